@@ -1,0 +1,204 @@
+"""Physical numbers of a model: how they are declared, listed, replaced and mapped to unbounded variables."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._types import Scalar, as_float64
+
+_Model = TypeVar("_Model", bound=eqx.Module)
+
+
+class ParameterSpec(NamedTuple):
+    """Declaration of one physical number.
+
+    Attributes:
+        symbol: letter of the equation.
+        unit: SI unit.
+        lower: smallest admissible value.
+        upper: largest admissible value.
+        fitted: whether a fit frees it unless told otherwise.
+    """
+
+    symbol: str
+    unit: str
+    lower: float
+    upper: float
+    fitted: bool
+
+
+class Parameter(NamedTuple):
+    """One physical number of a model.
+
+    Attributes:
+        name: `owner.field`, such as `cubic_stiffness.coefficient`; `mass` for the isolator's own.
+        spec: its declaration.
+        value: its present value.
+    """
+
+    name: str
+    spec: ParameterSpec
+    value: Float[Array, "..."]
+
+
+def parameter(
+    *, symbol: str, unit: str, lower: float = -math.inf, upper: float = math.inf, fitted: bool = True
+) -> Any:
+    """Declare a physical number of an element.
+
+    Args:
+        symbol: letter of the equation.
+        unit: SI unit.
+        lower: smallest admissible value.
+        upper: largest admissible value.
+        fitted: False for a number that is declared by the user and reported, but fitted only on request.
+
+    Returns:
+        A dataclass field, float64, that `list_parameters` finds.
+
+    Raises:
+        ValueError: if `lower` is not below `upper`.
+    """
+    if not lower < upper:
+        raise ValueError(f"Argument `lower` must be below `upper`, but {lower} is not below {upper}.")
+    spec = ParameterSpec(symbol, unit, lower, upper, fitted)
+    return eqx.field(converter=as_float64, metadata={"parameter": spec})
+
+
+def own_parameters(module: eqx.Module | type[eqx.Module]) -> tuple[tuple[str, ParameterSpec], ...]:
+    """List the parameters that a module declares itself, not those of modules inside it.
+
+    Args:
+        module: any equinox module, or its class.
+
+    Returns:
+        Pairs of field name and declaration, in the order of the fields.
+    """
+    return tuple(
+        (field.name, field.metadata["parameter"])
+        for field in dataclasses.fields(module)
+        if "parameter" in field.metadata
+    )
+
+
+def _owners(model: eqx.Module) -> list[tuple[str, eqx.Module]]:
+    """Pair every module of the model with its name in reports; a second element of a kind gets `_2`."""
+    owners: list[tuple[str, eqx.Module]] = [("", model)]
+    seen: dict[str, int] = {}
+    for element in getattr(model, "elements", ()):
+        seen[element.name] = seen.get(element.name, 0) + 1
+        suffix = "" if seen[element.name] == 1 else f"_{seen[element.name]}"
+        owners.append((element.name + suffix, element))
+    return owners
+
+
+def list_parameters(model: eqx.Module) -> tuple[Parameter, ...]:
+    """List the physical numbers of a model in a fixed order.
+
+    Args:
+        model: an isolator (own parameters first, then those of its elements) or a single element.
+
+    Returns:
+        Name, declaration and value of each.
+    """
+    return tuple(
+        Parameter(f"{owner}.{field}" if owner else field, spec, getattr(module, field))
+        for owner, module in _owners(model)
+        for field, spec in own_parameters(module)
+    )
+
+
+def _leaves(model: Any) -> list[Any]:
+    return [getattr(module, field) for _, module in _owners(model) for field, _ in own_parameters(module)]
+
+
+def replace_parameters(model: _Model, values: Sequence[Any] | Float[Array, " parameter"]) -> _Model:
+    """Give the same model with other numbers.
+
+    Args:
+        model: the model.
+        values: one value a parameter, in the order of `list_parameters`; plain numbers become float64 arrays.
+
+    Returns:
+        A new model.
+
+    Raises:
+        ValueError: if the count of values differs from that of the parameters.
+    """
+    count = len(_leaves(model))
+    if len(values) != count:
+        raise ValueError(f"Argument `values` must hold {count} numbers, but holds {len(values)}.")
+    return eqx.tree_at(_leaves, model, [as_float64(values[index]) for index in range(count)])
+
+
+def find_parameter(model: eqx.Module, name: str) -> int:
+    """Find a parameter by its name in reports.
+
+    Args:
+        model: the model.
+        name: such as `coulomb_friction.force`.
+
+    Returns:
+        Its place in `list_parameters(model)`.
+
+    Raises:
+        ValueError: if the model has no such parameter.
+    """
+    names = [entry.name for entry in list_parameters(model)]
+    if name not in names:
+        raise ValueError(f"Argument `name` must be one of {', '.join(names)}, but is {name!r}.")
+    return names.index(name)
+
+
+def to_physical(free: Scalar, spec: ParameterSpec, scale: Scalar | float) -> Scalar:
+    """Map an unbounded variable to a physical number within its bounds.
+
+    No bound: `scale * u`. One bound: softplus from it. Two: logistic between them.
+
+    Args:
+        free: the unbounded variable u.
+        spec: declaration with the bounds.
+        scale: magnitude of the physical number [its unit]; u is of order one.
+
+    Returns:
+        The physical number.
+    """
+    has_lower, has_upper = math.isfinite(spec.lower), math.isfinite(spec.upper)
+    if has_lower and has_upper:
+        return spec.lower + (spec.upper - spec.lower) * jax.nn.sigmoid(free)
+    if has_lower:
+        return spec.lower + scale * jax.nn.softplus(free)
+    if has_upper:
+        return spec.upper - scale * jax.nn.softplus(free)
+    return scale * free
+
+
+def to_free(value: Scalar | float, spec: ParameterSpec, scale: Scalar | float) -> Scalar:
+    """Map a physical number to its unbounded variable: the inverse of `to_physical`.
+
+    A value on or outside a bound starts a thousandth of its scale (or range) inside it.
+
+    Args:
+        value: the physical number.
+        spec: declaration with the bounds.
+        scale: as in `to_physical`.
+
+    Returns:
+        The unbounded variable.
+    """
+    has_lower, has_upper = math.isfinite(spec.lower), math.isfinite(spec.upper)
+    value = jnp.asarray(value)
+    if has_lower and has_upper:
+        share = jnp.clip((value - spec.lower) / (spec.upper - spec.lower), 1e-3, 1 - 1e-3)
+        return jnp.log(share) - jnp.log1p(-share)
+    if has_lower or has_upper:
+        distance = (value - spec.lower if has_lower else spec.upper - value) / scale
+        distance = jnp.maximum(distance, 1e-3)
+        return distance + jnp.log(-jnp.expm1(-distance))
+    return value / scale

@@ -1,0 +1,29 @@
+"""What force acts: one physical effect a file. This file is the catalogue: one import line an effect."""
+
+from ._abs_quadratic_damping import AbsQuadraticDamping as AbsQuadraticDamping
+from ._abs_quadratic_stiffness import AbsQuadraticStiffness as AbsQuadraticStiffness
+from ._added_mass import AddedMass as AddedMass
+from ._base import AbstractElement as AbstractElement
+from ._base import Scales as Scales
+from ._bouc_wen import BoucWen as BoucWen
+from ._coulomb_friction import CoulombFriction as CoulombFriction
+from ._cubic_damping import CubicDamping as CubicDamping
+from ._cubic_stiffness import CubicStiffness as CubicStiffness
+from ._dahl_friction import DahlFriction as DahlFriction
+from ._input_delay import InputDelay as InputDelay
+from ._input_gain import InputGain as InputGain
+from ._input_offset import InputOffset as InputOffset
+from ._linear_damping import LinearDamping as LinearDamping
+from ._linear_stiffness import LinearStiffness as LinearStiffness
+from ._maxwell_branch import MaxwellBranch as MaxwellBranch
+from ._position_damping import PositionDamping as PositionDamping
+from ._quadratic_stiffness import QuadraticStiffness as QuadraticStiffness
+from ._sensor_gain import SensorGain as SensorGain
+from ._sensor_offset import SensorOffset as SensorOffset
+
+CATALOGUE: dict[str, type[AbstractElement]] = {
+    member.name: member
+    for member in tuple(globals().values())
+    if isinstance(member, type) and issubclass(member, AbstractElement) and member is not AbstractElement
+}
+"""Every registered effect by its catalogue name."""

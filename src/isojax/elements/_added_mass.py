@@ -1,0 +1,40 @@
+"""Mass that moves along."""
+
+from typing import ClassVar
+
+from .._parameters import parameter
+from .._types import Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class AddedMass(AbstractElement):
+    """Mass that moves along and was not weighed.
+
+    `dm x''` [N].
+
+    Attributes:
+        mass: dm [kg].
+
+    Source: Newton's second law; not to be told from a force or accelerometer gain error in the linear range.
+    """
+
+    name: ClassVar[str] = "added_mass"
+    words: ClassVar[str] = "additional moving mass"
+    strength: ClassVar[str] = "mass"
+    signed: ClassVar[bool] = True
+
+    mass: Scalar = parameter(symbol="dm", unit="kg")
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "AddedMass":
+        """See `AbstractElement.guess`."""
+        return cls(0.0)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.mass
+
+    def inertia(self) -> Lanes | float:
+        """See `AbstractElement.inertia`."""
+        return self.mass

@@ -1,0 +1,163 @@
+"""The contract of an element: one physical effect, in the force balance or on the instruments."""
+
+import abc
+from typing import ClassVar
+
+import equinox as eqx
+
+from .._types import Internal, Lanes
+
+
+class Scales(eqx.Module):
+    """Typical magnitudes of a record, from which an element guesses its own parameters.
+
+    Attributes:
+        mass: moving mass [kg].
+        force: amplitude of the drive [N].
+        displacement: amplitude of the motion [m].
+        velocity: amplitude of the velocity [m/s].
+        acceleration: amplitude of the acceleration [m/s^2].
+        angular_frequency: centre of the excited band [rad/s].
+        sample_time: time between samples [s].
+        slowest_velocity: smallest velocity amplitude among the dwells or windows [m/s].
+        reading: amplitude of the measured output [its SI unit].
+    """
+
+    mass: float
+    force: float
+    displacement: float
+    velocity: float
+    acceleration: float
+    angular_frequency: float
+    sample_time: float
+    slowest_velocity: float
+    reading: float
+
+
+class AbstractElement(eqx.Module):
+    """One physical effect. Concrete elements declare what they are and override the methods they need.
+
+    The force balance is `mass x'' + sum of forces = F(t)`, the paper's eq. (4): a spring returns `+k x`.
+    Every method is neutral here, so that the isolator may ask each element everything and never its type.
+
+    Attributes:
+        name: catalogue name.
+        words: what the effect is, for reports.
+        strength: the field that is zero when the effect is absent.
+        signed: whether a negative strength is physical.
+        internal_states: how many internal states it carries.
+        substeps: integration steps a sample that the law needs at least (sharp laws need more than one).
+    """
+
+    name: ClassVar[str]
+    words: ClassVar[str]
+    strength: ClassVar[str]
+    signed: ClassVar[bool] = False
+    internal_states: ClassVar[int] = 0
+    substeps: ClassVar[int] = 1
+
+    @classmethod
+    @abc.abstractmethod
+    def guess(cls, scales: Scales) -> "AbstractElement":
+        """Give the absent effect (zero strength) with sensible shape parameters.
+
+        Args:
+            scales: magnitudes of the record.
+
+        Returns:
+            The element at zero strength.
+        """
+
+    @classmethod
+    def grid(cls, scales: Scales) -> "tuple[AbstractElement, ...]":
+        """Give the absent effect over a grid of the parameters that mean nothing at zero strength.
+
+        Args:
+            scales: magnitudes of the record.
+
+        Returns:
+            Elements at zero strength; one if there is nothing to vary.
+        """
+        return (cls.guess(scales),)
+
+    @classmethod
+    @abc.abstractmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """Give the strength at which the effect would be as large as the motion itself.
+
+        Args:
+            scales: magnitudes of the record.
+
+        Returns:
+            Strength [its SI unit], positive; the scale of columns and of bounds.
+        """
+
+    def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
+        """Give the force on the left-hand side of the balance [N].
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            s: internal states.
+
+        Returns:
+            Force [N], positive when it opposes positive motion.
+        """
+        return 0.0 * x
+
+    def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
+        """Give the rates of the internal states.
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            s: internal states.
+
+        Returns:
+            One rate an internal state.
+        """
+        return tuple(0.0 * state for state in s)
+
+    def inertia(self) -> Lanes | float:
+        """Give the mass that moves with the isolator [kg]."""
+        return 0.0
+
+    def drive(self, u: Lanes, u_rate: Lanes) -> tuple[Lanes, Lanes]:
+        """Turn the recorded drive into the one that acted.
+
+        Args:
+            u: recorded drive, already shifted by `shift()` [N, or m/s^2 for base excitation].
+            u_rate: its time derivative.
+
+        Returns:
+            The drive that acted, and its time derivative.
+        """
+        return u, u_rate
+
+    def shift(self) -> Lanes | float:
+        """Give the time by which the recorded drive leads the one that acted [s]."""
+        return 0.0
+
+    def reading(self, y: Lanes, s: Internal) -> Lanes:
+        """Turn the motion at the sensor into the recorded reading.
+
+        Args:
+            y: motion at the sensor [its SI unit].
+            s: internal states.
+
+        Returns:
+            The reading.
+        """
+        return y
+
+    def reading_rate(self, y: Lanes, s: Internal) -> Internal:
+        """Give what the motion at the sensor adds to the rates of the internal states (a sensor with memory).
+
+        Args:
+            y: motion at the sensor [its SI unit].
+            s: internal states.
+
+        Returns:
+            One rate an internal state.
+        """
+        return tuple(0.0 * state for state in s)

@@ -1,0 +1,67 @@
+"""Bouc-Wen hysteresis."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from .._parameters import parameter
+from .._types import Internal, Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class BoucWen(AbstractElement):
+    """Bouc-Wen hysteresis: a spring whose force depends on the path, not on the rate.
+
+    `f = K z`, `z' = v - beta |v| |z|^(n-1) z - gamma v |z|^n`.
+
+    Dissipation over the visited loop is what makes a parameter set admissible, not `|gamma| <= beta`.
+
+    Attributes:
+        stiffness: K [N/m].
+        beta: size of the loop [1/m^n].
+        gamma: its shape [1/m^n].
+        exponent: n, sharpness of the knee; fitted only on request.
+
+    Source: Bouc 1967; Wen 1976, J. Eng. Mech. 102:249; Ismail, Ikhouane & Rodellar 2009, eq. (2).
+    """
+
+    name: ClassVar[str] = "bouc_wen"
+    words: ClassVar[str] = "Bouc-Wen hysteresis"
+    strength: ClassVar[str] = "stiffness"
+    internal_states: ClassVar[int] = 1
+    substeps: ClassVar[int] = 2
+
+    stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
+    beta: Scalar = parameter(symbol="beta", unit="1/m^n", lower=0.0)
+    gamma: Scalar = parameter(symbol="gamma", unit="1/m^n")
+    exponent: Scalar = parameter(symbol="n", unit="1", lower=0.5, upper=10.0, fitted=False)
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "BoucWen":
+        """See `AbstractElement.guess`."""
+        return cls(0.0, 1.0 / scales.displacement, -0.5 / scales.displacement, 1.0)
+
+    @classmethod
+    def grid(cls, scales: Scales) -> "tuple[BoucWen, ...]":
+        """See `AbstractElement.grid`: softening and hardening loops, from slight to full."""
+        return tuple(
+            cls(0.0, size / scales.displacement, shape * size / scales.displacement, 1.0)
+            for size in (0.2, 1.0, 5.0)
+            for shape in (0.5, -0.9)
+        )
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.force / scales.displacement
+
+    def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
+        """See `AbstractElement.force`."""
+        return self.stiffness * s[0]
+
+    def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
+        """See `AbstractElement.state_rate`."""
+        (z,) = s
+        # |z|^n has a NaN derivative in n at rest; the floor is far below any measured displacement.
+        power = jnp.maximum(jnp.abs(z), 1e-30) ** self.exponent
+        return (v - self.beta * jnp.abs(v) * power * jnp.sign(z) - self.gamma * v * power,)

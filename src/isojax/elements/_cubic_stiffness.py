@@ -1,0 +1,40 @@
+"""Cubic spring."""
+
+from typing import ClassVar
+
+from .._parameters import parameter
+from .._types import Internal, Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class CubicStiffness(AbstractElement):
+    """Cubic spring.
+
+    `k3 x^3` [N].
+
+    Attributes:
+        coefficient: k3 [N/m^3].
+
+    Source: the paper, eq. (13); equivalent stiffness (3/4) k3 X^2, eq. (7).
+    """
+
+    name: ClassVar[str] = "cubic_stiffness"
+    words: ClassVar[str] = "cubic spring"
+    strength: ClassVar[str] = "coefficient"
+    signed: ClassVar[bool] = True
+
+    coefficient: Scalar = parameter(symbol="k3", unit="N/m^3")
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "CubicStiffness":
+        """See `AbstractElement.guess`."""
+        return cls(0.0)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.force / scales.displacement**3
+
+    def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
+        """See `AbstractElement.force`."""
+        return self.coefficient * x * x * x

@@ -1,0 +1,41 @@
+"""Delay of the drive."""
+
+from typing import ClassVar
+
+from .._parameters import parameter
+from .._types import Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class InputDelay(AbstractElement):
+    """The force acts later than it was recorded (converter, filter, or clock skew).
+
+    The force that acts at t is the one recorded at t - tau.
+
+    Attributes:
+        delay: tau [s].
+
+    Source: the apparent damping tau (k - m w^2) changes sign at resonance (Pintelon & Schoukens 2012, sec.
+        13.2).
+    """
+
+    name: ClassVar[str] = "input_delay"
+    words: ClassVar[str] = "delay between the force and the response channel"
+    strength: ClassVar[str] = "delay"
+    signed: ClassVar[bool] = True
+
+    delay: Scalar = parameter(symbol="tau", unit="s")
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "InputDelay":
+        """See `AbstractElement.guess`."""
+        return cls(0.0)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return 1.0 / scales.angular_frequency
+
+    def shift(self) -> Lanes | float:
+        """See `AbstractElement.shift`."""
+        return self.delay

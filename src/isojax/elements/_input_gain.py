@@ -1,0 +1,40 @@
+"""Gain of the drive channel."""
+
+from typing import ClassVar
+
+from .._parameters import parameter
+from .._types import Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class InputGain(AbstractElement):
+    """The force that acts is (1 + g) times the recorded one.
+
+    `F -> (1 + g) F`.
+
+    Attributes:
+        deviation: g [1].
+
+    Source: calibration error of a linear transducer.
+    """
+
+    name: ClassVar[str] = "input_gain"
+    words: ClassVar[str] = "gain error of the force channel"
+    strength: ClassVar[str] = "deviation"
+    signed: ClassVar[bool] = True
+
+    deviation: Scalar = parameter(symbol="g", unit="1", lower=-0.99)
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "InputGain":
+        """See `AbstractElement.guess`."""
+        return cls(0.0)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return 1.0
+
+    def drive(self, u: Lanes, u_rate: Lanes) -> tuple[Lanes, Lanes]:
+        """See `AbstractElement.drive`."""
+        return (1.0 + self.deviation) * u, (1.0 + self.deviation) * u_rate

@@ -1,0 +1,40 @@
+"""Offset of the drive channel."""
+
+from typing import ClassVar
+
+from .._parameters import parameter
+from .._types import Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class InputOffset(AbstractElement):
+    """A constant adds to the recorded drive.
+
+    `F -> F + F0`.
+
+    Attributes:
+        offset: F0 [N, or m/s^2 for base excitation].
+
+    Source: zero error of a linear transducer.
+    """
+
+    name: ClassVar[str] = "input_offset"
+    words: ClassVar[str] = "offset of the force channel"
+    strength: ClassVar[str] = "offset"
+    signed: ClassVar[bool] = True
+
+    offset: Scalar = parameter(symbol="F0", unit="N")
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "InputOffset":
+        """See `AbstractElement.guess`."""
+        return cls(0.0)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.force
+
+    def drive(self, u: Lanes, u_rate: Lanes) -> tuple[Lanes, Lanes]:
+        """See `AbstractElement.drive`."""
+        return u + self.offset, u_rate

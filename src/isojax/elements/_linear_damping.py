@@ -1,0 +1,40 @@
+"""Viscous damper."""
+
+from typing import ClassVar
+
+from .._parameters import parameter
+from .._types import Internal, Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class LinearDamping(AbstractElement):
+    """Viscous damper.
+
+    `c1 v` [N].
+
+    Attributes:
+        coefficient: c1 [N s/m].
+
+    Source: the paper, eq. (4).
+    """
+
+    name: ClassVar[str] = "linear_damping"
+    words: ClassVar[str] = "viscous damping"
+    strength: ClassVar[str] = "coefficient"
+    signed: ClassVar[bool] = False
+
+    coefficient: Scalar = parameter(symbol="c1", unit="N s/m")
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "LinearDamping":
+        """See `AbstractElement.guess`."""
+        return cls(0.0)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.force / scales.velocity
+
+    def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
+        """See `AbstractElement.force`."""
+        return self.coefficient * v

@@ -1,0 +1,11 @@
+"""What drives the isolator."""
+
+from ._base import AbstractExcitation as AbstractExcitation
+from ._harmonic import Harmonic as Harmonic
+from ._multisine import Multisine as Multisine
+from ._multisine import random_phase_multisine as random_phase_multisine
+from ._sampled import Hold as Hold
+from ._sampled import Sampled as Sampled
+from ._sampled import tabulate as tabulate
+from ._stepped_sine import SteppedSine as SteppedSine
+from ._swept_sine import SweptSine as SweptSine

@@ -1,0 +1,23 @@
+"""One sine."""
+
+import jax.numpy as jnp
+
+from .._parameters import parameter
+from .._types import Lanes, Scalar
+from ._base import AbstractExcitation
+
+
+class Harmonic(AbstractExcitation):
+    """`amplitude sin(2 pi frequency t)`, phase 0 at t = 0.
+
+    Attributes:
+        amplitude: F0 [N, or m/s^2 for base excitation].
+        frequency: f [Hz].
+    """
+
+    amplitude: Scalar = parameter(symbol="F0", unit="N")
+    frequency: Scalar = parameter(symbol="f", unit="Hz", lower=0.0)
+
+    def __call__(self, t: Lanes) -> Lanes:
+        """See `AbstractExcitation.__call__`."""
+        return self.amplitude * jnp.sin(2.0 * jnp.pi * self.frequency * t)

@@ -1,0 +1,190 @@
+"""Segments side by side: what one compiled scan takes."""
+
+import os
+from typing import NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from ..excitations import Hold, tabulate
+from ..models import RK4, Isolator, Quantity
+from ..records import Record, measured_state
+from ._segments import Segment
+
+
+class Batch(eqx.Module):
+    """Segments of equal sampling, padded to one length; a lane a segment.
+
+    Attributes:
+        drive: recorded drive at the stages of each sample's integration steps [its SI unit].
+        drive_rate: its time derivative.
+        measured: measured output [its SI unit].
+        weight: 1 where a sample counts, 0 where it does not (padding, settling).
+    """
+
+    drive: Float[Array, "time stage lanes"]
+    drive_rate: Float[Array, "time stage lanes"]
+    measured: Float[Array, "time lanes"]
+    weight: Float[Array, "time lanes"]
+
+
+class Prepared(NamedTuple):
+    """Batches of one set of segments, ready to simulate.
+
+    Attributes:
+        batches: equal shapes, one a worker thread; lanes run through them in order.
+        segments: the segments, a lane each; padding lanes repeat none.
+        record: record of each lane, padding lanes included (0 there).
+        starts: measured displacement and velocity at each lane's first sample; shape (2, lanes).
+        spread: rms displacement and velocity of each lane; shape (2, lanes).
+        quantity: what the sensor measures.
+        sample_time: time between samples [s].
+        count: samples that count in each record.
+    """
+
+    batches: tuple[Batch, ...]
+    segments: tuple[Segment, ...]
+    record: Int[np.ndarray, " lanes"]
+    starts: Float[np.ndarray, "2 lanes"]
+    spread: Float[np.ndarray, "2 lanes"]
+    quantity: Quantity
+    sample_time: float
+    count: Float[np.ndarray, " record"]
+
+
+def workers() -> int:
+    """Give the number of threads that share a batch: the cores on a CPU, one elsewhere."""
+    if jax.default_backend() != "cpu":
+        return 1
+    return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+
+
+def prepare(
+    records: tuple[Record, ...],
+    segments: tuple[Segment, ...],
+    *,
+    quantity: Quantity,
+    hold: Hold,
+    substeps: int,
+    shift: float = 0.0,
+) -> Prepared:
+    """Lay segments side by side.
+
+    Args:
+        records: the records that the segments refer to, equal in rate.
+        segments: pieces of them.
+        quantity: what the sensor measures.
+        hold: what the drive does between samples.
+        substeps: integration steps a sample.
+        shift: time by which the drive acts later than it was recorded [s].
+
+    Returns:
+        The batches and what belongs to their lanes.
+    """
+    length = max(segment.stop - segment.start for segment in segments)
+    threads = min(workers(), len(segments))
+    lanes = -(-len(segments) // threads) * threads
+    stages = 2 * substeps + 1
+    drive = np.zeros((length, stages, lanes))
+    rates = np.zeros((length, stages, lanes))
+    measured, weight = np.zeros((length, lanes)), np.zeros((length, lanes))
+    starts, spread = np.zeros((2, lanes)), np.ones((2, lanes))
+    owner = np.zeros(lanes, dtype=int)
+    place = -1
+    table = slopes = np.zeros((0, stages))
+    motion: tuple[np.ndarray, ...] = ()
+    for lane, segment in enumerate(segments):
+        record = records[segment.record]
+        if segment.record != place:
+            place = segment.record
+            table, slopes = tabulate(record.input, record.rate, hold, substeps, shift)
+            motion = measured_state(record, quantity)[:2]
+        window = slice(segment.start, segment.stop)
+        size = segment.stop - segment.start
+        drive[:size, :, lane], rates[:size, :, lane] = table[window], slopes[window]
+        measured[:size, lane] = record.output[window]
+        weight[segment.counted - segment.start : size, lane] = 1.0
+        owner[lane] = segment.record
+        for state in range(2):
+            starts[state, lane] = motion[state][segment.start]
+            spread[state, lane] = max(np.std(motion[state][window]), 1e-300)
+    share = lanes // threads
+    batches = tuple(
+        Batch(
+            *(jnp.asarray(values[..., first : first + share]) for values in (drive, rates, measured, weight))
+        )
+        for first in range(0, lanes, share)
+    )
+    count = np.bincount(owner, weights=weight.sum(axis=0), minlength=len(records))
+    return Prepared(batches, segments, owner, starts, spread, quantity, 1.0 / records[0].rate, count)
+
+
+MEMORY_STEPS = 4
+"""Integration steps a sample where internal states follow a measured motion."""
+
+
+@eqx.filter_jit
+def _memory_along(
+    model: Isolator, drive: Array, path: tuple[Array, Array], quantity: Quantity, sample_time: float
+) -> tuple[Array, ...]:
+    """Integrate the internal states along a given motion, straight between samples."""
+    solver = RK4()
+
+    def field(t: float, internal: tuple[Array, ...], ends: tuple[Array, ...]) -> tuple[Array, ...]:
+        x0, v0, x1, v1, u = ends
+        state = (x0 + t * (x1 - x0), v0 + t * (v1 - v0), *internal)
+        return tuple(sample_time * rate for rate in model.rates(state, u, 0.0, quantity)[2:])
+
+    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
+
+    def body(
+        internal: tuple[Array, ...], ends: tuple[Array, ...]
+    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        moved = internal
+        for step in range(MEMORY_STEPS):
+            t0, t1 = step / MEMORY_STEPS, (step + 1) / MEMORY_STEPS
+            moved, *_ = solver.step(term, t0, t1, moved, ends, None, False)
+        return moved, internal
+
+    x, v = path
+    rest = tuple(jnp.zeros(()) for _ in range(model.internal_states))
+    return jax.lax.scan(body, rest, (x[:-1], v[:-1], x[1:], v[1:], drive[:-1]))[1]
+
+
+def internal_starts(
+    model: Isolator, records: tuple[Record, ...], prepared: Prepared
+) -> tuple[Float[np.ndarray, "internal lanes"], Float[np.ndarray, "internal lanes"]]:
+    """Run the internal states of a model along the measured motion.
+
+    Args:
+        model: the isolator; its memories are taken along, its force balance is not.
+        records: the records of the segments.
+        prepared: the segments.
+
+    Returns:
+        Internal states at each lane's first sample, and their rms over the lane.
+    """
+    lanes = prepared.record.size
+    starts = np.zeros((model.internal_states, lanes))
+    spread = np.ones((model.internal_states, lanes))
+    if model.internal_states == 0:
+        return starts, spread
+    place, histories = -1, ()
+    for lane, segment in enumerate(prepared.segments):
+        if segment.record != place:
+            place = segment.record
+            record = records[place]
+            x, v = (jnp.asarray(value) for value in measured_state(record, prepared.quantity)[:2])
+            histories = _memory_along(
+                model, jnp.asarray(record.input), (x, v), prepared.quantity, prepared.sample_time
+            )
+            histories = tuple(np.asarray(history) for history in histories)
+        for state, history in enumerate(histories):
+            first = min(segment.start, history.size - 1)
+            starts[state, lane] = history[first]
+            spread[state, lane] = max(np.sqrt(np.mean(history[first : segment.stop] ** 2)), 1e-300)
+    return starts, spread

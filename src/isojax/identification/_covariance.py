@@ -1,0 +1,67 @@
+"""Uncertainty of fitted coefficients, in physical units: the one module that turns information into error bars."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+SMALLEST_SHARE = 1e-11
+"""Relative eigenvalue of the scaled information below which a combination counts as undetermined.
+
+Products are accumulated in float64, so that shares of about 1e-13 are rounding; a hundred times that is the margin.
+"""
+
+
+class Uncertainty(NamedTuple):
+    """Error bars.
+
+    Attributes:
+        covariance: of the coefficients [product of their units]; NaN in rows that the data do not determine.
+        standard_error: square root of its diagonal.
+        correlation: covariance scaled to a unit diagonal.
+        determined: False where a coefficient belongs to a combination that the data do not determine.
+        partners: for each undetermined combination, the places of the coefficients in it.
+    """
+
+    covariance: Float[np.ndarray, "column column"]
+    standard_error: Float[np.ndarray, " column"]
+    correlation: Float[np.ndarray, "column column"]
+    determined: Bool[np.ndarray, " column"]
+    partners: tuple[tuple[int, ...], ...]
+
+
+def uncertainty(matrix: Float[np.ndarray, "column column"], inflation: float = 1.0) -> Uncertainty:
+    """Invert an information matrix.
+
+    `C = inflation (J'J)^-1` with J the whitened derivatives after the nuisances. The matrix is first scaled to a unit
+    diagonal, so that stiffness in N/m and in N/m^3 do not spoil each other.
+
+    Args:
+        matrix: J'J [inverse product of units], coefficients only.
+        inflation: factor on the covariance: max(1, chi2/dof) where the model does not explain all of the data.
+
+    Returns:
+        The uncertainty.
+
+    Source: Seber & Wild 1989, Nonlinear Regression, eq. (2.21).
+    """
+    count = matrix.shape[0]
+    size = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    dead = ~(size > 0.0)
+    safe = np.where(dead, 1.0, size)
+    scaled = matrix / np.outer(safe, safe)
+    values, vectors = np.linalg.eigh(scaled) if count else (np.zeros(0), np.zeros((0, 0)))
+    good = values > SMALLEST_SHARE * max(1.0, count)
+    partners = tuple(
+        tuple(int(place) for place in np.flatnonzero(np.abs(vectors[:, index]) > 0.1))
+        for index in np.flatnonzero(~good)
+    )
+    determined = ~dead
+    for group in partners:
+        determined[list(group)] = False
+    inverse = (vectors[:, good] / values[good]) @ vectors[:, good].T
+    covariance = inflation * inverse / np.outer(safe, safe)
+    covariance[~determined, :] = np.nan
+    covariance[:, ~determined] = np.nan
+    error = np.sqrt(np.diag(covariance))
+    return Uncertainty(covariance, error, covariance / np.outer(error, error), determined, partners)

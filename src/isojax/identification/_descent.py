@@ -1,0 +1,176 @@
+"""The search itself: optimistix on systems of coefficient size."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from .._parameters import list_parameters, replace_parameters, to_free, to_physical
+from .._results import RESULTS
+from ..models import Isolator
+from ._elimination import Nuisances, step_nuisances
+from ._problem import Bench, Point, one_hot
+
+FIRST_DAMPING = 1e-3
+"""Marquardt's damping at the first step, over the diagonal of the normal equations: light, since starts are good."""
+
+RUNAWAY = 1e75
+"""Residual that stands for a simulation that ran away: finite, so that the solver steps back and not out."""
+
+
+class Descent(NamedTuple):
+    """How a search ended.
+
+    Attributes:
+        point: the best point, its columns in physical units of the free coefficients.
+        result: how it ended.
+        steps: evaluations of the simulation and its derivatives.
+    """
+
+    point: Point
+    result: RESULTS
+    steps: int
+
+
+class _Local(NamedTuple):
+    """Residual and Jacobian at one point, compressed to coefficient size."""
+
+    start: Float[Array, " column"]
+    residual: Float[Array, " row"]
+    jacobian: Float[Array, "row column"]
+
+
+def _residual(free: Float[Array, " column"], local: _Local) -> tuple[Float[Array, " row"], None]:
+    """Residual as optimistix sees it: exact in value and derivative at the point where it is asked."""
+    return local.residual + local.jacobian @ (free - local.start), None
+
+
+def _compress(matrix: Float[np.ndarray, "column column"]) -> tuple[np.ndarray, np.ndarray]:
+    """Give the residual and Jacobian of least size with the same normal equations (Cholesky factor)."""
+    count = matrix.shape[0] - 1
+    if not np.all(np.isfinite(matrix)):
+        return np.full(count + 1, RUNAWAY), np.zeros((count + 1, count))
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix / np.outer(size, size)
+    ridge = 1e-14
+    while True:
+        try:
+            factor = np.linalg.cholesky(scaled + ridge * np.eye(count + 1))
+            break
+        except np.linalg.LinAlgError:
+            ridge *= 10.0
+    factor = factor * size[:, None]
+    return factor[-1].copy(), -np.vstack([factor[:count, :count].T, np.zeros((1, count))])
+
+
+@eqx.filter_jit
+def _init(solver: Any, free: Array, local: _Local) -> Any:
+    struct = jax.eval_shape(lambda: local.residual)
+    return solver.init(_residual, free, local, {}, struct, None, frozenset())
+
+
+@eqx.filter_jit
+def _step(solver: Any, free: Array, local: _Local, state: Any) -> tuple[Array, Any]:
+    free, state, _ = solver.step(_residual, free, local, {}, state, frozenset())
+    return free, state
+
+
+def descend(
+    bench: Bench,
+    model: Isolator,
+    places: tuple[int, ...],
+    scales: tuple[float, ...],
+    nuisances: Nuisances,
+    *,
+    solver: optx.AbstractLeastSquaresSolver,
+    max_steps: int,
+    progress: Callable[[str], None],
+) -> Descent:
+    """Fit coefficients to the records, nuisances eliminated on the way.
+
+    Each step simulates every segment once with its exact forward derivatives. optimistix sees the compressed residual
+    at the point it asks for; the nuisances of a trial point are those that its step implies.
+
+    Args:
+        bench: the records.
+        model: start.
+        places: free coefficients, by their place in `list_parameters`.
+        scales: magnitude of each.
+        nuisances: start of the nuisances.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations after which the search gives up.
+        progress: told a line a step.
+
+    Returns:
+        The best point and how the search ended.
+
+    Source: Golub & Pereyra 1973 (variable projection); Marquardt 1963.
+    """
+    listed = list_parameters(model)
+    values = [entry.value for entry in listed]
+    specs = [listed[place].spec for place in places]
+
+    def physical(free: Array) -> Isolator:
+        numbers = list(values)
+        for column, place in enumerate(places):
+            numbers[place] = to_physical(free[column], specs[column], scales[column])
+        return replace_parameters(model, numbers)
+
+    def slopes(free: Array) -> list[float]:
+        return [
+            float(jax.jvp(lambda u, c=c: to_physical(u, specs[c], scales[c]), (free[c],), (jnp.ones(()),))[1])
+            for c in range(len(places))
+        ]
+
+    free = jnp.stack([to_free(values[place], specs[c], scales[c]) for c, place in enumerate(places)])
+    # Marquardt's scaling: the solver's variables are those in which the first normal equations have an equal diagonal.
+    unit = np.ones(len(places))
+    trial, trial_nuisances, best_free, scaled = free, nuisances, free, free
+    best: Point | None = None
+    state: Any = None
+    result, evaluations, accepted_before = RESULTS.not_converged, 0, 0
+    while evaluations < max_steps:
+        current = physical(trial)
+        point = bench.evaluate(current, one_hot(current, places, slopes(trial)), trial_nuisances)
+        evaluations += 1
+        residual, jacobian = _compress(point.reduced.matrix)
+        if state is None:
+            if not point.is_finite:
+                return Descent(point, RESULTS.not_finite, evaluations)
+            unit = np.sqrt(1.0 / FIRST_DAMPING / np.maximum(np.sum(jacobian**2, axis=0), 1e-300))
+        local = _Local(trial / unit, jnp.asarray(residual), jnp.asarray(jacobian * unit))
+        if state is None:
+            scaled = trial / unit
+            state = _init(solver, scaled, local)
+        scaled, state = _step(solver, scaled, local, state)
+        accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
+        chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
+        progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
+        if accepted:
+            best, best_free = point, trial
+            # Predicted decrease of chi2: a hundredth of a standard error is no longer a step.
+            decrement = float(np.sum(residual[:-1] ** 2)) / max(1.0, chi2)
+            if decrement < 1e-4 * max(1, len(places)):
+                result = RESULTS.successful
+                break
+        if bool(state.terminate):
+            result = RESULTS.successful
+            break
+        trial = state.y_eval * unit
+        assert best is not None
+        owner = bench.prepared(best.model, len(best.model.elements)).record
+        trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
+    assert best is not None
+    return Descent(_in_physical_units(best, slopes(best_free)), result, evaluations)
+
+
+def _in_physical_units(point: Point, slopes: list[float]) -> Point:
+    """Rescale the columns of a point from unbounded variables to physical coefficients."""
+    factor = np.append(1.0 / np.asarray(slopes), 1.0)
+    by_record = point.reduced.by_record * np.outer(factor, factor)
+    return point._replace(reduced=point.reduced._replace(by_record=by_record))

@@ -1,0 +1,143 @@
+"""Nuisances taken out of the normal equations, segment by segment and record by record.
+
+Every coefficient of interest sees only what is left of the data once the initial states of the segments and the stiffness
+scales of the records have explained what they can: variable projection, done on the small matrices of `information`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ._information import STIFFNESS_SCALE_UNIT
+
+
+class Nuisances(NamedTuple):
+    """Where the nuisances stand, and their priors.
+
+    Attributes:
+        states: deviation of each segment's initial states from the measured ones, in the states' own scales (which
+            are also the standard deviations of their priors).
+        stiffness: deviation of each record's linear stiffness [units of `STIFFNESS_SCALE_UNIT`].
+        stiffness_spread: standard deviation of its prior [relative stiffness].
+    """
+
+    states: Float[np.ndarray, "lanes state"]
+    stiffness: Float[np.ndarray, " record"]
+    stiffness_spread: float
+
+
+class Reduced(NamedTuple):
+    """Normal equations of the coefficients alone, and the way back to the nuisances.
+
+    Attributes:
+        by_record: [[J'J, J'r], [r'J, r'r]] after the nuisances; coefficients first, residual last; whitened.
+        eliminated: degrees of freedom that the nuisances of each record took from the data.
+        raw: squared size of each coefficient column before anything was eliminated; whitened.
+        stiffness_map: step of the stiffness scales = map[:, -1] - map[:, :-1] @ step of the coefficients.
+        stiffness_variance: of each record's stiffness scale, given the coefficients [relative stiffness squared].
+        states_map: step of the states = map[..., -1] - map[..., :-1] @ [step of coefficients, of the stiffness scale].
+    """
+
+    by_record: Float[np.ndarray, "record column column"]
+    eliminated: Float[np.ndarray, " record"]
+    raw: Float[np.ndarray, " column"]
+    stiffness_map: Float[np.ndarray, "record column"]
+    stiffness_variance: Float[np.ndarray, " record"]
+    states_map: Float[np.ndarray, "lanes state column2"]
+
+    @property
+    def matrix(self) -> Float[np.ndarray, "column column"]:
+        """Normal equations of all records together."""
+        return self.by_record.sum(axis=0)
+
+
+def eliminate(
+    matrices: Float[np.ndarray, "lanes column column"],
+    noise: float,
+    owner: Int[np.ndarray, " lanes"],
+    used: int,
+    records: int,
+    columns: int,
+    has_scale: bool,
+    nuisances: Nuisances,
+) -> Reduced:
+    """Eliminate the initial states of each segment, then the stiffness scale of each record.
+
+    Args:
+        matrices: from `information`.
+        noise: rms of the noise [SI unit of the output].
+        owner: record of each lane.
+        used: lanes that hold a segment; the rest is padding.
+        records: count of records.
+        columns: count of coefficient columns.
+        has_scale: whether the stiffness scale has a column.
+        nuisances: where they stand, and their priors.
+
+    Returns:
+        The reduced equations.
+    """
+    matrices = matrices[:used] / noise**2
+    states = matrices.shape[1] - columns - int(has_scale) - 1
+    shared = columns + int(has_scale)
+    keep = np.r_[0:shared, shared + states]
+    drop = np.arange(shared, shared + states)
+
+    # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
+    offset = nuisances.states[:used]
+    inner = matrices[:, drop[:, None], drop] + np.eye(states)
+    cross = matrices[:, drop[:, None], keep].copy()
+    cross[:, :, -1] -= offset
+    outer = matrices[:, keep[:, None], keep].copy()
+    outer[:, -1, -1] += np.sum(offset**2, axis=1)
+    states_map = np.linalg.solve(inner, cross)
+    left = outer - np.swapaxes(cross, 1, 2) @ states_map
+    eliminated = np.zeros(records)
+    np.add.at(eliminated, owner[:used], states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2))
+
+    per_record = np.zeros((records, shared + 1, shared + 1))
+    np.add.at(per_record, owner[:used], left)
+    stiffness_map = np.zeros((records, columns + 1))
+    variance = np.zeros(records)
+    reduced = per_record.copy()
+    if has_scale:
+        spread = nuisances.stiffness_spread / STIFFNESS_SCALE_UNIT
+        pivot = per_record[:, columns, columns] + 1.0 / spread**2
+        row = np.delete(per_record[:, columns, :], columns, axis=1)
+        row[:, -1] -= nuisances.stiffness / spread**2
+        stiffness_map, variance = row / pivot[:, None], STIFFNESS_SCALE_UNIT**2 / pivot
+        reduced = np.delete(np.delete(per_record, columns, axis=1), columns, axis=2)
+        reduced[:, -1, -1] += (nuisances.stiffness / spread) ** 2
+        reduced = reduced - stiffness_map[:, :, None] * row[:, None, :]
+        eliminated += 1.0 - 1.0 / (pivot * spread**2)
+    raw = np.diagonal(matrices, axis1=1, axis2=2).sum(axis=0)[:columns]
+    return Reduced(reduced, eliminated, raw, stiffness_map, variance, states_map)
+
+
+def step_nuisances(
+    reduced: Reduced,
+    owner: Int[np.ndarray, " lanes"],
+    nuisances: Nuisances,
+    step: Float[np.ndarray, " column"],
+) -> Nuisances:
+    """Give the nuisances that go with a step of the coefficients.
+
+    Args:
+        reduced: the equations at the present point.
+        owner: record of each lane.
+        nuisances: where they stand.
+        step: step of the coefficients, in the units of their columns.
+
+    Returns:
+        The nuisances after the step.
+    """
+    stiffness_step = reduced.stiffness_map[:, -1] - reduced.stiffness_map[:, :-1] @ step
+    used = reduced.states_map.shape[0]
+    coefficients = reduced.states_map[:, :, : step.size] @ step
+    if reduced.states_map.shape[2] == step.size + 2:
+        coefficients = (
+            coefficients + reduced.states_map[:, :, step.size] * stiffness_step[owner[:used]][:, None]
+        )
+    states = nuisances.states.copy()
+    states[:used] += reduced.states_map[:, :, -1] - coefficients
+    return Nuisances(states, nuisances.stiffness + stiffness_step, nuisances.stiffness_spread)

@@ -1,0 +1,203 @@
+"""How far a model is from records: free runs from start to end, and restarts at every segment."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from .._parameters import list_parameters
+from ..models import Isolator
+from ..records import Record
+from ._elimination import Nuisances, step_nuisances
+from ._information import readings
+from ._problem import Bench, Point, Problem, stiffness_deviation
+from ._segments import Segment
+
+ROUNDS = 3
+"""Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
+
+
+class Errors(NamedTuple):
+    """Errors of one role's records.
+
+    Attributes:
+        rmse: free-run error, rms [SI unit of the output].
+        nrmse: the same over the rms of the measured output about its record's mean.
+        nrmse_segments: the error with every segment restarted, likewise normalised.
+        chi2_per_dof: squared whitened error with every segment restarted, a degree of freedom.
+    """
+
+    rmse: float
+    nrmse: float
+    nrmse_segments: float
+    chi2_per_dof: float
+
+
+class Run(NamedTuple):
+    """One record against its simulation.
+
+    Attributes:
+        record: the record.
+        simulated: what the sensor chain would record [SI unit of the output].
+        counted: whether each sample's error counts.
+    """
+
+    record: Record
+    simulated: Float[np.ndarray, " time"]
+    counted: Float[np.ndarray, " time"]
+
+    @property
+    def residual(self) -> Float[np.ndarray, " time"]:
+        """Measured less simulated [SI unit of the output]; 0 where a sample does not count."""
+        return np.where(self.counted > 0.0, self.record.output - self.simulated, 0.0)
+
+
+class Restarts(NamedTuple):
+    """Records with every segment restarted from its own best initial state.
+
+    Attributes:
+        runs: each record, its segments joined.
+        point: the equations at the best nuisances; no coefficient has a column.
+    """
+
+    runs: tuple[Run, ...]
+    point: Point
+
+    @property
+    def stiffness(self) -> Float[np.ndarray, " record"]:
+        """Relative deviation of each record's linear stiffness."""
+        return stiffness_deviation(self.point.nuisances)
+
+
+def _best_nuisances(bench: Bench, model: Isolator, spread: float) -> Point:
+    """Find the nuisances at given coefficients."""
+    nothing = np.zeros((len(list_parameters(model)), 0))
+    carried = len(model.elements)
+    point = bench.evaluate(model, nothing, bench.settle(None, model, carried, spread))
+    owner = bench.prepared(model, carried).record
+    for _ in range(ROUNDS):
+        if not point.is_finite:
+            break
+        moved = step_nuisances(point.reduced, owner, point.nuisances, np.zeros(0))
+        point = bench.evaluate(model, nothing, moved)
+    return point
+
+
+def _simulate_lanes(
+    bench: Bench, model: Isolator, nuisances: Nuisances
+) -> list[Float[np.ndarray, " sample"]]:
+    """Simulate every segment from its best initial state."""
+    prepared = bench.prepared(model, len(model.elements))
+    starts, scales = bench.starts(model, prepared)
+    states = starts + scales * nuisances.states.T
+    factor = 1.0 + stiffness_deviation(nuisances)[prepared.record]
+    simulated = readings(model, factor, states, prepared)
+    return [simulated[: part.stop - part.start, lane] for lane, part in enumerate(prepared.segments)]
+
+
+def restart_records(problem: Problem, model: Isolator, spread: float) -> Restarts:
+    """Restart every segment from its best initial state; no coefficient is touched.
+
+    Args:
+        problem: the records.
+        model: the isolator.
+        spread: prior standard deviation of each record's linear stiffness.
+
+    Returns:
+        The records against their restarted simulations.
+    """
+    bench = Bench(problem)
+    point = _best_nuisances(bench, model, spread)
+    simulated = [np.full(record.output.size, np.nan) for record in problem.records]
+    counted = [np.zeros(record.output.size) for record in problem.records]
+    for part, values in zip(problem.segments, _simulate_lanes(bench, model, point.nuisances), strict=True):
+        simulated[part.record][part.start : part.stop] = values
+        counted[part.record][part.counted : part.stop] = 1.0
+    runs = tuple(Run(*entry) for entry in zip(problem.records, simulated, counted, strict=True))
+    return Restarts(runs, point)
+
+
+def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
+    """Simulate each record from its start to its end with nothing fed back.
+
+    The initial state comes from the samples that the campaign gives for it (`settle`), else from the first second;
+    internal states start at rest, and no stiffness scale is applied.
+
+    Args:
+        problem: the records.
+        model: the isolator.
+
+    Returns:
+        One run a record.
+    """
+    records = problem.records
+
+    def heading(place: int, record: Record) -> Segment:
+        length = record.settle if record.settle >= 8 else int(round(record.rate))
+        return Segment(place, 0, min(length, record.output.size), 0)
+
+    heads = Problem(
+        records,
+        tuple(heading(place, record) for place, record in enumerate(records)),
+        problem.quantity,
+        problem.hold,
+        problem.noise,
+        problem.integrator,
+    )
+    bench = Bench(heads)
+    point = _best_nuisances(bench, model, 1e-9)
+    prepared = bench.prepared(model, len(model.elements))
+    starts, scales = bench.starts(model, prepared)
+    begin = (starts + scales * point.nuisances.states.T)[:, : len(records)]
+
+    whole = heads._replace(
+        segments=tuple(
+            Segment(place, 0, record.output.size, record.settle) for place, record in enumerate(records)
+        )
+    )
+    prepared = Bench(whole).prepared(model, len(model.elements))
+    states = np.zeros((begin.shape[0], prepared.record.size))
+    states[:, : len(records)] = begin
+    simulated = readings(model, np.ones(prepared.record.size), states, prepared)
+    return tuple(
+        Run(
+            record,
+            simulated[: record.output.size, place],
+            (np.arange(record.output.size) >= record.settle).astype(float),
+        )
+        for place, record in enumerate(records)
+    )
+
+
+def summarise(free: tuple[Run, ...], restarts: Restarts, role: str, coefficients: int) -> Errors | None:
+    """Give the errors of one role's records.
+
+    Args:
+        free: free runs of all records.
+        restarts: restarted runs of all records.
+        role: "fit" or "holdout".
+        coefficients: coefficients that were fitted to these records.
+
+    Returns:
+        The errors, or None if no record has this role.
+    """
+    places = [place for place, run in enumerate(free) if run.record.role == role]
+    if not places:
+        return None
+
+    def rms(runs: tuple[Run, ...]) -> tuple[float, float]:
+        error = signal = count = 0.0
+        for place in places:
+            run = runs[place]
+            kept = run.counted > 0.0
+            measured = run.record.output[kept]
+            error += float(np.sum(run.residual[kept] ** 2))
+            signal += float(np.sum((measured - measured.mean()) ** 2))
+            count += kept.sum()
+        return float(np.sqrt(error / count)), float(np.sqrt(error / signal))
+
+    rmse, nrmse = rms(free)
+    point = restarts.point
+    chi2 = float(point.reduced.by_record[places, -1, -1].sum())
+    dof = float(np.sum(point.samples[places] - point.reduced.eliminated[places])) - coefficients
+    return Errors(rmse, nrmse, rms(restarts.runs)[1], chi2 / max(1.0, dof))

@@ -1,0 +1,220 @@
+"""Coefficients estimated from time histories, with the scatter of the stiffness from record to record."""
+
+from collections import defaultdict
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import optimistix as optx
+
+from .._parameters import Parameter, list_parameters
+from .._results import RESULTS
+from ..elements import Scales
+from ..models import Isolator
+from ..records import Record
+from ._covariance import Uncertainty, uncertainty
+from ._descent import descend
+from ._elimination import Nuisances
+from ._information import STIFFNESS_SCALE_UNIT, has_stiffness_scale
+from ._problem import Bench, Point
+
+FIRST_STIFFNESS_SPREAD = 1e-2
+"""Prior of the stiffness scales before the records have said how much they scatter: one percent."""
+
+SMALLEST_STIFFNESS_SPREAD = 1e-5
+
+
+class Estimate(NamedTuple):
+    """Fitted coefficients and what is known of them.
+
+    Attributes:
+        model: the fitted isolator.
+        places: free coefficients, by their place in `list_parameters`.
+        bench: the records it was held against.
+        point: equations at the solution, columns in physical units.
+        uncertainty: of the free coefficients.
+        result: how the search ended.
+        steps: evaluations of simulation and derivatives.
+    """
+
+    model: Isolator
+    places: tuple[int, ...]
+    bench: Bench
+    point: Point
+    uncertainty: Uncertainty
+    result: RESULTS
+    steps: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free coefficients."""
+        listed = list_parameters(self.model)
+        return tuple(listed[place].name for place in self.places)
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squared whitened residuals after the nuisances."""
+        return self.point.chi2
+
+    @property
+    def dof(self) -> float:
+        """Samples less nuisances less free coefficients."""
+        return max(1.0, self.point.free_samples - len(self.places))
+
+    @property
+    def excess(self) -> float:
+        """What the model leaves unexplained beyond the noise: chi2 - dof."""
+        return self.chi2 - self.dof
+
+
+def free_places(
+    model: Isolator, fixed: tuple[str, ...], free: tuple[str, ...] | None, mass_free: bool
+) -> tuple[int, ...]:
+    """Give the coefficients to fit.
+
+    Args:
+        model: the isolator.
+        fixed: names to hold.
+        free: names to fit, and no others; by default every fitted kind.
+        mass_free: whether the mass is among them by default.
+
+    Returns:
+        Their places in `list_parameters`.
+
+    Raises:
+        ValueError: if a name is no parameter of the model, or nothing is left to fit.
+    """
+    listed = list_parameters(model)
+    known = [entry.name for entry in listed]
+    for argument, names in (("fixed", fixed), ("free", free or ())):
+        for name in names:
+            if name not in known:
+                raise ValueError(
+                    f"Argument `{argument}` must name parameters of the model ({', '.join(known)}), but holds {name!r}."
+                )
+
+    def chosen(entry: Parameter) -> bool:
+        if free is not None:
+            return entry.name in free
+        wanted = entry.spec.fitted or (entry.name == "mass" and mass_free)
+        return wanted and entry.name not in fixed
+
+    places = tuple(place for place, entry in enumerate(listed) if chosen(entry))
+    if not places:
+        raise ValueError(
+            "Arguments `free` and `fixed` must leave at least one coefficient to fit, but leave none."
+        )
+    return places
+
+
+def magnitudes(model: Isolator, places: tuple[int, ...], scales: Scales) -> tuple[float, ...]:
+    """Give the magnitude of each free coefficient: its value, or what would matter where it is zero.
+
+    Args:
+        model: the isolator.
+        places: free coefficients.
+        scales: magnitudes of the records.
+
+    Returns:
+        One positive number a coefficient.
+    """
+    typical = {
+        f"{element.name}.{element.strength}": abs(element.typical_strength(scales))
+        for element in model.elements
+    }
+    listed = list_parameters(model)
+    sizes = []
+    for place in places:
+        value = abs(float(listed[place].value))
+        floor = 1e-3 * typical.get(listed[place].name, 0.0)
+        sizes.append(max(value, floor) or 1.0)
+    return tuple(sizes)
+
+
+def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: float) -> float:
+    """Give the standard deviation of the linear stiffness between repeats of a record.
+
+    Repeats at equal level and direction share every deterministic error of the model, so that their differences show
+    repeatability alone; without repeats, records of equal level serve, then all records.
+
+    Args:
+        records: the records.
+        point: equations with loose stiffness scales.
+        inflation: chi2/dof.
+
+    Returns:
+        Relative standard deviation, not below `SMALLEST_STIFFNESS_SPREAD`.
+    """
+    values = (point.nuisances.stiffness + point.reduced.stiffness_map[:, -1]) * STIFFNESS_SCALE_UNIT
+    variance = point.reduced.stiffness_variance * max(1.0, inflation)
+    for key in (lambda r: (r.level, r.direction), lambda r: r.level, lambda r: None):
+        groups = defaultdict(list)
+        for place, record in enumerate(records):
+            groups[key(record)].append(place)
+        groups = [group for group in groups.values() if len(group) > 1]
+        if groups:
+            squares = sum(np.sum((values[group] - values[group].mean()) ** 2) for group in groups)
+            expected = sum(np.mean(variance[group]) * (len(group) - 1) for group in groups)
+            freedom = sum(len(group) - 1 for group in groups)
+            return float(np.sqrt(max((squares - expected) / freedom, SMALLEST_STIFFNESS_SPREAD**2)))
+    return 1e-3
+
+
+def estimate(
+    bench: Bench,
+    model: Isolator,
+    places: tuple[int, ...],
+    scales: Scales,
+    *,
+    nuisances: Nuisances | None,
+    solver: optx.AbstractLeastSquaresSolver,
+    max_steps: int,
+    progress: Callable[[str], None],
+) -> Estimate:
+    """Fit the free coefficients of a model to records.
+
+    Args:
+        bench: the records.
+        model: start.
+        places: free coefficients.
+        scales: magnitudes of the records.
+        nuisances: known nuisances of an earlier fit, with the scatter of the stiffness; else it is estimated.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations after which a search gives up.
+        progress: told a line a step.
+
+    Returns:
+        The estimate.
+    """
+    carried = len(model.elements)
+    known = nuisances is not None
+    start = bench.settle(nuisances, model, carried, FIRST_STIFFNESS_SPREAD)
+    sizes = magnitudes(model, places, scales)
+    found = descend(bench, model, places, sizes, start, solver=solver, max_steps=max_steps, progress=progress)
+    steps = found.steps
+    single = len(bench.problem.records) == 1
+    if found.result == RESULTS.successful and has_stiffness_scale(model) and not known:
+        freedom = max(1.0, found.point.free_samples)
+        inflation = found.point.chi2 / freedom
+        spread = (
+            SMALLEST_STIFFNESS_SPREAD
+            if single
+            else stiffness_scatter(bench.problem.records, found.point, inflation)
+        )
+        progress(f"linear stiffness scatters by {100 * spread:.2g} % between records")
+        again = found.point.nuisances._replace(stiffness_spread=spread)
+        found = descend(
+            bench,
+            found.point.model,
+            places,
+            sizes,
+            again,
+            solver=solver,
+            max_steps=max_steps,
+            progress=progress,
+        )
+        steps += found.steps
+    point = found.point
+    dof = max(1.0, point.free_samples - len(places))
+    error = uncertainty(point.reduced.matrix[:-1, :-1], max(1.0, point.chi2 / dof))
+    return Estimate(point.model, places, bench, point, error, found.result, steps)

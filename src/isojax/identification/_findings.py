@@ -1,0 +1,169 @@
+"""What a diagnosis says: candidates, findings and verdicts."""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from ..records import Campaign
+from ._classical_guess import ClassicalGuess
+from ._estimate import Estimate
+from ._fit import Fit
+
+VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
+
+
+class Candidate(NamedTuple):
+    """One absent effect, as the evidence ranks it.
+
+    Attributes:
+        effect: catalogue name.
+        words: what it is.
+        z: score over its standard deviation, before any refit; signed like the strength.
+        p_value: family-wise, over all candidates.
+        visibility: share of its trace in the data that the fitted coefficients cannot imitate.
+        strength: its strength: refitted where it was refitted, else by one linear step [its unit].
+        strength_error: standard error of the strength [its unit].
+        unit: unit of the strength.
+        chi2_per_dof: after the refit; NaN where it was not refitted.
+        delta_bic: Schwarz's criterion over that of the best candidate, per max(chi2/dof, 1); NaN where not refitted.
+        likeness: correlation with the best candidate's trace, -1 to 1.
+        admissible: whether its sign and its dissipation are physical.
+    """
+
+    effect: str
+    words: str
+    z: float
+    p_value: float
+    visibility: float
+    strength: float
+    strength_error: float
+    unit: str
+    chi2_per_dof: float
+    delta_bic: float
+    likeness: float
+    admissible: bool
+
+
+class Finding(NamedTuple):
+    """An effect that the model lacked.
+
+    Attributes:
+        effect: catalogue name.
+        indistinguishable: catalogue names that these data cannot tell from it.
+        p_value: family-wise chance of so large a score without the effect.
+        excess_explained: share of chi2 - dof that adding it removed.
+        transfer: share of the excess that it removed on records (or halves) that its refit did not see.
+        ranking: all candidates, best first.
+        separating_experiment: what test would part the indistinguishable ones, in words.
+    """
+
+    effect: str
+    indistinguishable: tuple[str, ...]
+    p_value: float
+    excess_explained: float
+    transfer: float
+    ranking: tuple[Candidate, ...]
+    separating_experiment: str
+
+
+class Verdict(NamedTuple):
+    """What the residual of a fit says.
+
+    Attributes:
+        verdict: "none" (nothing is missing), "found" (named, and the fit is then good), "partly_explained",
+            or "unexplained".
+        finding: the effect, or None.
+        ranking: all candidates, best first.
+        indistinguishable: catalogue names within the evidence of the best; empty where nothing was found.
+        unexplained: share of the excess that is left after the best effect.
+        hidden: catalogue names that these data cannot show beside the fitted coefficients.
+        bounds: for each effect that was not found, how large its strength could still be, with its unit.
+        refit: the model with the effect, fitted; None where nothing was found.
+        reason: one sentence.
+    """
+
+    verdict: VerdictWord
+    finding: Finding | None
+    ranking: tuple[Candidate, ...]
+    indistinguishable: tuple[str, ...]
+    unexplained: float
+    hidden: tuple[str, ...]
+    bounds: dict[str, tuple[float, str]]
+    refit: Estimate | None
+    reason: str
+
+
+class Extension(NamedTuple):
+    """A model before and after an effect was added.
+
+    Attributes:
+        before: the fit without it.
+        fit: the fit with it.
+        verdict: why it was added.
+    """
+
+    before: Fit
+    fit: Fit
+    verdict: Verdict
+
+    @property
+    def after(self) -> Fit:
+        """The fit with the effect."""
+        return self.fit
+
+
+class Residual(NamedTuple):
+    """What a fitted model leaves of its records.
+
+    Attributes:
+        values: measured less simulated of each fitting record, segments restarted [SI unit of the output].
+        noise_floor: rms of the noise [SI unit of the output].
+        whiteness: share of lags within +-25 (0 left out) whose autocorrelation stays in the 99 % band, a record each.
+        lags: the lags [samples].
+        autocorrelation: of each record's residual at the lags.
+        cross_correlation: of each record's residual with the drive at the lags.
+        band: half width of the 99 % band of each record.
+    """
+
+    values: tuple[Float[np.ndarray, " time"], ...]
+    noise_floor: float
+    whiteness: Float[np.ndarray, " record"]
+    lags: Float[np.ndarray, " lag"]
+    autocorrelation: Float[np.ndarray, "record lag"]
+    cross_correlation: Float[np.ndarray, "record lag"]
+    band: Float[np.ndarray, " record"]
+
+
+class Loop(NamedTuple):
+    """The closed loop: from records to a model that explains them, or to the admission that it does not.
+
+    Attributes:
+        campaign: the measurements.
+        guess: the classical start.
+        before: the declared model, fitted.
+        extensions: each effect that was added, in the order of discovery.
+        after: the final fit (the same as `before` where nothing was added).
+        verdict: over all iterations.
+        last: the diagnosis of the final fit.
+        seconds: wall time.
+    """
+
+    campaign: Campaign
+    guess: ClassicalGuess
+    before: Fit
+    extensions: tuple[Extension, ...]
+    after: Fit
+    verdict: VerdictWord
+    last: Verdict
+    seconds: float
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The effects found, in the order of discovery."""
+        return tuple(step.verdict.finding for step in self.extensions if step.verdict.finding is not None)
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, str]]:
+        """For each effect not found: how large its strength could still be, with its unit."""
+        return self.last.bounds

@@ -1,0 +1,237 @@
+"""The fit: coefficients straight from the time histories of all records together."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import optimistix as optx
+from jaxtyping import Float
+
+from .._parameters import list_parameters
+from .._results import RESULTS
+from .._types import check_float64
+from ..models import Integrator, Isolator
+from ..records import Campaign, NoiseEstimate, estimate_noise
+from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise
+from ._estimate import Estimate, estimate, free_places
+from ._problem import Bench, Problem, build_problem
+from ._scales import scales as campaign_scales
+from ._steps import find_integrator
+
+DEFAULT_SOLVER = optx.LevenbergMarquardt(rtol=1e-9, atol=1e-9)
+
+
+class Statistics(NamedTuple):
+    """Counts and criteria of a fit.
+
+    Attributes:
+        samples: samples that count.
+        coefficients: free coefficients.
+        chi2: squared whitened residual after the nuisances.
+        dof: samples less nuisances less coefficients.
+        aic: Akaike's criterion, chi2 + 2 coefficients.
+        bic: Schwarz's criterion, chi2 + coefficients ln(samples).
+        steps: simulations with derivatives that the search took.
+        stiffness_scatter: standard deviation of the linear stiffness between records [relative].
+        integration_error: rms change of the readings when the integration step is halved, over the noise.
+    """
+
+    samples: int
+    coefficients: int
+    chi2: float
+    dof: float
+    aic: float
+    bic: float
+    steps: int
+    stiffness_scatter: float
+    integration_error: float
+
+
+class Fit(NamedTuple):
+    """A fitted model, its error bars and its errors.
+
+    Attributes:
+        model: the fitted isolator.
+        start: the isolator that the search started from.
+        campaign: the measurements.
+        free: names of the fitted coefficients.
+        covariance: of the fitted coefficients [product of their units], scaled by max(1, chi2/dof).
+        errors: errors by role, "fit" and "holdout" (None without such records).
+        stats: counts and criteria.
+        noise: the noise that errors are held against.
+        result: how the search ended.
+        estimate: the equations at the solution.
+        free_runs: every record simulated from its start to its end.
+        restarts: every record with each segment restarted.
+    """
+
+    model: Isolator
+    start: Isolator
+    campaign: Campaign
+    free: tuple[str, ...]
+    covariance: Float[np.ndarray, "parameter parameter"]
+    errors: dict[str, Errors | None]
+    stats: Statistics
+    noise: NoiseEstimate
+    result: RESULTS
+    estimate: Estimate
+    free_runs: tuple[Run, ...]
+    restarts: Restarts
+
+    @property
+    def nrmse(self) -> float:
+        """Free-run error on the fitted records over the rms of their measured output about the mean."""
+        errors = self.errors["fit"]
+        return float("nan") if errors is None else errors.nrmse
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard error of each fitted coefficient [its unit]; NaN where the data do not determine it."""
+        return dict(zip(self.free, (float(e) for e in self.estimate.uncertainty.standard_error), strict=True))
+
+    def __str__(self) -> str:
+        """Give the fit report."""
+        from ._fit_report import fit_report
+
+        return fit_report(self)
+
+
+def silent(line: str) -> None:
+    """Take a line of progress and say nothing.
+
+    Args:
+        line: the line.
+    """
+
+
+def fit(
+    model: Isolator,
+    campaign: Campaign,
+    *,
+    free: tuple[str, ...] | None = None,
+    fixed: tuple[str, ...] = (),
+    solver: Any = DEFAULT_SOLVER,
+    integrator: Integrator | None = None,
+    max_steps: int = 40,
+    progress: Callable[[str], None] = silent,
+) -> Fit:
+    """Fit the coefficients of a model to the time histories of all fitting records together.
+
+    Least squares on the measured samples, weighted by the channel's noise, with exact forward-mode derivatives. Dwells and
+    windows start from states of their own, and the linear stiffness may differ from record to record by as much as
+    repeats show; both are eliminated before optimistix sees the residual.
+
+    Args:
+        model: start, such as `classical_guess(campaign).model`.
+        campaign: the measurements.
+        free: names of the coefficients to fit, and no others; all fitted kinds (and the mass, where the campaign
+            frees it) if omitted.
+        fixed: names of coefficients to hold.
+        solver: an optimistix least-squares solver.
+        integrator: solver and steps; the coarsest steps whose error is a twentieth of the noise, if omitted.
+        max_steps: simulations with derivatives after which the search gives up.
+        progress: told a line a step.
+
+    Returns:
+        The fit. Where the search failed, `result` says why and every error is NaN.
+
+    Raises:
+        ValueError: if a name is no parameter of the model.
+        RuntimeError: if JAX is not in 64-bit mode.
+    """
+    check_float64()
+    places = free_places(model, fixed, free, campaign.mass_free)
+    noise = estimate_noise(campaign)
+    bench = bench_for(model, campaign, noise.sigma, integrator)
+    found = estimate(
+        bench,
+        model,
+        places,
+        campaign_scales(campaign),
+        nuisances=None,
+        solver=solver,
+        max_steps=max_steps,
+        progress=progress,
+    )
+    return complete(found, model, campaign, noise)
+
+
+def bench_for(model: Isolator, campaign: Campaign, noise: float, integrator: Integrator | None) -> Bench:
+    """Give the bench of a campaign's fitting records.
+
+    Args:
+        model: the isolator.
+        campaign: the measurements.
+        noise: rms of the noise [SI unit of the output].
+        integrator: solver and steps, or None to choose them.
+
+    Returns:
+        The bench.
+    """
+    problem = build_problem(
+        campaign.fit_records,
+        model,
+        quantity=campaign.output.quantity,
+        hold=campaign.input.hold,
+        noise=noise,
+        integrator=Integrator() if integrator is None else integrator,
+    )
+    if integrator is None:
+        problem = problem._replace(integrator=find_integrator(problem, model))
+    return Bench(problem)
+
+
+def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseEstimate) -> Fit:
+    """Hold an estimate against every record of the campaign, fitted and held out.
+
+    Args:
+        found: the estimate.
+        start: the isolator that the search started from.
+        campaign: the measurements.
+        noise: the noise.
+
+    Returns:
+        The fit.
+    """
+    fitted = found.bench.problem
+    everything = build_problem(
+        campaign.records,
+        found.model,
+        quantity=fitted.quantity,
+        hold=fitted.hold,
+        noise=fitted.noise,
+        integrator=fitted.integrator,
+    )
+    spread = found.point.nuisances.stiffness_spread
+    free_runs = run_freely(everything, found.model)
+    restarts = restart_records(everything, found.model, spread)
+    errors = {
+        "fit": summarise(free_runs, restarts, "fit", len(found.places)),
+        "holdout": summarise(free_runs, restarts, "holdout", 0),
+    }
+    samples, count = int(found.point.samples.sum()), len(found.places)
+    stats = Statistics(
+        samples,
+        count,
+        found.chi2,
+        found.dof,
+        found.chi2 + 2.0 * count,
+        found.chi2 + count * float(np.log(samples)),
+        found.steps,
+        spread,
+        float("nan"),
+    )
+    return Fit(
+        found.model,
+        start,
+        campaign,
+        found.names,
+        found.uncertainty.covariance,
+        errors,
+        stats,
+        noise,
+        found.result,
+        found,
+        free_runs,
+        restarts,
+    )

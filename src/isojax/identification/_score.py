@@ -1,0 +1,190 @@
+"""The score test: every absent effect rides along at zero strength, with what a refit would absorb projected out."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy import stats
+
+from .._parameters import find_parameter
+from ..elements import CATALOGUE, AbstractElement, Scales
+from ..models import Isolator
+from ._estimate import Estimate
+from ._elimination import Nuisances, step_nuisances
+from ._problem import one_hot
+
+SMALLEST_VISIBILITY = 0.005
+"""Share of a candidate's column that must be left after projection; less is numerical dust."""
+
+DRAWS = 20_000
+
+
+class Score(NamedTuple):
+    """What the data say of one absent effect, before any refit.
+
+    Attributes:
+        element: the effect at zero strength, with the shape parameters of its largest score.
+        z: score over its standard deviation; its sign is that of the strength.
+        robust_z: the same with the scatter between records (or segments) as its standard deviation.
+        strength: strength by one linear step [its unit].
+        error: standard deviation of the strength for white noise [its unit].
+        visibility: share of the column that the fitted coefficients and nuisances leave.
+        p_value: family-wise, over all candidates.
+        admissible: whether the sign of the strength is physical.
+        column: place of the effect among the probes.
+    """
+
+    element: AbstractElement
+    z: float
+    robust_z: float
+    strength: float
+    error: float
+    visibility: float
+    p_value: float
+    admissible: bool
+    column: int
+
+
+class ScoreTest(NamedTuple):
+    """Scores of all absent effects.
+
+    Attributes:
+        scores: one a family, largest |z| first; effects below the visibility limit are left out.
+        hidden: catalogue names that the data cannot show beside the fitted coefficients.
+        likeness: correlation of the projected columns of `scores`, in their order.
+        fitted: the estimate that was tested.
+        steps: linear step of the fitted coefficients that goes with each score's strength [their units].
+        nuisances: nuisances that go with that step.
+    """
+
+    scores: tuple[Score, ...]
+    hidden: tuple[str, ...]
+    likeness: Float[np.ndarray, "score score"]
+    fitted: Estimate
+    steps: tuple[Float[np.ndarray, " column"], ...]
+    nuisances: tuple[Nuisances, ...]
+
+
+def absent_effects(model: Isolator, scales: Scales, excluded: tuple[str, ...] = ()) -> tuple[AbstractElement, ...]:
+    """Give every catalogue effect that the model lacks, over the grids of their shape parameters.
+
+    Args:
+        model: the isolator.
+        scales: magnitudes of the records.
+        excluded: catalogue names to leave out.
+
+    Returns:
+        Elements at zero strength.
+    """
+    present = {element.name for element in model.elements} | set(excluded)
+    return tuple(
+        probe for name, kind in sorted(CATALOGUE.items()) if name not in present for probe in kind.grid(scales)
+    )
+
+
+def score_test(
+    fitted: Estimate, scales: Scales, probes: tuple[AbstractElement, ...], seed: int = 0
+) -> ScoreTest:
+    """Test the absent effects, all at once.
+
+    With r the whitened residual, J the columns of fitted coefficients and nuisances, P = I - Q Q' and g = P g_j:
+    `z = g.r / |g|`, strength `g.r / |g|^2 +- 1 / |g|`, visibility `|g| / |g_j|`, likeness `cos(g_i, g_j)`.
+
+    Args:
+        fitted: the estimate to test.
+        scales: magnitudes of the records.
+        probes: absent effects at zero strength.
+        seed: of the draws for the family-wise p-value.
+
+    Returns:
+        The scores.
+
+    Source: Rao 1948; Davies 1977 for parameters that mean nothing under the null; Westfall & Young 1993.
+    """
+    model = fitted.model.with_elements(*probes)
+    carried = len(fitted.model.elements)
+    places = list(fitted.places)
+    sizes = list(np.sqrt(1.0 / np.maximum(np.diag(fitted.point.reduced.matrix)[:-1], 1e-300)))
+    names = _strength_names(model)[carried:]
+    places += [find_parameter(model, name) for name in names]
+    sizes += [1e-3 * probe.typical_strength(scales) for probe in probes]
+    point = fitted.bench.evaluate(model, one_hot(model, places, sizes), fitted.point.nuisances, carried)
+    count = len(fitted.places)
+    by_record = point.reduced.by_record
+    matrix = by_record.sum(axis=0)
+    base, cross = matrix[:count, :count], matrix[:count, count:]
+    absorbed = np.linalg.pinv(base, rcond=1e-12, hermitian=True) @ cross
+    information = matrix[count:-1, count:-1] - cross[:, :-1].T @ absorbed[:, :-1]
+    score = matrix[count:-1, -1] - cross[:, :-1].T @ absorbed[:, -1]
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
+    raw = np.sqrt(np.maximum(point.reduced.raw[count:], 1e-300))
+    visibility = size / raw
+    seen = visibility > SMALLEST_VISIBILITY
+    safe = np.where(seen, np.maximum(size, 1e-300), np.inf)
+    z = score / safe
+    # Each record's own share of the projected score: its scatter is the honest standard deviation.
+    shares = by_record[:, count:-1, -1] - by_record[:, count:-1, :count] @ absorbed[:, -1]
+    shares -= np.einsum("pq,rp->rq", absorbed[:, :-1], by_record[:, :count, -1] - by_record[:, :count, :count] @ absorbed[:, -1])
+    spread = np.sqrt(np.maximum(np.sum(shares**2, axis=0), size**2))
+    robust = np.where(seen, score / np.maximum(spread, 1e-300), 0.0)
+
+    best: dict[str, int] = {}
+    for column, probe in enumerate(probes):
+        if seen[column] and (probe.name not in best or abs(z[column]) > abs(z[best[probe.name]])):
+            best[probe.name] = column
+    order = sorted(best.values(), key=lambda column: -abs(z[column]))
+    correlation = information / np.outer(safe, safe)
+    inflation = np.sqrt(max(1.0, fitted.chi2 / fitted.dof))
+    family = _family_wise(correlation[np.ix_(seen, seen)], np.abs(z[order]) / inflation, seed)
+    scores, steps, moved = [], [], []
+    owner = fitted.bench.prepared(model, carried).record
+    for column, p_value in zip(order, family, strict=True):
+        probe = probes[column]
+        amount = score[column] / size[column] ** 2
+        step = absorbed[:, -1] - absorbed[:, column] * amount
+        full = np.zeros(len(places))
+        full[:count], full[count + column] = step, amount
+        unit = sizes[count + column]
+        scores.append(
+            Score(
+                probe,
+                float(z[column]),
+                float(robust[column]),
+                float(amount * unit),
+                float(unit / size[column]),
+                float(visibility[column]),
+                float(p_value),
+                bool(probe.signed or amount > 0.0),
+                column,
+            )
+        )
+        steps.append(step * np.asarray(sizes[:count]))
+        moved.append(step_nuisances(point.reduced, owner, fitted.point.nuisances, full))
+    hidden = tuple(sorted({probe.name for probe in probes} - set(best)))
+    likeness = correlation[np.ix_(order, order)]
+    return ScoreTest(tuple(scores), hidden, likeness, fitted, tuple(steps), tuple(moved))
+
+
+def _strength_names(model: Isolator) -> list[str]:
+    """Give the name of each element's strength; a second element of a kind carries `_2`."""
+    seen: dict[str, int] = {}
+    names = []
+    for element in model.elements:
+        seen[element.name] = seen.get(element.name, 0) + 1
+        suffix = "" if seen[element.name] == 1 else f"_{seen[element.name]}"
+        names.append(f"{element.name}{suffix}.{element.strength}")
+    return names
+
+
+def _family_wise(
+    correlation: Float[np.ndarray, "score score"], sizes: Float[np.ndarray, " family"], seed: int
+) -> Float[np.ndarray, " family"]:
+    """Give the chance that the largest of all scores exceeds each size: by drawing, and by Bonferroni far out."""
+    if sizes.size == 0:
+        return sizes
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = np.abs(np.random.default_rng(seed).standard_normal((DRAWS, root.shape[0])) @ root.T).max(axis=1)
+    drawn = np.mean(draws[:, None] >= sizes, axis=0)
+    bound = np.minimum(1.0, 2.0 * correlation.shape[0] * stats.norm.sf(sizes))
+    return np.where(drawn > 50 / DRAWS, drawn, bound)

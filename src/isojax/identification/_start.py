@@ -1,0 +1,106 @@
+"""Coefficients to start from, by what kind of records there are."""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from ..models import Isolator
+from ..records import Campaign, Record
+from ._all_dwells import dwell_motion, fit_all_dwells
+from ._decrement import Decrement, logarithmic_decrement
+from ._linear_balance import BalanceFit
+from ._linear_response import LinearResponse, linear_response
+from ._motion import measured_motion
+from ._receptance import FrequencyResponse
+from ._restoring_force import fit_restoring_force
+from ._sanity import sane_fit
+from ._scales import excited_centre
+from ._sensor_zero import output_mean
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TimeStart:
+    """What records without dwells say.
+
+    Attributes:
+        fit: coefficients from the force balance in time.
+        linear: best linear receptance of each driven record.
+        decrements: logarithmic decrement of each free decay, by record name.
+        notes: what the reader must know, a sentence each.
+    """
+
+    fit: BalanceFit
+    linear: tuple[LinearResponse, ...]
+    decrements: dict[str, Decrement]
+    notes: tuple[str, ...]
+
+
+def start_from_dwells(
+    base: Isolator, names: tuple[str, ...], responses: tuple[FrequencyResponse, ...], mass_free: bool
+) -> tuple[BalanceFit, tuple[str, ...]]:
+    """Start from the harmonic balance of every dwell.
+
+    Args:
+        base: the declared structure.
+        names: catalogue names of the elements to fit.
+        responses: measured harmonics of the records.
+        mass_free: whether the mass is unknown too.
+
+    Returns:
+        The fit and its notes.
+    """
+    motion = dwell_motion(base, responses)
+    highest, fastest = (float(np.max(np.abs(s))) for s in (motion.displacement, motion.velocity))
+    return sane_fit(
+        lambda chosen: fit_all_dwells(base, chosen, responses, mass_free=mass_free), names, highest, fastest
+    )
+
+
+def start_from_time(
+    campaign: Campaign, base: Isolator, names: tuple[str, ...], records: tuple[Record, ...], mass_free: bool
+) -> TimeStart:
+    """Start from the force balance in time of records without dwells.
+
+    Args:
+        campaign: says what the channels measure.
+        base: the declared structure.
+        names: catalogue names of the elements to fit.
+        records: broadband, periodic, swept or freely decaying records.
+        mass_free: whether the mass is unknown too.
+
+    Returns:
+        The fit, linear receptances, decrements, notes.
+    """
+    origin = output_mean(campaign) if campaign.output.offset_free else 0.0
+    motions = tuple(measured_motion(campaign, record, origin) for record in records)
+    pairs = list(zip(records, motions, strict=True))
+    centres = tuple(excited_centre(record, motion) / (2 * np.pi) for record, motion in pairs)
+    offset_free = campaign.input.offset_free or campaign.output.offset_free
+    highest = max(float(np.max(np.abs(motion.displacement[motion.trusted]))) for motion in motions)
+    fastest = max(float(np.max(np.abs(motion.velocity[motion.trusted]))) for motion in motions)
+    fit, notes = sane_fit(
+        lambda chosen: fit_restoring_force(
+            base, chosen, motions, centres, campaign.rate, campaign.output.quantity, offset_free, mass_free
+        ),
+        names,
+        highest,
+        fastest,
+    )
+    factor = -float(base.mass) if base.excitation == "base_acceleration" else 1.0
+    linear = tuple(
+        linear_response(record.name, motion, factor * motion.drive, record.rate, record.period)
+        for record, motion in pairs
+        if record.kind != "free_decay" and np.any(motion.drive)
+    )
+    decrements = {
+        record.name: logarithmic_decrement(_about_rest(record.output), record.rate)
+        for record in records
+        if record.kind == "free_decay"
+    }
+    return TimeStart(fit, linear, decrements, notes)
+
+
+def _about_rest(output: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+    """Give a free decay about the place where it ends: the mean of its last fifth."""
+    return output - np.mean(output[-max(1, output.size // 5) :])

@@ -1,0 +1,15 @@
+"""The isolator: mass and elements, its integrator, its forced response, its file."""
+
+from ._integrator import Integrator as Integrator
+from ._isolator import Isolator as Isolator
+from ._isolator import Quantity as Quantity
+from ._isolator import State as State
+from ._rk4 import RK4 as RK4
+from ._scan import advance as advance
+from ._scan import scan_records as scan_records
+from ._simulate import Simulation as Simulation
+from ._simulate import simulate as simulate
+from ._storage import load_model as load_model
+from ._storage import model_to_dict as model_to_dict
+from ._storage import save_model as save_model
+from ._storage import write_whole as write_whole

@@ -1,0 +1,62 @@
+"""How finely to integrate: the one place of steps and tolerances."""
+
+import diffrax
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from ._isolator import Isolator
+from ._rk4 import RK4
+
+
+class Integrator(eqx.Module):
+    """Solver, steps and tolerances; every derived tolerance follows from these.
+
+    Attributes:
+        solver: a diffrax solver; `RK4` for sample-locked work.
+        substeps: steps a sample at least; elements with sharp laws raise it (see `steps_per_sample`).
+        rtol: relative tolerance of adaptive steps, or None for fixed steps.
+        atol: absolute tolerance of adaptive steps on the state in SI units, used where `rtol` is given.
+        max_steps: steps after which one simulation gives up.
+
+    Raises:
+        ValueError: if `rtol` is given to a solver that estimates no error.
+    """
+
+    solver: diffrax.AbstractSolver = eqx.field(default_factory=RK4)
+    substeps: int = eqx.field(static=True, default=1)
+    rtol: float | None = eqx.field(static=True, default=None)
+    atol: float = eqx.field(static=True, default=1e-12)
+    max_steps: int = eqx.field(static=True, default=50_000_000)
+
+    def __check_init__(self):
+        """Refuse adaptive steps without an error estimate."""
+        if self.rtol is not None and not isinstance(self.solver, diffrax.AbstractAdaptiveSolver):
+            raise ValueError(
+                "Argument `solver` must estimate its error where `rtol` is given, such as diffrax.Dopri8(), "
+                f"but is {type(self.solver).__name__}()."
+            )
+
+    def steps_per_sample(self, model: Isolator) -> int:
+        """Give the integration steps a sample.
+
+        Args:
+            model: the isolator, whose sharpest element may ask for more.
+
+        Returns:
+            The larger of the two demands.
+        """
+        return max(self.substeps, model.substeps)
+
+    def controller(self, times: Float[Array, " time"]) -> diffrax.AbstractStepSizeController:
+        """Give diffrax's step size controller.
+
+        Args:
+            times: ends of the fixed steps [s].
+
+        Returns:
+            A controller that steps from one of these times to the next, or an adaptive one where `rtol` is
+            given.
+        """
+        if self.rtol is None:
+            return diffrax.StepTo(ts=times)
+        return diffrax.PIDController(rtol=self.rtol, atol=self.atol)

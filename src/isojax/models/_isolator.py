@@ -1,0 +1,247 @@
+"""The isolator: a mass and the effects that act on it."""
+
+from typing import Literal, cast
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
+from .._types import Internal, Lanes, Scalar
+from ..elements import AbstractElement
+
+State = tuple[Lanes, ...]
+"""Displacement [m], velocity [m/s], then the internal states of each element in turn."""
+
+Quantity = Literal["acceleration", "velocity", "displacement"]
+
+
+class Isolator(eqx.Module):
+    """One coordinate: `mass x'' + sum of element forces = F(t)`.
+
+    Under base excitation x is the motion relative to the base, the force is -mass times the base
+    acceleration, and an acceleration reading is the absolute one.
+
+    Attributes:
+        mass: moving mass [kg].
+        elements: the effects, in any order; those of the instruments act in the order given.
+        excitation: what the recorded drive is.
+
+    Raises:
+        ValueError: if the mass is not positive, `elements` holds something else, or `excitation` is neither.
+
+    Source: the paper, eq. (4).
+    """
+
+    mass: Scalar = parameter(symbol="m", unit="kg", lower=0.0, fitted=False)
+    # A type checker reads `parameter(...)` as a default and misses one here.
+    elements: tuple[AbstractElement, ...] = eqx.field(converter=tuple)  # pyright: ignore[reportGeneralTypeIssues]
+    excitation: Literal["force", "base_acceleration"] = eqx.field(static=True, default="force")
+
+    def __check_init__(self):
+        """Refuse what is no isolator; a traced mass passes unseen."""
+        if self.excitation not in ("force", "base_acceleration"):
+            raise ValueError(
+                f'Argument `excitation` must be "force" or "base_acceleration", but is {self.excitation!r}.'
+            )
+        for place, entry in enumerate(self.elements):
+            if not isinstance(entry, AbstractElement):
+                raise ValueError(
+                    f"Argument `elements` must hold elements, but elements[{place}] = {entry!r}."
+                )
+        known = eqx.is_array(self.mass) and not isinstance(self.mass, Tracer)
+        if known and not np.all(np.asarray(self.mass) > 0):
+            raise ValueError(f"Argument `mass` must be positive, but is {self.mass}.")
+
+    @property
+    def internal_states(self) -> int:
+        """Count of internal states of all elements."""
+        return sum(element.internal_states for element in self.elements)
+
+    @property
+    def substeps(self) -> int:
+        """Integration steps a sample that the sharpest element asks for."""
+        return max((element.substeps for element in self.elements), default=1)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name, declaration and value of every physical number."""
+        return list_parameters(self)
+
+    def __getitem__(self, name: str) -> Scalar:
+        """Give a parameter by its name in reports.
+
+        Args:
+            name: such as `cubic_stiffness.coefficient`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            ValueError: if there is no such parameter.
+        """
+        return list_parameters(self)[find_parameter(self, name)].value
+
+    def replace(self, **values: Scalar | float) -> "Isolator":
+        """Give the same isolator with other numbers.
+
+        Args:
+            **values: new values by the name in reports, with `__` for the dot:
+                `model.replace(cubic_stiffness__coefficient=2e11)`.
+
+        Returns:
+            The new isolator.
+
+        Raises:
+            ValueError: if there is no such parameter.
+        """
+        numbers = [entry.value for entry in list_parameters(self)]
+        for name, value in values.items():
+            numbers[find_parameter(self, name.replace("__", "."))] = jnp.asarray(value, dtype=float)
+        return replace_parameters(self, numbers)
+
+    def element(self, name: str) -> AbstractElement | None:
+        """Give the first element of a catalogue name, or None.
+
+        Args:
+            name: catalogue name.
+
+        Returns:
+            The element, or None if the model lacks the effect.
+        """
+        return next((element for element in self.elements if element.name == name), None)
+
+    def with_elements(self, *added: AbstractElement) -> "Isolator":
+        """Give the isolator with further effects.
+
+        Args:
+            *added: elements to append.
+
+        Returns:
+            The new isolator.
+        """
+        return Isolator(self.mass, (*self.elements, *added), self.excitation)
+
+    def _internal(self, state: State) -> list[Internal]:
+        """Share the internal states out among the elements."""
+        shares, place = [], 2
+        for element in self.elements:
+            shares.append(state[place : place + element.internal_states])
+            place += element.internal_states
+        return shares
+
+    def shift(self) -> Lanes | float:
+        """Give the time by which the recorded drive leads the one that acted [s]."""
+        return sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
+
+    def drive(self, u: Lanes, u_rate: Lanes | float) -> Lanes:
+        """Give the drive that acted.
+
+        Args:
+            u: recorded drive, already shifted [N, or m/s^2 for base excitation].
+            u_rate: its time derivative.
+
+        Returns:
+            The drive that acted, in the same unit.
+        """
+        rate = jnp.asarray(u_rate, dtype=float)
+        for element in self.elements:
+            u, rate = element.drive(u, rate)
+        return u
+
+    def restoring_force(self, state: State) -> Lanes:
+        """Give the sum of element forces [N].
+
+        Args:
+            state: displacement, velocity and internal states.
+
+        Returns:
+            Force on the left-hand side of the balance [N].
+        """
+        total = 0.0 * state[0]
+        for element, internal in zip(self.elements, self._internal(state), strict=True):
+            total = total + element.force(state[0], state[1], internal)
+        return total
+
+    def acceleration(self, state: State, u: Lanes, u_rate: Lanes | float = 0.0) -> Lanes:
+        """Give the acceleration of the coordinate.
+
+        Args:
+            state: displacement, velocity and internal states.
+            u: recorded drive, already shifted.
+            u_rate: its time derivative.
+
+        Returns:
+            Acceleration [m/s^2]; relative to the base under base excitation.
+        """
+        inertia = self.mass
+        for element in self.elements:
+            inertia = inertia + element.inertia()
+        drive = self.drive(u, u_rate)
+        if self.excitation == "base_acceleration":
+            return -drive - self.restoring_force(state) / inertia
+        return (drive - self.restoring_force(state)) / inertia
+
+    def motion(self, state: State, u: Lanes, u_rate: Lanes | float, quantity: Quantity) -> Lanes:
+        """Give the motion at the sensor.
+
+        Args:
+            state: displacement, velocity and internal states.
+            u: recorded drive, already shifted.
+            u_rate: its time derivative.
+            quantity: what the sensor measures.
+
+        Returns:
+            Acceleration [m/s^2] (absolute under base excitation), velocity [m/s] or displacement [m].
+        """
+        if quantity == "displacement":
+            return state[0]
+        if quantity == "velocity":
+            return state[1]
+        acceleration = self.acceleration(state, u, u_rate)
+        if self.excitation == "base_acceleration":
+            return acceleration + self.drive(u, u_rate)
+        return acceleration
+
+    def reading(self, state: State, u: Lanes, u_rate: Lanes | float, quantity: Quantity) -> Lanes:
+        """Give what the sensor chain records.
+
+        Args:
+            state: displacement, velocity and internal states.
+            u: recorded drive, already shifted.
+            u_rate: its time derivative.
+            quantity: what the sensor measures.
+
+        Returns:
+            The reading [SI unit of the quantity].
+        """
+        y = self.motion(state, u, u_rate, quantity)
+        for element, internal in zip(self.elements, self._internal(state), strict=True):
+            y = element.reading(y, internal)
+        return y
+
+    def rates(
+        self, state: State, u: Lanes, u_rate: Lanes | float, quantity: Quantity = "acceleration"
+    ) -> State:
+        """Give the time derivative of the state.
+
+        Args:
+            state: displacement, velocity and internal states.
+            u: recorded drive, already shifted.
+            u_rate: its time derivative.
+            quantity: what the sensor measures; an instrument with memory follows it, as changed by the
+                instruments before.
+
+        Returns:
+            One rate a state.
+        """
+        internal_rates: list[Lanes] = []
+        if self.internal_states:
+            y = self.motion(state, u, u_rate, quantity)
+            for element, internal in zip(self.elements, self._internal(state), strict=True):
+                own = element.state_rate(state[0], state[1], internal)
+                sensed = element.reading_rate(y, internal)
+                internal_rates.extend(a + b for a, b in zip(own, sensed, strict=True))
+                y = element.reading(y, internal)
+        return (state[1], self.acceleration(state, u, u_rate), *internal_rates)

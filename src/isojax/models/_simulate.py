@@ -1,0 +1,144 @@
+"""Forced response of one isolator, by diffrax."""
+
+import math
+from collections.abc import Sequence
+from typing import get_args
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .._results import RESULTS
+from .._types import Lanes, as_float64, check_float64
+from ..excitations import AbstractExcitation
+from ._integrator import Integrator
+from ._isolator import Isolator, Quantity, State
+
+
+class Simulation(eqx.Module):
+    """A simulated record.
+
+    Attributes:
+        time: [s].
+        drive: drive that acted [N, or m/s^2 for base excitation].
+        displacement: [m]; relative to the base under base excitation.
+        velocity: [m/s].
+        acceleration: [m/s^2]; relative to the base under base excitation.
+        reading: what the sensor chain records [SI unit of the quantity].
+        internal: internal states of the elements.
+        result: how the integration ended.
+    """
+
+    time: Float[Array, " time"]
+    drive: Float[Array, " time"]
+    displacement: Float[Array, " time"]
+    velocity: Float[Array, " time"]
+    acceleration: Float[Array, " time"]
+    reading: Float[Array, " time"]
+    internal: tuple[Float[Array, " time"], ...]
+    result: RESULTS
+
+
+@eqx.filter_jit
+def _solve(
+    model: Isolator,
+    excitation: AbstractExcitation,
+    time: Float[Array, " time"],
+    state: State,
+    integrator: Integrator,
+    quantity: Quantity,
+    rate: float,
+) -> tuple[State, diffrax.RESULTS]:
+    shift = model.shift()
+    parts = integrator.steps_per_sample(model)
+    # Counted, not summed up: the steps of a zero-order hold must not drift against its samples.
+    steps = jnp.arange((time.size - 1) * parts + 1, dtype=float) / (rate * parts)
+
+    def field(t: Lanes, y: State, args: None) -> State:
+        return model.rates(y, excitation(t - shift), excitation.rate(t - shift), quantity)
+
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(field),  # pyright: ignore[reportArgumentType]
+        integrator.solver,
+        t0=steps[0],
+        t1=steps[-1],
+        dt0=None if integrator.rtol is None else 1.0 / (rate * parts),
+        y0=state,
+        saveat=diffrax.SaveAt(ts=time),
+        stepsize_controller=integrator.controller(steps),
+        adjoint=diffrax.ForwardMode(),
+        max_steps=integrator.max_steps,
+        throw=False,
+    )
+    assert solution.ys is not None
+    return solution.ys, solution.result
+
+
+def simulate(
+    model: Isolator,
+    excitation: AbstractExcitation,
+    *,
+    duration: float,
+    rate: float = 1000.0,
+    initial_state: Sequence[Lanes | float] | None = None,
+    quantity: Quantity = "acceleration",
+    integrator: Integrator | None = None,
+) -> Simulation:
+    """Integrate the forced response of an isolator.
+
+    Args:
+        model: the isolator.
+        excitation: the drive.
+        duration: length of the record [s].
+        rate: samples a second [Hz].
+        initial_state: displacement [m], velocity [m/s], internal states at t = 0; at rest if omitted.
+        quantity: what the sensor measures.
+        integrator: solver and steps; fixed RK4 steps locked to the samples if omitted.
+
+    Returns:
+        The simulated record, from t = 0 to `duration` inclusive. If the integration failed, every value that
+        depends on it is NaN, and `result` says why.
+
+    Raises:
+        ValueError: if `duration` or `rate` is not positive and finite, the record is shorter than one sample,
+            the initial state has the wrong length, or `quantity` is none of the three.
+        RuntimeError: if JAX is not in 64-bit mode.
+    """
+    check_float64()
+    integrator = Integrator() if integrator is None else integrator
+    for name, value in (("duration", duration), ("rate", rate)):
+        if not 0 < value < math.inf:
+            raise ValueError(f"Argument `{name}` must be positive and finite, but is {value}.")
+    count = round(duration * rate)
+    if count < 1:
+        raise ValueError(
+            f"Argument `duration` must be at least one sample of {1 / rate} s, but is {duration}."
+        )
+    if quantity not in get_args(Quantity):
+        raise ValueError(f"Argument `quantity` must be one of {get_args(Quantity)}, but is {quantity!r}.")
+    size = 2 + model.internal_states
+    start = (0.0,) * size if initial_state is None else initial_state
+    if len(start) != size:
+        raise ValueError(f"Argument `initial_state` must hold {size} states, but holds {len(start)}.")
+    state = tuple(as_float64(value) for value in start)
+    time = jnp.arange(count + 1, dtype=float) / rate
+    states, ended = _solve(model, excitation, time, state, integrator, quantity, rate)
+    shift = model.shift()
+    u, u_rate = jax.vmap(excitation)(time - shift), jax.vmap(excitation.rate)(time - shift)
+    ran = ended == diffrax.RESULTS.successful
+    finite = jnp.all(jnp.isfinite(jnp.stack(states)))
+    result = RESULTS.where(ran & ~finite, RESULTS.not_finite, RESULTS.promote(ended))
+    good = ran & finite
+    states = tuple(jnp.where(good, value, jnp.nan) for value in states)
+    return Simulation(
+        time,
+        model.drive(u, u_rate),
+        states[0],
+        states[1],
+        model.acceleration(states, u, u_rate),
+        model.reading(states, u, u_rate, quantity),
+        states[2:],
+        result,
+    )

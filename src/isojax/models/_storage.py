@@ -1,0 +1,127 @@
+"""Models on disk: JSON, without loss."""
+
+import json
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from .._parameters import own_parameters
+from .._types import check_float64
+from ..elements import CATALOGUE
+from ._isolator import Isolator
+
+FORMAT = "isojax-model"
+
+
+def model_to_dict(model: Isolator) -> dict[str, Any]:
+    """Give a model as plain numbers and words.
+
+    Args:
+        model: the isolator.
+
+    Returns:
+        A dictionary that JSON holds without loss (shortest decimal that reads back the same float64).
+    """
+    return {
+        "format": FORMAT,
+        "version": 1,
+        "excitation": model.excitation,
+        "mass": float(model.mass),
+        "elements": [
+            {"name": element.name}
+            | {field: float(getattr(element, field)) for field, _ in own_parameters(element)}
+            for element in model.elements
+        ],
+    }
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file whole or not at all: to a temporary file beside it, then rename.
+
+    Args:
+        path: the file.
+        text: its content.
+    """
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def save_model(model: Isolator, path: str | Path) -> None:
+    """Save a model as JSON.
+
+    Args:
+        model: the isolator.
+        path: the file to write; its folder must exist.
+
+    Raises:
+        ValueError: if a parameter is not finite.
+    """
+    for entry in model.parameters:
+        if not math.isfinite(entry.value):
+            raise ValueError(f"Argument `model` must be finite, but its {entry.name} is {entry.value}.")
+    write_whole(Path(path), json.dumps(model_to_dict(model), indent=1) + "\n")
+
+
+def load_model(path: str | Path) -> Isolator:
+    """Load a model saved by `save_model`.
+
+    Args:
+        path: the JSON file.
+
+    Returns:
+        The isolator, equal to the one saved.
+
+    Raises:
+        ValueError: if the file is missing, is no isojax model, names an unknown element or parameter, or
+            holds something else than a finite number for one.
+        RuntimeError: if JAX is not in 64-bit mode.
+    """
+    check_float64()
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror}).") from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: is no JSON file ({error}).") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("version") != 1:
+        raise ValueError(f'{path}: must hold "format": "{FORMAT}", "version": 1, but does not.')
+    unknown = sorted(set(content) - {"format", "version", "excitation", "mass", "elements"})
+    if unknown:
+        raise ValueError(f"{path}: unknown key {unknown[0]!r}.")
+    if content.get("excitation") not in ("force", "base_acceleration"):
+        found = content.get("excitation")
+        raise ValueError(f'{path}: "excitation" must be "force" or "base_acceleration", but is {found!r}.')
+    if not isinstance(content.get("elements"), list):
+        raise ValueError(f'{path}: "elements" must be a list, but is {content.get("elements")!r}.')
+    elements = []
+    for entry in content["elements"]:
+        name = entry.get("name") if isinstance(entry, dict) else None
+        if name not in CATALOGUE:
+            known = ", ".join(sorted(CATALOGUE))
+            raise ValueError(f"{path}: element name must be one of {known}, but is {name!r}.")
+        expected = [field for field, _ in own_parameters(CATALOGUE[name])]
+        values = {key: value for key, value in entry.items() if key != "name"}
+        if sorted(values) != sorted(expected):
+            raise ValueError(f"{path}: element {name} must hold {expected}, but holds {sorted(values)}.")
+        numbers = {key: _number(path, name, key, value) for key, value in values.items()}
+        elements.append(CATALOGUE[name](**numbers))
+    mass = _number(path, "the model", "mass", content.get("mass"))
+    if not mass > 0:
+        raise ValueError(f"{path}: mass of the model must be positive, but is {mass}.")
+    return Isolator(mass, tuple(elements), content["excitation"])
+
+
+def _number(path: Path, owner: str, key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{path}: {key} of {owner} must be a finite number, but is {value!r}.")
+    return float(value)

@@ -1,0 +1,115 @@
+"""A measurement campaign: its channels, its filter, the model named for it, and its records in test order."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from ._record import Record
+
+InputQuantity = Literal["force", "base_acceleration", "reaction_mass_acceleration", "command"]
+OutputQuantity = Literal["acceleration", "velocity", "displacement"]
+Hold = Literal["band_limited", "linear", "zero_order"]
+
+
+@dataclass(frozen=True)
+class InputChannel:
+    """What drove the isolator.
+
+    Attributes:
+        quantity: What the column measures.
+        column: Its name in the file.
+        unit: Its unit in the file.
+        gain: Input in SI = gain * column in SI; N/V where the column is a voltage.
+        gain_free: Whether the gain is to be identified.
+        offset_free: Whether a constant offset of the input is to be identified.
+        hold: How the input runs between two samples.
+        moving_mass: Mass [kg] of a reaction-mass exciter, else None.
+    """
+
+    quantity: InputQuantity
+    column: str
+    unit: str
+    gain: float = 1.0
+    gain_free: bool = False
+    offset_free: bool = False
+    hold: Hold = "band_limited"
+    moving_mass: float | None = None
+
+
+@dataclass(frozen=True)
+class OutputChannel:
+    """What was measured on the isolated mass.
+
+    Attributes:
+        quantity: Acceleration, velocity or displacement.
+        column: Its name in the file.
+        unit: Its unit in the file.
+        offset_free: Whether a constant offset of the output is to be identified.
+        noise: Declared rms noise in SI, or None to estimate it.
+    """
+
+    quantity: OutputQuantity
+    column: str
+    unit: str
+    offset_free: bool = False
+    noise: float | None = None
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Low-pass filter on both channels alike.
+
+    Attributes:
+        kind: "butterworth".
+        order: Order of the filter; run forwards and backwards it acts twice.
+        cutoff_hz: Cut-off frequency [Hz].
+        applied: True: the bench did it; False: the reader does, with zero phase.
+    """
+
+    kind: Literal["butterworth"]
+    order: int
+    cutoff_hz: float
+    applied: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """Everything campaign.toml says, with the records read.
+
+    Attributes:
+        title: Name of the campaign.
+        file: The campaign.toml.
+        mass: Isolated mass [kg].
+        mass_free: Whether the mass is to be identified.
+        input: The input channel.
+        output: The output channel.
+        filter: The filter, or None.
+        rate: Samples per second [Hz], of every record.
+        stiffness: Catalogue names of the stiffness terms, as written in [model].
+        damping: Catalogue names of the damping terms, as written in [model].
+        elements: Further catalogue names.
+        records: The records in the order of the test in time.
+    """
+
+    title: str
+    file: Path
+    mass: float
+    mass_free: bool
+    input: InputChannel
+    output: OutputChannel
+    filter: Filter | None
+    rate: float
+    stiffness: tuple[str, ...]
+    damping: tuple[str, ...]
+    elements: tuple[str, ...]
+    records: tuple[Record, ...]
+
+    @property
+    def fit_records(self) -> tuple[Record, ...]:
+        """Records that may set a coefficient."""
+        return tuple(record for record in self.records if record.role == "fit")
+
+    @property
+    def holdout_records(self) -> tuple[Record, ...]:
+        """Records that only judge."""
+        return tuple(record for record in self.records if record.role == "holdout")

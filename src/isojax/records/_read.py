@@ -1,0 +1,263 @@
+"""campaign.toml and its data files as one `Campaign` in SI."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from ._campaign import Campaign, Filter, InputChannel, OutputChannel
+from ._columns import read_columns
+from ._declaration import Declaration, read_declaration
+from ._filter import zero_phase_butterworth
+from ._kind import detect_kind
+from ._record import Dwell, Kind, Record
+from ._schedule import read_schedule, scheduled_dwells
+from ._segment import check_dwells
+from ._time_base import find_rate
+from ._units import si_factor
+from ._words import row
+
+_INPUT_MEASURES = {
+    "force": "force",
+    "base_acceleration": "acceleration",
+    "reaction_mass_acceleration": "acceleration",
+    "command": "command",
+}
+_FEWEST_SAMPLES = 16
+
+
+def read_campaign(path: str | Path) -> Campaign:
+    """Gives a measurement campaign, its records in SI units and in the order of the test.
+
+    Paths of data files and schedules are relative to the campaign.toml. Units are converted, a reaction mass
+    becomes a force, the filter runs where `applied = false`, dwells come from the schedule or are found, and
+    the kind of each record is detected.
+
+    Args:
+        path: The campaign.toml or its folder.
+
+    Returns:
+        The campaign.
+
+    Raises:
+        ValueError: At the first thing that is wrong with the .toml or a data file: which file, which field or
+            row, what was found and what was expected.
+
+    Source:
+        The form of campaign.toml is described in the README.
+    """
+    declared = read_declaration(path)
+    file, sections = declared.file, declared.sections
+    drive = InputChannel(**sections["input"])
+    response = OutputChannel(**sections["output"])
+    reader_filter = None if sections["filter"] is None else Filter(**sections["filter"])
+    sign = -drive.moving_mass if drive.moving_mass is not None else 1.0
+    factors = (
+        sign * drive.gain * si_factor(drive.unit, _INPUT_MEASURES[drive.quantity], f"{file}: [input] unit"),
+        si_factor(response.unit, response.quantity, f"{file}: [output] unit"),
+    )
+    names = _record_names(declared)
+    records = tuple(
+        _read_record(declared, i, names[i], factors, reader_filter) for i in range(len(declared.records))
+    )
+    _check_apart(declared, records)
+    rate = records[0].rate
+    for record in records:
+        if abs(record.rate / rate - 1.0) > 1e-3:
+            raise ValueError(
+                f"{file}: {record.file} is sampled at {record.rate:.9g} Hz, but {records[0].file} at "
+                f"{rate:.9g} Hz; "
+                "all records of a campaign must have one rate"
+            )
+    return Campaign(
+        title=sections["campaign"]["title"] or file.resolve().parent.name,
+        file=file,
+        mass=sections["campaign"]["mass"],
+        mass_free=sections["campaign"]["mass_free"],
+        input=drive,
+        output=response,
+        filter=reader_filter,
+        rate=rate,
+        stiffness=tuple(sections["model"]["stiffness"]),
+        damping=tuple(sections["model"]["damping"]),
+        elements=tuple(sections["model"]["elements"]),
+        records=records,
+    )
+
+
+def _record_names(declared: Declaration) -> list[str]:
+    """Gives the file stem of each record; with its folder, ending and samples where it is not unique."""
+    paths = [Path(entry["file"]) for entry in declared.records]
+    files: dict[str, set[str]] = {}
+    for path in paths:
+        files.setdefault(path.stem, set()).add(path.as_posix())
+    names = [path.stem if len(files[path.stem]) == 1 else path.as_posix() for path in paths]
+    spans = [
+        f"[{entry['start']}:{'' if entry['stop'] is None else entry['stop']}]" for entry in declared.records
+    ]
+    return [name + span if names.count(name) > 1 else name for name, span in zip(names, spans, strict=True)]
+
+
+def _read_record(
+    declared: Declaration, number: int, name: str, factors: tuple[float, float], reader_filter: Filter | None
+) -> Record:
+    entry, sections = declared.records[number], declared.sections
+    where = f"{declared.file}: [[record]] number {number + 1}"
+    file = declared.file.parent / entry["file"]
+    drive, response, clock = (
+        sections["input"]["column"],
+        sections["output"]["column"],
+        sections["sampling"]["time"],
+    )
+    columns = read_columns(file, list(dict.fromkeys([drive, response] + ([clock] if clock else []))))
+    total = columns[drive].samples.size
+    start, stop = _span(where, file, entry, total)
+    raw_input = _channel(file, drive, columns[drive].samples[start:stop], start) * factors[0]
+    raw_output = _channel(file, response, columns[response].samples[start:stop], start) * factors[1]
+    time = columns[clock].samples[start:stop] if clock else None
+    stated = next((column.rate for column in columns.values() if column.rate is not None), None)
+    rate = find_rate(file, sections["sampling"]["rate"], stated, time, clock, start)
+    _check_not_constant(file, response, raw_output)
+    if np.ptp(raw_input) == 0.0 and raw_input[0] != 0.0:
+        _check_not_constant(file, drive, raw_input)
+    shown_input, shown_output = raw_input, raw_output
+    if reader_filter is not None:
+        if reader_filter.cutoff_hz >= 0.5 * rate:
+            raise ValueError(
+                f"{declared.file}: [filter] cutoff_hz = {reader_filter.cutoff_hz:g} must be below half the "
+                "sampling "
+                f"rate, {0.5 * rate:g} Hz"
+            )
+        if not reader_filter.applied:
+            shown_input, shown_output = (
+                zero_phase_butterworth(one, rate, reader_filter.order, reader_filter.cutoff_hz)
+                for one in (raw_input, raw_output)
+            )
+    dwells, kind = _excitation(declared, entry, rate, (start, stop, total), shown_input, shown_output)
+    if kind != "free_decay" and not np.any(raw_input):
+        raise ValueError(
+            f"{file}: column `{drive}` is 0 throughout, and the output does not decay; expected a force "
+            "that varies"
+        )
+    return Record(
+        name=name,
+        file=file,
+        time=np.arange(stop - start) / rate,
+        rate=rate,
+        input=shown_input,
+        output=shown_output,
+        raw_input=raw_input,
+        raw_output=raw_output,
+        level=entry["level"],
+        direction=entry["direction"],
+        repeat=entry["repeat"],
+        role=entry["role"],
+        period=entry["period"],
+        settle=entry["settle"],
+        dwells=dwells,
+        kind=kind,
+    )
+
+
+def _span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:
+    start, stop = entry["start"], total if entry["stop"] is None else entry["stop"]
+    if start >= total or stop > total:
+        wrong = f"start = {start}" if start >= total else f"stop = {stop}"
+        raise ValueError(f"{where} {wrong} lies outside {file}, which has {total} samples")
+    if stop <= start:
+        raise ValueError(f"{where} stop = {stop} must be above start = {start}")
+    size = stop - start
+    if size < _FEWEST_SAMPLES:
+        raise ValueError(f"{where} covers {size} samples of {file}; at least {_FEWEST_SAMPLES} are needed")
+    if entry["settle"] >= size:
+        raise ValueError(
+            f"{where} settle = {entry['settle']} must be below the record's {size} samples ({file})"
+        )
+    if entry["period"] is not None and entry["period"] > size:
+        raise ValueError(f"{where} period = {entry['period']} exceeds the record's {size} samples ({file})")
+    if entry["period"] is not None and entry["schedule"] is not None:
+        raise ValueError(
+            f"{where} has both a period and a schedule; a record is periodic or stepped, not both"
+        )
+    return start, stop
+
+
+def _channel(
+    file: Path, column: str, samples: Float[np.ndarray, " time"], start: int
+) -> Float[np.ndarray, " time"]:
+    wrong = np.flatnonzero(~np.isfinite(samples))
+    if wrong.size:
+        at = int(wrong[0])
+        more = f" (and at {wrong.size - 1} more)" if wrong.size > 1 else ""
+        raise ValueError(
+            f"{file}: column `{column}` is {samples[at]} at {row(start + at)}{more}; every sample must be "
+            "a finite "
+            "number"
+        )
+    return samples
+
+
+def _check_not_constant(file: Path, column: str, samples: Float[np.ndarray, " time"]) -> None:
+    if np.ptp(samples) == 0.0:
+        raise ValueError(
+            f"{file}: column `{column}` is constant ({samples[0]:.6g} in SI throughout); expected a "
+            "channel that "
+            "varies"
+        )
+
+
+def _excitation(
+    declared: Declaration,
+    entry: Mapping[str, Any],
+    rate: float,
+    span: tuple[int, int, int],
+    drive: Float[np.ndarray, " time"],
+    response: Float[np.ndarray, " time"],
+) -> tuple[tuple[Dwell, ...], Kind]:
+    """Gives the dwells and the kind of a record: as declared, else as detected."""
+    if entry["period"] is not None:
+        return (), "periodic"
+    if entry["schedule"] is not None:
+        file = declared.file.parent / entry["schedule"]
+        dwells = scheduled_dwells(file, read_schedule(file), rate, *span)
+        check_dwells(file, drive, rate, dwells)
+        return dwells, "stepped_sine"
+    sections = declared.sections
+    if sections["output"]["quantity"] != "acceleration":
+        inertia = None
+    else:
+        inertia = (
+            1.0 if sections["input"]["quantity"] == "base_acceleration" else sections["campaign"]["mass"]
+        )
+    return detect_kind(drive, response, rate, inertia)
+
+
+def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:
+    """Refuses samples that are counted twice, above all held-out ones that are also used to fit."""
+    files = [record.file.resolve() for record in records]
+    for i, record in enumerate(records):
+        for j, other in enumerate(records[:i]):
+            # settle samples only set the state; but a fit sees its own, so they must not be held-out ones
+            mine, its = (
+                entry["start"] + (0 if one.role == "fit" and record.role != other.role else one.settle)
+                for entry, one in ((declared.records[i], record), (declared.records[j], other))
+            )
+            first = max(mine, its)
+            last = min(
+                declared.records[i]["start"] + record.time.size,
+                declared.records[j]["start"] + other.time.size,
+            )
+            if files[i] != files[j] or first >= last:
+                continue
+            shared = (
+                f"[[record]] number {j + 1} and number {i + 1} share samples {first}:{last} of {record.file}"
+            )
+            if record.role == other.role:
+                raise ValueError(f"{declared.file}: {shared}; each sample may count only once")
+            raise ValueError(
+                f'{declared.file}: {shared}, once with role = "{other.role}", once with role = '
+                f'"{record.role}"; '
+                "held-out samples must not be used to fit"
+            )

@@ -1,0 +1,71 @@
+"""One measured record: the two channels in SI, how they were excited, and the dwells of a stepped sine."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+Direction = Literal["forward", "backward", "none"]
+Role = Literal["fit", "holdout"]
+Kind = Literal["stepped_sine", "periodic", "swept", "free_decay", "broadband"]
+
+
+@dataclass(frozen=True)
+class Dwell:
+    """A stretch of a stepped sine at one frequency.
+
+    Attributes:
+        start: First sample, counted from the start of the record.
+        stop: One past the last sample.
+        frequency: Excitation frequency [Hz].
+        cycles: Number of cycles.
+    """
+
+    start: int
+    stop: int
+    frequency: float
+    cycles: float
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One measurement on a uniform time grid.
+
+    Attributes:
+        name: File stem, made unique where two records would share it.
+        file: Where it was read from.
+        time: Seconds since the record's first sample.
+        rate: Samples per second [Hz].
+        input: Force on the mass [N] (from a reaction mass: -moving_mass * acceleration), base acceleration
+            [m/s^2], or gain * command.
+        output: Acceleration [m/s^2], velocity [m/s] or displacement [m].
+        raw_input: The input before the reader's [filter]; the same array where the reader does not filter.
+        raw_output: The output before the reader's [filter].
+        level: Nominal excitation level, or None.
+        direction: Direction of the sweep.
+        repeat: Number of the repetition, or None.
+        role: "fit" or "holdout".
+        period: Samples per period of a periodic excitation, or None.
+        settle: Samples at the start that count in no error.
+        dwells: Dwells of a stepped sine, else empty.
+        kind: What the excitation is.
+    """
+
+    name: str
+    file: Path
+    time: Float[np.ndarray, " time"]
+    rate: float
+    input: Float[np.ndarray, " time"]
+    output: Float[np.ndarray, " time"]
+    raw_input: Float[np.ndarray, " time"]
+    raw_output: Float[np.ndarray, " time"]
+    level: float | None = None
+    direction: Direction = "none"
+    repeat: int | None = None
+    role: Role = "fit"
+    period: int | None = None
+    settle: int = 0
+    dwells: tuple[Dwell, ...] = ()
+    kind: Kind = "broadband"

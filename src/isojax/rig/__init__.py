@@ -1,0 +1,56 @@
+"""A simulated test bench, to judge the identification by.
+
+It shares no code with the models that it judges: NumPy and SciPy only. A `Plant` is a mass with force laws
+and instruments; a `Plan` says what to test; `run` returns the records and `write_campaign` files them as a
+campaign with its truth beside it.
+
+Accuracy: with the default tolerance the motion is good to 1e-7 of its rms (tests/rig compares it with closed
+forms and with SciPy). Discontinuous laws are exact: each turning, sticking and breaking away is located and
+ends a step.
+"""
+
+from ._bench import DEFAULT_BENCH as DEFAULT_BENCH
+from ._bench import Bench as Bench
+from ._bench import SimulatedRecord as SimulatedRecord
+from ._bench import response as response
+from ._bench import run as run
+from ._broadband_plans import FreeDecay as FreeDecay
+from ._broadband_plans import Impulse as Impulse
+from ._broadband_plans import Multisine as Multisine
+from ._campaign import truth as truth
+from ._campaign import write_campaign as write_campaign
+from ._dampers import AbsQuadraticDamping as AbsQuadraticDamping
+from ._dampers import CubicDamping as CubicDamping
+from ._dampers import LinearDamping as LinearDamping
+from ._dampers import PositionDamping as PositionDamping
+from ._excitation import Chirp as Chirp
+from ._excitation import Piece as Piece
+from ._excitation import Tones as Tones
+from ._friction import CoulombFriction as CoulombFriction
+from ._hysteresis import BoucWen as BoucWen
+from ._hysteresis import DahlFriction as DahlFriction
+from ._inertia import AddedMass as AddedMass
+from ._instruments import InputDelay as InputDelay
+from ._instruments import InputGain as InputGain
+from ._instruments import InputOffset as InputOffset
+from ._instruments import Instrument as Instrument
+from ._instruments import SensorGain as SensorGain
+from ._instruments import SensorOffset as SensorOffset
+from ._law import Law as Law
+from ._paper import paper_plan as paper_plan
+from ._paper import y_plant as y_plant
+from ._paper import z_plant as z_plant
+from ._plan import Plan as Plan
+from ._plan import Trial as Trial
+from ._plant import Plant as Plant
+from ._plant import base_laws as base_laws
+from ._relaxation import MaxwellBranch as MaxwellBranch
+from ._shaker import EXAMPLE_SHAKER as EXAMPLE_SHAKER
+from ._shaker import IDEAL_SHAKER as IDEAL_SHAKER
+from ._shaker import Shaker as Shaker
+from ._sine_plans import SteppedSine as SteppedSine
+from ._sine_plans import SweptSine as SweptSine
+from ._springs import AbsQuadraticStiffness as AbsQuadraticStiffness
+from ._springs import CubicStiffness as CubicStiffness
+from ._springs import LinearStiffness as LinearStiffness
+from ._springs import QuadraticStiffness as QuadraticStiffness

@@ -1,0 +1,105 @@
+"""Effects of the instruments: what is recorded is not quite what acts on the plant and how it answers.
+
+With every instrument in place, acting force(t) = (1 + gain deviation) x recorded force(t - delay) + offset,
+and recorded output = (1 + gain deviation) x output + offset.
+"""
+
+from abc import ABC
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+
+class Instrument(ABC):
+    """One effect between the plant and the file; acts on the fine grid, before the anti-alias filter."""
+
+    name: ClassVar[str]
+    """Catalogue name, as in campaign.toml."""
+
+    @property
+    def lag(self) -> float:
+        """Time by which the acting force lags the recorded one, s."""
+        return 0.0
+
+    def recorded_force(
+        self, times: Float[np.ndarray, " time"], force: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """What the force channel shows of the force, N."""
+        return force
+
+    def recorded_output(
+        self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """What the output channel shows of the output, in its SI unit."""
+        return output
+
+
+@dataclass(frozen=True)
+class InputDelay(Instrument):
+    """The force acts `delay` seconds after it is recorded."""
+
+    name: ClassVar[str] = "input_delay"
+    delay: float
+
+    @property
+    def lag(self) -> float:
+        """The delay, s."""
+        return self.delay
+
+
+@dataclass(frozen=True)
+class InputGain(Instrument):
+    """The acting force is (1 + deviation) times the recorded one."""
+
+    name: ClassVar[str] = "input_gain"
+    deviation: float
+
+    def recorded_force(
+        self, times: Float[np.ndarray, " time"], force: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The force over (1 + deviation), N."""
+        return force / (1 + self.deviation)
+
+
+@dataclass(frozen=True)
+class InputOffset(Instrument):
+    """The acting force is the recorded one plus `force` newtons."""
+
+    name: ClassVar[str] = "input_offset"
+    force: float
+
+    def recorded_force(
+        self, times: Float[np.ndarray, " time"], force: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The force less the offset, N."""
+        return force - self.force
+
+
+@dataclass(frozen=True)
+class SensorGain(Instrument):
+    """The output channel shows (1 + deviation) times the output."""
+
+    name: ClassVar[str] = "sensor_gain"
+    deviation: float
+
+    def recorded_output(
+        self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The output times (1 + deviation)."""
+        return output * (1 + self.deviation)
+
+
+@dataclass(frozen=True)
+class SensorOffset(Instrument):
+    """The output channel shows the output plus `value`, in the SI unit of the output."""
+
+    name: ClassVar[str] = "sensor_offset"
+    value: float
+
+    def recorded_output(
+        self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The output plus the offset."""
+        return output + self.value

@@ -1,0 +1,254 @@
+"""What every registered element must do: a new one is tested here unasked, by its line in the catalogue."""
+
+import inspect
+import math
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from isojax import paper
+from isojax._parameters import list_parameters, own_parameters, replace_parameters, to_free, to_physical
+from isojax._results import is_successful
+from isojax.elements import CATALOGUE, AbstractElement, Scales
+from isojax.excitations import Harmonic
+from isojax.models import Integrator, Isolator, load_model, save_model, simulate
+
+SCALES = Scales(
+    mass=800.0,
+    force=150.0,
+    displacement=3e-3,
+    velocity=0.08,
+    acceleration=2.2,
+    angular_frequency=27.0,
+    sample_time=1e-3,
+    slowest_velocity=0.02,
+    reading=2.2,
+)
+
+DRIVE = Harmonic(150.0, 4.3)
+
+every_element = pytest.mark.parametrize("kind", CATALOGUE.values(), ids=CATALOGUE.keys())
+
+
+def with_strength(element: AbstractElement, share: float) -> AbstractElement:
+    """The element at a share of its typical strength."""
+    strength = jnp.asarray(share * element.typical_strength(SCALES), dtype=float)
+    return eqx.tree_at(lambda e: getattr(e, e.strength), element, strength)
+
+
+def internal(element: AbstractElement, *, rest: bool, shape=(), seed=0) -> tuple:
+    """Internal states at rest, or random ones of the size of the motion."""
+    size = 0.0 if rest else 0.3 * SCALES.displacement
+    draws = np.random.default_rng(seed).standard_normal((element.internal_states, *shape))
+    return tuple(jnp.asarray(size * draw) for draw in draws)
+
+
+def answers(element: AbstractElement, x, v, s, u, du, y) -> tuple:
+    """Everything that the isolator asks an element."""
+    return (
+        element.force(x, v, s),
+        element.state_rate(x, v, s),
+        jnp.asarray(element.inertia()),
+        element.drive(u, du),
+        jnp.asarray(element.shift()),
+        element.reading(y, s),
+        element.reading_rate(y, s),
+    )
+
+
+def motion(shape=(), seed=1) -> list:
+    """Random displacement, velocity, drive, drive rate and reading of realistic size."""
+    rng = np.random.default_rng(seed)
+    sizes = (SCALES.displacement, SCALES.velocity, SCALES.force, SCALES.force * 27.0, SCALES.reading)
+    return [jnp.asarray(size * rng.standard_normal(shape)) for size in sizes]
+
+
+@every_element
+def test_an_element_declares_what_it_is(kind):
+    assert CATALOGUE[kind.name] is kind
+    assert kind.name == kind.name.lower()
+    assert len(kind.words.split()) >= 2
+    assert kind.strength in [field for field, _ in own_parameters(kind)]
+    assert isinstance(kind.signed, bool)
+    assert kind.internal_states >= 0
+    assert kind.substeps >= 1
+    assert kind.__subclasses__() == []
+
+
+@every_element
+def test_an_element_is_alone_in_the_file_of_its_name(kind):
+    module = inspect.getmodule(kind)
+    own = [
+        member
+        for member in vars(module).values()
+        if inspect.isclass(member) and issubclass(member, AbstractElement) and member is not AbstractElement
+    ]
+    assert module.__name__ == f"isojax.elements._{kind.name}"
+    assert own == [kind]
+
+
+@every_element
+def test_an_element_says_where_its_law_comes_from(kind):
+    assert "Source:" in inspect.getdoc(kind)
+    for field, _ in own_parameters(kind):
+        assert f"{field}: " in inspect.getdoc(kind)
+
+
+@every_element
+def test_parameters_have_symbols_units_and_bounds(kind):
+    for field, spec in own_parameters(kind):
+        assert spec.symbol, field
+        assert spec.unit, field
+        assert spec.lower < spec.upper, field
+
+
+@every_element
+def test_a_strength_that_may_be_negative_is_not_bounded_at_zero(kind):
+    lower = dict(own_parameters(kind))[kind.strength].lower
+    assert lower < 0.0 if kind.signed else lower in (0.0, -math.inf)
+
+
+@every_element
+def test_the_guess_and_the_grid_are_the_absent_effect_within_bounds(kind):
+    grid = kind.grid(SCALES)
+    assert len(grid) >= 1
+    for element in (kind.guess(SCALES), *grid):
+        assert type(element) is kind
+        assert float(getattr(element, kind.strength)) == 0.0
+        for entry in list_parameters(element):
+            assert entry.value.dtype == jnp.float64
+            assert entry.value.shape == ()
+            assert math.isfinite(entry.value)
+            assert entry.spec.lower <= entry.value <= entry.spec.upper
+
+
+@every_element
+def test_the_grid_repeats_no_element(kind):
+    points = [
+        tuple(float(entry.value) for entry in list_parameters(element)) for element in kind.grid(SCALES)
+    ]
+    assert len(set(points)) == len(points)
+
+
+@every_element
+def test_zero_strength_removes_the_effect(kind):
+    for element in (kind.guess(SCALES), *kind.grid(SCALES)):
+        x, v, u, du, y = motion((7,))
+        s = internal(element, rest=False, shape=(7,))
+        force, _, inertia, driven, shift, reading, sensed = answers(element, x, v, s, u, du, y)
+        np.testing.assert_array_equal(force, 0.0)
+        assert float(inertia) == 0.0
+        assert float(shift) == 0.0
+        np.testing.assert_array_equal(driven, (u, du))
+        np.testing.assert_array_equal(reading, y)
+        assert len(sensed) == element.internal_states
+
+
+@every_element
+def test_the_typical_strength_is_positive_finite_and_does_something(kind):
+    strength = kind.typical_strength(SCALES)
+    assert math.isfinite(strength)
+    assert strength > 0.0
+    absent, present = kind.guess(SCALES), with_strength(kind.guess(SCALES), 1.0)
+    x, v, u, du, y = motion()
+    s = internal(present, rest=False)
+    before = jax.tree.leaves(answers(absent, x, v, s, u, du, y))
+    after = jax.tree.leaves(answers(present, x, v, s, u, du, y))
+    assert any(float(jnp.max(jnp.abs(a - b))) > 0.0 for a, b in zip(before, after, strict=True))
+
+
+@every_element
+@pytest.mark.parametrize("share", [0.0, 0.1])
+@pytest.mark.parametrize("shape", [0.6, 1.0, 1.7])
+def test_derivatives_are_finite_at_rest(kind, share, shape):
+    guess = kind.guess(SCALES)
+    element = with_strength(
+        replace_parameters(guess, [shape * p.value for p in list_parameters(guess)]), share
+    )
+    zero = jnp.asarray(0.0)
+
+    def everything(element, x, v, s):
+        return answers(element, x, v, s, zero, zero, zero)
+
+    slopes = jax.jacfwd(everything, argnums=(0, 1, 2, 3))(element, zero, zero, internal(element, rest=True))
+    for slope in jax.tree.leaves(slopes):
+        assert bool(jnp.all(jnp.isfinite(slope)))
+
+
+@every_element
+def test_free_variables_and_physical_numbers_round_trip(kind):
+    element = with_strength(kind.guess(SCALES), 0.1)
+    for entry in list_parameters(element):
+        scale = kind.typical_strength(SCALES) if entry.name == kind.strength else abs(entry.value) + 1e-300
+        back = to_physical(to_free(entry.value, entry.spec, scale), entry.spec, scale)
+        np.testing.assert_allclose(back, entry.value, rtol=1e-12)
+
+
+@every_element
+@pytest.mark.parametrize("shape", [(), (5,), (2, 3)])
+def test_any_leading_shape_gives_the_single_answers(kind, shape):
+    element = with_strength(kind.guess(SCALES), 0.1)
+    x, v, u, du, y = motion(shape)
+    s = internal(element, rest=False, shape=shape)
+    together = jax.tree.leaves(eqx.filter_jit(answers)(element, x, v, s, u, du, y))
+    flat = [jnp.ravel(value) for value in (x, v, u, du, y)]
+    lanes = jax.vmap(lambda x, v, s, u, du, y: answers(element, x, v, s, u, du, y))
+    apart = jax.tree.leaves(lanes(flat[0], flat[1], tuple(jnp.ravel(p) for p in s), *flat[2:]))
+    for batch, single in zip(together, apart, strict=True):
+        single = single if batch.shape == () and shape != () else jnp.reshape(single, shape)
+        np.testing.assert_allclose(jnp.broadcast_to(batch, single.shape), single, rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def absent():
+    """A record of the paper's model with every effect at zero strength: one compilation serves all."""
+    return simulated({name: kind.guess(SCALES) for name, kind in CATALOGUE.items()})
+
+
+def simulated(effects: dict[str, AbstractElement]):
+    model = paper.y_direction().with_elements(*effects.values())
+    return simulate(model, DRIVE, duration=0.2)
+
+
+def test_effects_of_zero_strength_leave_the_simulated_record_as_it_was(absent):
+    finest = Integrator(substeps=max(kind.substeps for kind in CATALOGUE.values()))
+    without = simulate(paper.y_direction(), DRIVE, duration=0.2, integrator=finest)
+    np.testing.assert_allclose(absent.reading, without.reading, rtol=1e-12, atol=1e-14)
+
+
+@every_element
+def test_an_effect_simulates_and_shows_in_the_record(kind, absent):
+    effects = {name: other.guess(SCALES) for name, other in CATALOGUE.items()}
+    present = simulated(effects | {kind.name: with_strength(effects[kind.name], 0.1)})
+    assert is_successful(present.result)
+    assert bool(jnp.all(jnp.isfinite(present.reading)))
+    assert float(jnp.max(jnp.abs(present.reading - absent.reading))) > 1e-6 * SCALES.reading
+
+
+@every_element
+def test_json_keeps_every_digit(kind, tmp_path):
+    element = with_strength(kind.guess(SCALES), 1.0 / 3.0)
+    model = Isolator(800.0 / 7.0, (element,))
+    save_model(model, tmp_path / "model.json")
+    assert eqx.tree_equal(load_model(tmp_path / "model.json"), model)
+
+
+@every_element
+def test_the_linearised_isolator_is_finite_at_rest(kind):
+    model = paper.y_direction().with_elements(with_strength(kind.guess(SCALES), 0.1))
+    size = 2 + model.internal_states
+    rest, zero = tuple(jnp.asarray(0.0) for _ in range(size)), jnp.asarray(0.0)
+    matrix = np.asarray(jax.jacfwd(lambda y: model.rates(y, zero, zero))(rest))
+    assert matrix.shape == (size, size)
+    assert np.all(np.isfinite(matrix))
+    assert np.all(np.linalg.eigvals(matrix).real < 1e-9)
+
+
+def test_the_catalogue_holds_every_element_file():
+    folder = Path(inspect.getfile(AbstractElement)).parent
+    files = {path.stem[1:] for path in folder.glob("_*.py")} - {"_init__", "base"}
+    assert files == set(CATALOGUE)

@@ -1,0 +1,63 @@
+"""The scan over records and the single simulation are one integrator."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from isojax import paper
+from isojax.elements import CoulombFriction, MaxwellBranch
+from isojax.excitations import Sampled, tabulate
+from isojax.models import RK4, scan_records, simulate
+
+RATE, COUNT = 1000.0, 1500
+
+
+def drives() -> np.ndarray:
+    """Two records of different level and frequency, one column each."""
+    t = np.arange(COUNT) / RATE
+    return np.stack([150.0 * np.sin(2 * np.pi * 4.3 * t), 60.0 * np.sin(2 * np.pi * 5.7 * t + 0.4)], axis=1)
+
+
+@pytest.mark.parametrize("hold", ["band_limited", "linear", "zero_order"])
+def test_records_side_by_side_are_the_single_simulations(hold):
+    model = paper.y_direction().with_elements(MaxwellBranch(2e4, 0.03), CoulombFriction(5.0, 1e-2))
+    tables = [tabulate(column, RATE, hold, model.substeps)[0] for column in drives().T]
+    start = tuple(jnp.asarray([value, -value]) for value in (1e-3, 0.01, 2e-4))
+
+    def observe(state, u, du):
+        return state[0], model.reading(state, u, du, "acceleration")
+
+    end, (displacement, reading) = jax.jit(
+        lambda drive: scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, drive, None, observe)
+    )(jnp.asarray(np.stack(tables, axis=-1)))
+    for lane in range(2):
+        record = simulate(
+            model,
+            Sampled(drives()[:, lane], RATE, hold),
+            duration=(COUNT - 1) / RATE,
+            initial_state=tuple(value[lane] for value in start),
+        )
+        size = float(jnp.max(jnp.abs(record.displacement)))
+        np.testing.assert_allclose(displacement[:, lane], record.displacement, atol=1e-12 * size)
+        size = float(jnp.max(jnp.abs(record.reading)))
+        np.testing.assert_allclose(reading[:, lane], record.reading, atol=1e-11 * size)
+    assert all(value.shape == (2,) for value in end)
+
+
+def test_the_drive_rate_reaches_the_instruments():
+    model = paper.y_direction()
+    values, slopes = tabulate(drives()[:, 0], RATE, "band_limited", 1)
+    _, seen = scan_records(
+        model,
+        RK4(),
+        "acceleration",
+        1.0 / RATE,
+        (jnp.zeros(1), jnp.zeros(1)),
+        jnp.asarray(values)[..., None],
+        jnp.asarray(slopes)[..., None],
+        lambda state, u, du: du,
+    )
+    t = np.arange(COUNT) / RATE
+    expected = 150.0 * 2 * np.pi * 4.3 * np.cos(2 * np.pi * 4.3 * t)
+    np.testing.assert_allclose(seen[200:-200, 0], expected[200:-200], rtol=0.0, atol=1e-5 * np.max(expected))

@@ -1,0 +1,211 @@
+"""Every mistake in campaign.toml gives one ValueError: file, field, what was found and what was expected."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from isojax.records import read_campaign
+
+RECORD = r'role = "fit"'
+MISTAKES = {
+    "a missing section": (r"\[output\](.|\n)*?\n\n", "", r"section \[output\] is missing.*`quantity`"),
+    "an unknown section": (r"\[model\]", "[modell]", r"unknown section `modell`; did you mean `model`"),
+    "a misspelt field": ("^mass = ", "mas = ", r"\[campaign\].*unknown field `mas`; did you mean `mass`"),
+    "a missing mass": ("^mass = 2.0\n", "", r"\[campaign\] lacks the field `mass`"),
+    "a missing column field": ('column = "force"\n', "", r"\[input\] lacks the field `column`"),
+    "a missing unit": ('unit = "N"\n', "", r"\[input\] lacks the field `unit`"),
+    "a missing quantity": (
+        'quantity = "force"\n',
+        "",
+        r"\[input\] lacks the field `quantity`.*base_acceleration",
+    ),
+    "a negative mass": ("mass = 2.0", "mass = -2.0", r"mass = -2.0 must be a finite number above 0"),
+    "a mass that is no number": ("mass = 2.0", "mass = nan", r"mass = nan must be a finite number above 0"),
+    "a mass in quotes": ("mass = 2.0", 'mass = "2.0"', r"mass = '2.0' must be a finite number"),
+    "a flag in quotes": (
+        "mass = 2.0",
+        'mass = 2.0\nmass_free = "yes"',
+        r"mass_free = 'yes' must be true or false",
+    ),
+    "a flag that is a number": (
+        "mass = 2.0",
+        "mass = 2.0\nmass_free = 1",
+        r"mass_free = 1 must be true or false",
+    ),
+    "a number that is a flag": ("mass = 2.0", "mass = true", r"mass = True must be a finite number"),
+    "an empty title": ('"tiny"', '""', r"title = '' must be a text"),
+    "an unknown quantity": (
+        '"force"',
+        '"forse"',
+        r"quantity = 'forse' must be one of .*; did you mean `force`",
+    ),
+    "an unknown output": ('"acceleration"', '"jerk"', r"\[output\] quantity = 'jerk' must be one of"),
+    "a zero gain": ('unit = "N"', 'unit = "N"\ngain = 0', r"gain = 0 must be a finite number other than 0"),
+    "an unknown hold": ('unit = "N"', 'unit = "N"\nhold = "cubic"', r"hold = 'cubic' must be one of"),
+    "a reaction mass without its mass": (
+        'quantity = "force"',
+        'quantity = "reaction_mass_acceleration"',
+        r"lacks the field `moving_mass`",
+    ),
+    "a moving mass without a reaction mass": (
+        'unit = "N"',
+        'unit = "N"\nmoving_mass = 3.0',
+        r"moving_mass = 3.0 belongs to",
+    ),
+    "one column for both channels": ('"force"\nunit', '"acceleration"\nunit', r"both name column"),
+    "an unknown unit": (
+        'unit = "N"',
+        'unit = "Nn"',
+        r'\[input\] unit = "Nn" is not a unit.*did you mean `N`|mN',
+    ),
+    "a unit of another quantity": (
+        'unit = "N"',
+        'unit = "m"',
+        r'unit = "m" \(meter\) does not measure a force',
+    ),
+    "a knot for a kilonewton": ('unit = "N"', 'unit = "kn"', r"does not measure a force.*did you mean `kN`"),
+    "gram for an acceleration's unit": ('"m/s\\^2"', '"kg"', r"does not measure an acceleration"),
+    "a unit with a number": ('"m/s\\^2"', '"2 m/s^2"', r"is not a unit"),
+    "noise below zero": (
+        '"m/s\\^2"',
+        '"m/s^2"\nnoise = -0.1',
+        r"noise = -0.1 must be a finite number above 0",
+    ),
+    "a negative rate": ("rate = 200.0", "rate = -200.0", r"\[sampling\] rate = -200.0 must be"),
+    "no rate at all": ("rate = 200.0\n", "", r"the sampling rate is not known"),
+    "a filter above half the rate": (
+        r"\[model\]",
+        "[filter]\norder = 4\ncutoff_hz = 120.0\napplied = false\n[model]",
+        r"cutoff_hz = 120 must be below half the sampling rate, 100 Hz",
+    ),
+    "a filter without order": (
+        r"\[model\]",
+        "[filter]\ncutoff_hz = 20.0\n[model]",
+        r"\[filter\] lacks .* `order`",
+    ),
+    "an unknown filter": (
+        r"\[model\]",
+        '[filter]\nkind = "bessel"\norder = 2\ncutoff_hz = 20.0\n[model]',
+        r"kind = 'bessel' must be one of",
+    ),
+    "a stiffness that is no list": (
+        r'\["linear"\]',
+        '"linear"',
+        r"\[model\] stiffness = 'linear' must be a list",
+    ),
+    "a list of numbers": (r'\["linear"\]', "[1, 2]", r"stiffness = \[1, 2\] must be a list"),
+    "a term named twice": (r'\["linear"\]', '["linear", "linear"]', r"must be a list of different names"),
+    "records as one table": (r"\[\[record\]\]", "[record]", r"write \[\[record\]\] above each record"),
+    "a section as a list": (r"\[model\]", "[[model]]", r"\[model\] must be one table of fields"),
+    "no record": (r"\[\[record\]\](.|\n)*", "", r"no \[\[record\]\] is listed"),
+    "no record to fit": (RECORD, 'role = "holdout"', r"no \[\[record\]\] has role = \"fit\""),
+    "an unknown role": (
+        RECORD,
+        'role = "test"',
+        r"number 1 role = 'test' must be one of \"fit\", \"holdout\"",
+    ),
+    "a missing role": (RECORD, "", r"\[\[record\]\] number 1 lacks the field `role`"),
+    "a missing file field": ('file = "run.csv"', "", r"number 1 lacks the field `file`"),
+    "a missing file": ("run.csv", "rum.csv", r"rum\.csv does not exist.*did you mean `run.csv`"),
+    "an unknown ending": ('"run.csv"', '"campaign.toml"', r'unknown ending "\.toml"; expected one of \.csv'),
+    "a missing column": ('column = "force"', 'column = "forc"', r"no column `forc`; it has `time`, `force`"),
+    "an unknown direction": (RECORD, RECORD + '\ndirection = "up"', r"direction = 'up' must be one of"),
+    "a start that is a fraction": (RECORD, RECORD + "\nstart = 1.5", r"start = 1.5 must be a whole number"),
+    "a negative start": (RECORD, RECORD + "\nstart = -1", r"start = -1 must be a whole number, at least 0"),
+    "a start outside the file": (
+        RECORD,
+        RECORD + "\nstart = 2000",
+        r"start = 2000 lies outside .* 2000 samples",
+    ),
+    "a stop outside the file": (RECORD, RECORD + "\nstop = 2001", r"stop = 2001 lies outside .*run\.csv"),
+    "a stop before the start": (
+        RECORD,
+        RECORD + "\nstart = 90\nstop = 50",
+        r"stop = 50 must be above start = 90",
+    ),
+    "too few samples": (RECORD, RECORD + "\nstop = 5", r"covers 5 samples"),
+    "a settle beyond the record": (
+        RECORD,
+        RECORD + "\nsettle = 2000",
+        r"settle = 2000 must be below .* 2000",
+    ),
+    "a period beyond the record": (
+        RECORD,
+        RECORD + "\nperiod = 2001",
+        r"period = 2001 exceeds .* 2000 samples",
+    ),
+    "a missing schedule": (
+        RECORD,
+        RECORD + '\nschedule = "no.csv"',
+        r"no\.csv does not exist; it is the schedule",
+    ),
+    "text for a level": (RECORD, RECORD + '\nlevel = "60 N"', r"level = '60 N' must be a finite number"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_the_toml_is_named(mistake: str, tiny: Callable[..., Path]) -> None:
+    pattern, replacement, message = MISTAKES[mistake]
+    folder = tiny((pattern, replacement))
+    with pytest.raises(ValueError, match=message) as caught:
+        read_campaign(folder)
+    assert str(folder) in str(caught.value)
+
+
+def test_the_tiny_campaign_itself_is_read(tiny: Callable[..., Path]) -> None:
+    assert read_campaign(tiny()).records[0].output.shape == (2000,)
+
+
+def test_broken_toml_names_the_file_and_the_line(tiny: Callable[..., Path]) -> None:
+    with pytest.raises(ValueError, match=r"campaign\.toml is not valid TOML: .*line 3"):
+        read_campaign(tiny(("mass = 2.0", "mass = ")))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"", "is empty"), (b"\xff\xfe[campaign]", "is not UTF-8")],
+)
+def test_a_file_that_is_no_text_is_refused(content: bytes, message: str, tmp_path: Path) -> None:
+    (tmp_path / "campaign.toml").write_bytes(content)
+    with pytest.raises(ValueError, match=message):
+        read_campaign(tmp_path)
+
+
+def test_a_folder_without_campaign_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"campaign\.toml does not exist"):
+        read_campaign(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("", ""), ("stop = 1200", "start = 1000"), ("stop = 1200", "start = 1150\nsettle = 20")],
+)
+def test_held_out_samples_that_are_also_fitted_are_refused(
+    first: str, second: str, tiny: Callable[..., Path]
+) -> None:
+    more = f'role = "fit"\n{first}\n[[record]]\nfile = "run.csv"\nrole = "holdout"\n{second}\n'
+    with pytest.raises(ValueError, match=r"number 1 and number 2 share samples .*held-out samples must not"):
+        read_campaign(tiny((RECORD, more)))
+
+
+def test_a_fit_must_not_set_its_state_from_held_out_samples(tiny: Callable[..., Path]) -> None:
+    more = (
+        f'{RECORD}\nstart = 900\nsettle = 100\n[[record]]\nfile = "run.csv"\nrole = "holdout"\nstop = 950\n'
+    )
+    with pytest.raises(ValueError, match=r"share samples 900:950"):
+        read_campaign(tiny((RECORD, more)))
+
+
+def test_samples_that_would_count_twice_are_refused(tiny: Callable[..., Path]) -> None:
+    with pytest.raises(ValueError, match="each sample may count only once"):
+        read_campaign(tiny((RECORD, f'{RECORD}\n[[record]]\nfile = "run.csv"\n{RECORD}\n')))
+
+
+def test_settle_samples_of_a_held_out_record_may_be_fitted_ones(tiny: Callable[..., Path]) -> None:
+    more = (
+        f'{RECORD}\nstop = 1000\n[[record]]\nfile = "run.csv"\nrole = "holdout"\nstart = 950\nsettle = 50\n'
+    )
+    campaign = read_campaign(tiny((RECORD, more)))
+    assert [record.name for record in campaign.records] == ["run[0:1000]", "run[950:]"]
+    assert [record.role for record in campaign.records] == ["fit", "holdout"]
