@@ -156,7 +156,7 @@ def find_parameter(model: eqx.Module, name: str) -> int:
     return names.index(name)
 
 
-def to_physical(free: Scalar, spec: ParameterSpec, scale: Scalar | float) -> Scalar:
+def to_physical(free: Float[Array, ""], spec: ParameterSpec, scale: Scalar | float) -> Float[Array, ""]:
     """Map an unbounded variable to a physical number within its bounds.
 
     No bound: `scale * u`. One bound: softplus from it. Two: logistic between them.
@@ -179,7 +179,7 @@ def to_physical(free: Scalar, spec: ParameterSpec, scale: Scalar | float) -> Sca
     return scale * free
 
 
-def to_free(value: Scalar | float, spec: ParameterSpec, scale: Scalar | float) -> Scalar:
+def to_free(value: Scalar | float, spec: ParameterSpec, scale: Scalar | float) -> Float[Array, ""]:
     """Map a physical number to its unbounded variable: the inverse of `to_physical`.
 
     A value on or outside a bound starts a thousandth of its scale (or range) inside it.

@@ -1,7 +1,8 @@
 """The isolator models that the paper identified, ready to use.
 
 Source: "Data-driven modeling and analysis of nonlinear isolated mechanical system", eqs. (13), (18), (23),
-(28), (36). The paper prints |y| y' and y^3 in the damping of eqs. (30) and (33); eqs. (18) and (28) make them |v| v and v^3.
+(28), (36). The paper prints |y| y' and y^3 in the damping of eqs. (30) and (33); eqs. (18) and (28) make them
+|v| v and v^3.
 """
 
 from typing import Literal

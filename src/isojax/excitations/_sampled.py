@@ -27,9 +27,9 @@ def tabulate(
     """Give a sampled drive and its derivative at the stages of the integration steps.
 
     "band_limited": the drive holds no power above half the rate (an anti-aliased recording). The record is
-    continued oddly about its ends, freed of the line through them and interpolated by zero-padding of the spectrum.
-    That is exact to rounding where the drive is odd about its ends; any other bend there costs `0.036 |F''| / rate^2`
-    in the drive and `0.25 |F''| / rate` in its derivative beside the end, and a hundredth of that ten samples in.
+    continued oddly about its ends, freed of the line through them and interpolated by zero-padding of
+    the spectrum. A record that bends at its end pays `0.036 |F''| / rate^2` in the drive and
+    `0.25 |F''| / rate` in its derivative in the last interval, and a hundredth of that ten samples in.
 
     "linear": straight between samples.
 

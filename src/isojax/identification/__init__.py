@@ -1,0 +1,33 @@
+"""From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop over all."""
+
+from ._base_model import base_model as base_model
+from ._circle_fit import CircleFit as CircleFit
+from ._circle_fit import fit_circle as fit_circle
+from ._classical_guess import ClassicalGuess as ClassicalGuess
+from ._classical_guess import classical_guess as classical_guess
+from ._close_loop import close_loop as close_loop
+from ._close_loop import extend as extend
+from ._covariance import Uncertainty as Uncertainty
+from ._covariance import uncertainty as uncertainty
+from ._diagnose import diagnose as diagnose
+from ._errors import Errors as Errors
+from ._errors import Run as Run
+from ._findings import Candidate as Candidate
+from ._findings import Extension as Extension
+from ._findings import Finding as Finding
+from ._findings import Loop as Loop
+from ._findings import Residual as Residual
+from ._findings import Verdict as Verdict
+from ._fit import Fit as Fit
+from ._fit import Statistics as Statistics
+from ._fit import fit as fit
+from ._half_power import HalfPower as HalfPower
+from ._half_power import find_half_power as find_half_power
+from ._harmonic_balance import equivalent_coefficients as equivalent_coefficients
+from ._harmonic_balance import invert_equivalent as invert_equivalent
+from ._harmonic_balance import normalised_law as normalised_law
+from ._linear_response import linear_response as linear_response
+from ._paper_table import PaperTable as PaperTable
+from ._paper_table import paper_table as paper_table
+from ._residual import residual as residual
+from ._scales import scales as scales

@@ -123,7 +123,7 @@ def prepare(
     return Prepared(batches, segments, owner, starts, spread, quantity, 1.0 / records[0].rate, count)
 
 
-MEMORY_STEPS = 4
+MEMORY_STEPS = 2
 """Integration steps a sample where internal states follow a measured motion."""
 
 
@@ -131,7 +131,7 @@ MEMORY_STEPS = 4
 def _memory_along(
     model: Isolator, drive: Array, path: tuple[Array, Array], quantity: Quantity, sample_time: float
 ) -> tuple[Array, ...]:
-    """Integrate the internal states along a given motion, straight between samples."""
+    """Integrate the internal states along given motions, straight between samples; a lane a record."""
     solver = RK4()
 
     def field(t: float, internal: tuple[Array, ...], ends: tuple[Array, ...]) -> tuple[Array, ...]:
@@ -151,7 +151,7 @@ def _memory_along(
         return moved, internal
 
     x, v = path
-    rest = tuple(jnp.zeros(()) for _ in range(model.internal_states))
+    rest = tuple(jnp.zeros(x.shape[1]) for _ in range(model.internal_states))
     return jax.lax.scan(body, rest, (x[:-1], v[:-1], x[1:], v[1:], drive[:-1]))[1]
 
 
@@ -173,18 +173,18 @@ def internal_starts(
     spread = np.ones((model.internal_states, lanes))
     if model.internal_states == 0:
         return starts, spread
-    place, histories = -1, ()
-    for lane, segment in enumerate(prepared.segments):
-        if segment.record != place:
-            place = segment.record
-            record = records[place]
-            x, v = (jnp.asarray(value) for value in measured_state(record, prepared.quantity)[:2])
-            histories = _memory_along(
-                model, jnp.asarray(record.input), (x, v), prepared.quantity, prepared.sample_time
-            )
-            histories = tuple(np.asarray(history) for history in histories)
-        for state, history in enumerate(histories):
-            first = min(segment.start, history.size - 1)
-            starts[state, lane] = history[first]
-            spread[state, lane] = max(np.sqrt(np.mean(history[first : segment.stop] ** 2)), 1e-300)
+    length = max(record.input.size for record in records)
+    motions = np.zeros((3, length, len(records)))
+    for place, record in enumerate(records):
+        x, v, _ = measured_state(record, prepared.quantity)
+        motions[:, : x.size, place] = x, v, record.input
+        motions[:, x.size :, place] = motions[:, x.size - 1, place][:, None]
+    x, v, drive = (jnp.asarray(motion) for motion in motions)
+    histories = _memory_along(model, drive, (x, v), prepared.quantity, prepared.sample_time)
+    for state, history in enumerate(np.asarray(history) for history in histories):
+        for lane, segment in enumerate(prepared.segments):
+            first = min(segment.start, length - 2)
+            starts[state, lane] = history[first, segment.record]
+            piece = history[first : segment.stop, segment.record]
+            spread[state, lane] = max(np.sqrt(np.mean(piece**2)), 1e-300)
     return starts, spread

@@ -183,28 +183,32 @@ def column_information(
             starts[index, count + index] = np.asarray(scales[index])
         response = _respond(slopes, forcing, jnp.asarray(starts), prepared.sample_time / steps)
         del forcing, slopes
-        return _products(response, reading, units, by_parameter, by_state, batch, steps)
+        readings_by_parameter = [entry[1] for entry in by_parameter]
+        readings_by_state = [entry[1] for entry in by_state]
+        return np.asarray(
+            _products(response, reading, jnp.asarray(units), readings_by_parameter, readings_by_state, batch, steps)
+        )
 
     with ThreadPoolExecutor(workers()) as pool:
         return np.concatenate(list(pool.map(one, range(parts))))
 
 
+@eqx.filter_jit
 def _products(
     response: Float[Array, "node state column lanes"],
     reading: Float[Array, "node lanes"],
-    units: list[float],
-    by_parameter: list[tuple[tuple[Array, ...], Array]],
-    by_state: list[tuple[tuple[Array, ...], Array]],
+    units: Float[Array, " parameter"],
+    by_parameter: list[Array],
+    by_state: list[Array],
     batch: Batch,
     steps: int,
-) -> Float[np.ndarray, "lanes column column"]:
+) -> Float[Array, "lanes column column"]:
     """Form the readings' columns and multiply them out, lane by lane."""
-    d = np.asarray(response)[::steps]
-    weight = np.asarray(batch.weight)
-    by_reading = np.stack([np.asarray(entry[1])[::steps] for entry in by_state], axis=1)
-    rows = np.einsum("tscl,tsl->ctl", d, by_reading)
-    for column, unit in enumerate(units):
-        rows[column] += unit * np.asarray(by_parameter[column][1])[::steps]
-    last = (np.asarray(batch.measured) - np.asarray(reading)[::steps])[None]
-    table = np.moveaxis(np.concatenate([rows, last]) * weight, 2, 0)
-    return table @ np.swapaxes(table, 1, 2)
+    rows = sum(
+        response[::steps, index] * slope[::steps, None] for index, slope in enumerate(by_state)
+    )
+    direct = jnp.stack([slope[::steps] for slope in by_parameter], axis=1) * units[None, :, None]
+    rows = rows + jnp.pad(direct, ((0, 0), (0, len(by_state)), (0, 0)))
+    last = (batch.measured - reading[::steps])[:, None]
+    table = jnp.concatenate([rows, last], axis=1) * batch.weight[:, None]
+    return jnp.einsum("tcl,tdl->lcd", table, table)

@@ -89,6 +89,7 @@ def descend(
     *,
     solver: optx.AbstractLeastSquaresSolver,
     max_steps: int,
+    tolerance: float,
     progress: Callable[[str], None],
 ) -> Descent:
     """Fit coefficients to the records, nuisances eliminated on the way.
@@ -104,6 +105,7 @@ def descend(
         nuisances: start of the nuisances.
         solver: an optimistix least-squares solver.
         max_steps: evaluations after which the search gives up.
+        tolerance: decrease of chi2 per max(chi2/dof, 1) below which a step is no longer one.
         progress: told a line a step.
 
     Returns:
@@ -152,10 +154,11 @@ def descend(
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
         progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
         if accepted:
+            gained = float("inf") if best is None else best.chi2 - point.chi2
             best, best_free = point, trial
-            # Predicted decrease of chi2: a hundredth of a standard error is no longer a step.
-            decrement = float(np.sum(residual[:-1] ** 2)) / max(1.0, chi2)
-            if decrement < 1e-4 * max(1, len(places)):
+            # What a full linear step would still gain, and what the last one did gain: either may say that it is over.
+            decrement = float(np.sum(residual[:-1] ** 2))
+            if min(decrement, gained) < tolerance * max(1.0, chi2):
                 result = RESULTS.successful
                 break
         if bool(state.terminate):

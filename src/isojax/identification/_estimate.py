@@ -170,6 +170,7 @@ def estimate(
     solver: optx.AbstractLeastSquaresSolver,
     max_steps: int,
     progress: Callable[[str], None],
+    tolerance: float = 1e-2,
 ) -> Estimate:
     """Fit the free coefficients of a model to records.
 
@@ -182,6 +183,7 @@ def estimate(
         solver: an optimistix least-squares solver.
         max_steps: evaluations after which a search gives up.
         progress: told a line a step.
+        tolerance: decrease of chi2 per max(chi2/dof, 1) below which the search is over.
 
     Returns:
         The estimate.
@@ -190,7 +192,19 @@ def estimate(
     known = nuisances is not None
     start = bench.settle(nuisances, model, carried, FIRST_STIFFNESS_SPREAD)
     sizes = magnitudes(model, places, scales)
-    found = descend(bench, model, places, sizes, start, solver=solver, max_steps=max_steps, progress=progress)
+    # The scatter of the stiffness is found from a rough solution; the search goes on from there.
+    rough = max(tolerance, 1.0) if has_stiffness_scale(model) and not known else tolerance
+    found = descend(
+        bench,
+        model,
+        places,
+        sizes,
+        start,
+        solver=solver,
+        max_steps=max_steps,
+        tolerance=rough,
+        progress=progress,
+    )
     steps = found.steps
     single = len(bench.problem.records) == 1
     if found.result == RESULTS.successful and has_stiffness_scale(model) and not known:
@@ -211,6 +225,7 @@ def estimate(
             again,
             solver=solver,
             max_steps=max_steps,
+            tolerance=tolerance,
             progress=progress,
         )
         steps += found.steps

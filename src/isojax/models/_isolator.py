@@ -6,6 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Array, Float
 
 from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
 from .._types import Internal, Lanes, Scalar
@@ -69,7 +70,7 @@ class Isolator(eqx.Module):
         """Name, declaration and value of every physical number."""
         return list_parameters(self)
 
-    def __getitem__(self, name: str) -> Scalar:
+    def __getitem__(self, name: str) -> Float[Array, ""]:
         """Give a parameter by its name in reports.
 
         Args:

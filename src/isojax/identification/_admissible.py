@@ -1,0 +1,59 @@
+"""Whether a model is physical over the motion that was measured."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ..models import Isolator
+from ..records import Record, measured_state
+
+
+def visited_range(records: tuple[Record, ...], quantity: str) -> tuple[float, float]:
+    """Give the largest displacement [m] and velocity [m/s] that dwells and windows reached.
+
+    Args:
+        records: the records.
+        quantity: what the sensor measures.
+
+    Returns:
+        Both, as 99.5 % quantiles: integrals of a measured acceleration are rough at the ends of a record.
+    """
+    states = [measured_state(record, quantity)[:2] for record in records]
+    return (
+        float(max(np.quantile(np.abs(x), 0.995) for x, _ in states)),
+        float(max(np.quantile(np.abs(v), 0.995) for _, v in states)),
+    )
+
+
+def find_violation(model: Isolator, records: tuple[Record, ...], quantity: str) -> str | None:
+    """Find what is unphysical in a model over the visited motion, if anything.
+
+    The static tangent stiffness must be positive wherever the model has a spring, and the static damping force must
+    not drive the motion. Memories are judged by the sign of their strengths, which the bounds hold.
+
+    Args:
+        model: the isolator.
+        records: the records.
+        quantity: what the sensor measures.
+
+    Returns:
+        A sentence, or None.
+    """
+    largest_x, largest_v = visited_range(records, quantity)
+    rest = tuple(jnp.zeros(()) for _ in range(model.internal_states))
+
+    def static(x: Float[jax.Array, ""], v: Float[jax.Array, ""]) -> Float[jax.Array, ""]:
+        return model.restoring_force((x, v, *rest))
+
+    xs = jnp.linspace(-largest_x, largest_x, 101)
+    vs = jnp.linspace(-largest_v, largest_v, 101)
+    tangent = jax.vmap(jax.jacfwd(static), (0, None))(xs, jnp.zeros(()))
+    if model.element("linear_stiffness") is not None and float(tangent.min()) <= 0.0:
+        where = 1e3 * float(xs[int(jnp.argmin(tangent))])
+        return f"its stiffness is lost at {where:.3g} mm, within the visited motion"
+    power = jax.vmap(lambda v: static(jnp.zeros(()), v) * v - static(jnp.zeros(()), jnp.zeros(())) * v)(vs)
+    if float(power.min()) < -1e-9 * float(jnp.abs(power).max()):
+        where = 1e3 * float(vs[int(jnp.argmin(power))])
+        return f"its damping feeds energy in at {where:.3g} mm/s, within the visited motion"
+    return None

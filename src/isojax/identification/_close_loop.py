@@ -1,0 +1,97 @@
+"""The closed loop: fit, find what is missing, add it, and again until nothing is left."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from ..records import Campaign
+from ._classical_guess import classical_guess
+from ._diagnose import MOST_OF_IT, diagnose, is_good
+from ._findings import Extension, Loop, Verdict, VerdictWord
+from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
+
+
+def extend(before: Fit, verdict: Verdict) -> Extension:
+    """Add the effect that a diagnosis found, and hold the new model against every record.
+
+    Args:
+        before: the fit that was diagnosed.
+        verdict: its diagnosis.
+
+    Returns:
+        The fits before and after.
+
+    Raises:
+        ValueError: if the diagnosis found nothing to add.
+    """
+    if verdict.refit is None:
+        raise ValueError(
+            f'Argument `verdict` must have found an effect to add, but its verdict is "{verdict.verdict}": {verdict.reason}'
+        )
+    after = complete(verdict.refit, before.model, before.campaign, before.noise)
+    return Extension(before, after, verdict)
+
+
+def close_loop(
+    campaign: Campaign,
+    *,
+    max_iterations: int = 3,
+    solver: Any = DEFAULT_SOLVER,
+    progress: Callable[[str], None] = silent,
+) -> Loop:
+    """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
+
+    Held-out records are never used to fit a coefficient, to choose an effect or to stop.
+
+    Args:
+        campaign: the measurements.
+        max_iterations: effects that may be added at most.
+        solver: an optimistix least-squares solver.
+        progress: told a line a step.
+
+    Returns:
+        The loop: fits before and after, the findings, and the verdict over all.
+    """
+    begin = time.perf_counter()
+    progress("classical guess")
+    guess = classical_guess(campaign)
+    progress("fit of the declared model")
+    before = current = fit(guess.model, campaign, solver=solver, progress=progress)
+    first = before.estimate.excess
+    extensions: list[Extension] = []
+    significance = 0.01
+    while True:
+        verdict = diagnose(
+            current, first_excess=first, significance=significance, solver=solver, progress=progress
+        )
+        progress(verdict.reason)
+        if verdict.refit is None or len(extensions) == max_iterations:
+            break
+        extensions.append(extend(current, verdict))
+        current = extensions[-1].after
+        significance *= 0.5
+        found = current.estimate
+        if is_good(found.chi2 / found.dof, found.excess, first):
+            break
+    return Loop(
+        campaign,
+        guess,
+        before,
+        tuple(extensions),
+        current,
+        _overall(current, first, bool(extensions), verdict),
+        verdict,
+        time.perf_counter() - begin,
+    )
+
+
+def _overall(final: Fit, first_excess: float, any_found: bool, last: Verdict) -> VerdictWord:
+    """Give the verdict over all iterations."""
+    found = final.estimate
+    good = is_good(found.chi2 / found.dof, found.excess, first_excess)
+    if not any_found:
+        return last.verdict
+    if good:
+        return "found"
+    explained = 1.0 - found.excess / max(first_excess, 1.0)
+    return "partly_explained" if explained >= MOST_OF_IT else "unexplained"

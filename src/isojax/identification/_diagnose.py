@@ -1,0 +1,348 @@
+"""The diagnosis: from a residual to the effect that the model lacks, or to the word that nothing is."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._parameters import list_parameters, own_parameters, replace_parameters
+from .._results import RESULTS
+from ..elements import AbstractElement, Scales
+from ..models import Isolator
+from ._admissible import find_violation
+from ._elimination import Nuisances
+from ._estimate import Estimate, estimate
+from ._findings import Candidate, Finding, Verdict
+from ._fit import DEFAULT_SOLVER, Fit, silent
+from ._problem import Bench
+from ._scales import scales as campaign_scales
+from ._score import Score, ScoreTest, absent_effects, score_test
+from ._segments import cut_segments
+from ._separate import separating_experiment
+from ._transfer import transferred_share
+
+GOOD = 1.05
+"""chi2/dof up to which a fit is good."""
+
+LEFT_OVER = 0.03
+"""Share of the first excess that may be left where the noise is small beside every model error."""
+
+MOST_OF_IT = 0.8
+"""Share of the excess that an effect must explain to be the explanation."""
+
+SMALLEST_GAIN = 0.005
+"""Gain in chi2/dof below which an effect is not named: with half a million samples anything is significant."""
+
+SURVIVORS = 4
+"""Families that are refitted."""
+
+ROUGH = 1.0
+"""Decrease of chi2 below which the refit of a candidate is over: a tenth of the evidence that ranks it."""
+
+CLOSE_BIC = 10.0
+CLOSE_LIKENESS = 0.95
+
+
+class Refit(NamedTuple):
+    """A candidate refitted with everything free.
+
+    Attributes:
+        score: its score before.
+        estimate: the refit.
+        violation: what is unphysical about it, or None.
+    """
+
+    score: Score
+    estimate: Estimate
+    violation: str | None
+
+
+def is_good(chi2_per_dof: float, excess: float, first_excess: float) -> bool:
+    """Say whether a fit leaves nothing worth explaining.
+
+    Args:
+        chi2_per_dof: of the fit.
+        excess: chi2 - dof of the fit.
+        first_excess: of the first fit of the loop.
+
+    Returns:
+        True if chi2/dof is near one, or hardly any of the first excess is left.
+    """
+    return chi2_per_dof <= GOOD or excess < LEFT_OVER * first_excess
+
+
+def refit_candidate(
+    test: ScoreTest, index: int, scales: Scales, solver: Any, max_steps: int, progress: Callable[[str], None]
+) -> Estimate:
+    """Fit the model with one absent effect, everything free, from the linear step that the score gives.
+
+    Args:
+        test: the score test.
+        index: the candidate.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations at most.
+        progress: told a line a step.
+
+    Returns:
+        The refit.
+    """
+    fitted, score = test.fitted, test.scores[index]
+    element = score.element
+    best: tuple[float, Isolator, Nuisances] | None = None
+    added = element.internal_states
+    for share in (1.0, 0.3, 0.03):
+        model = _extended(fitted, element, share * score.strength, share * test.steps[index])
+        old, new = fitted.point.nuisances, test.nuisances[index]
+        states = old.states + share * (new.states - old.states)
+        states = np.concatenate([states, np.zeros((states.shape[0], added))], axis=1)
+        stiffness = old.stiffness + share * (new.stiffness - old.stiffness)
+        nuisances = Nuisances(states, stiffness, old.stiffness_spread)
+        nothing = np.zeros((len(list_parameters(model)), 0))
+        point = fitted.bench.evaluate(model, nothing, nuisances)
+        if point.is_finite and (best is None or point.chi2 < best[0]):
+            best = (point.chi2, model, nuisances)
+        if best is not None and best[0] < fitted.chi2:
+            break
+    if best is None:
+        return fitted._replace(result=RESULTS.not_finite)
+    _, model, nuisances = best
+    names = {f"{name}" for name in fitted.names}
+    listed = list_parameters(model)
+    first_new = len(listed) - len(own_parameters(element))
+    places = tuple(
+        place
+        for place, entry in enumerate(listed)
+        if entry.name in names or (place >= first_new and entry.spec.fitted)
+    )
+    return estimate(
+        fitted.bench,
+        model,
+        places,
+        scales,
+        nuisances=nuisances,
+        solver=solver,
+        max_steps=max_steps,
+        progress=progress,
+        tolerance=ROUGH,
+    )
+
+
+def _extended(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
+    """Give the model with the effect at a strength, the fitted coefficients moved by a step."""
+    model = fitted.model.with_elements(element)
+    listed = list_parameters(model)
+    numbers = [entry.value for entry in listed]
+    for place, change in zip(fitted.places, step, strict=True):
+        moved = float(numbers[place]) + float(change)
+        spec = listed[place].spec
+        if spec.lower < moved < spec.upper:
+            numbers[place] = numbers[place] * 0.0 + moved
+    fields = [name for name, _ in own_parameters(element)]
+    place = len(listed) - len(fields) + fields.index(element.strength)
+    numbers[place] = numbers[place] * 0.0 + strength
+    return replace_parameters(model, numbers)
+
+
+def diagnose(
+    fit: Fit,
+    *,
+    first_excess: float | None = None,
+    significance: float = 0.01,
+    excluded: tuple[str, ...] = (),
+    solver: Any = DEFAULT_SOLVER,
+    max_steps: int = 25,
+    progress: Callable[[str], None] = silent,
+) -> Verdict:
+    """Name the effect that a fitted model lacks, with its evidence; or say that nothing is, or that none explains it.
+
+    Held-out records take no part.
+
+    Args:
+        fit: the fit to diagnose.
+        first_excess: chi2 - dof of the first fit of the loop; of this one if omitted.
+        significance: family-wise level of the score test.
+        excluded: catalogue names that are not to be considered.
+        solver: an optimistix least-squares solver for the refits.
+        max_steps: evaluations a refit at most.
+        progress: told a line a step.
+
+    Returns:
+        The verdict.
+    """
+    fitted = fit.estimate
+    scales = campaign_scales(fit.campaign)
+    probes = absent_effects(fitted.model, scales, excluded)
+    progress(f"score test of {len({probe.name for probe in probes})} absent effects")
+    test = score_test(fitted, scales, probes)
+    first = fitted.excess if first_excess is None else first_excess
+    chi2_per_dof = fitted.chi2 / fitted.dof
+    refits: list[Refit] = []
+    for index, score in enumerate(test.scores):
+        if len(refits) == SURVIVORS:
+            break
+        if not score.admissible or score.p_value > significance:
+            continue
+        # The score says what one linear step could gain at most when the model is near; far away it only ranks.
+        if chi2_per_dof <= GOOD and score.z**2 / fitted.dof < SMALLEST_GAIN / 5.0:
+            continue
+        progress(f"refit with {score.element.name}")
+        found = refit_candidate(test, index, scales, solver, max_steps, progress)
+        violation = None
+        if found.result == RESULTS.not_finite or found.excess >= fitted.excess:
+            violation = "its refit failed"
+        else:
+            violation = find_violation(found.model, fit.campaign.fit_records, fitted.bench.problem.quantity)
+        refits.append(Refit(score, found, violation))
+    return _judge(fit, test, refits, first, scales, significance, solver, progress)
+
+
+def _bic(found: Estimate, inflation: float) -> float:
+    return found.chi2 / inflation + len(found.places) * float(np.log(found.point.samples.sum()))
+
+
+def _judge(
+    fit: Fit,
+    test: ScoreTest,
+    refits: list[Refit],
+    first_excess: float,
+    scales: Scales,
+    significance: float,
+    solver: Any,
+    progress: Callable[[str], None],
+) -> Verdict:
+    """Weigh the refits, and word the verdict."""
+    fitted = fit.estimate
+    usable = [refit for refit in refits if refit.violation is None]
+    inflation = max([1.0] + [min(refit.estimate.chi2 / refit.estimate.dof for refit in usable)] if usable else [1.0])
+    usable.sort(key=lambda refit: _bic(refit.estimate, inflation))
+    good = is_good(fitted.chi2 / fitted.dof, fitted.excess, first_excess)
+    ranking = _ranking(test, refits, usable, inflation)
+    bounds = _bounds(test, fitted, None)
+    if usable:
+        best = usable[0]
+        gain = fitted.chi2 - best.estimate.chi2
+        extra = len(best.estimate.places) - len(fitted.places)
+        enough = gain / fitted.dof >= (SMALLEST_GAIN if good else min(SMALLEST_GAIN, LEFT_OVER * first_excess / fitted.dof))
+        clear = _bic(fitted, inflation) - _bic(best.estimate, inflation) > CLOSE_BIC
+        share = transferred_share(fit, best.estimate, scales, solver, progress) if enough and clear else 0.0
+        if enough and clear and share > 0.0:
+            return _found(fit, test, usable, ranking, first_excess, share, inflation)
+        reason = (
+            f"adding {best.score.element.name} gains {gain / fitted.dof:.2g} of chi2/dof for {extra} more coefficients"
+            + ("" if share > 0.0 or not (enough and clear) else ", but it does not carry over to data left out of its refit")
+        )
+    else:
+        reason = "no absent effect is both significant and physical"
+    verdict = "none" if good else "unexplained"
+    words = "The fit is good and " if good else "The fit is not good, but "
+    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
+
+
+def _found(
+    fit: Fit,
+    test: ScoreTest,
+    usable: list[Refit],
+    ranking: tuple[Candidate, ...],
+    first_excess: float,
+    share: float,
+    inflation: float,
+) -> Verdict:
+    """Word a finding."""
+    fitted, best = fit.estimate, usable[0]
+    name = best.score.element.name
+    explained = (fitted.chi2 - best.estimate.chi2) / max(fitted.excess, 1.0)
+    together = tuple(
+        entry.effect
+        for entry in ranking
+        if entry.effect != name
+        and entry.admissible
+        and (entry.delta_bic <= CLOSE_BIC or abs(entry.likeness) > CLOSE_LIKENESS)
+    )
+    finding = Finding(
+        name,
+        together,
+        best.score.p_value,
+        float(min(explained, 1.0)),
+        share,
+        ranking,
+        separating_experiment(name, together),
+    )
+    good = is_good(best.estimate.chi2 / best.estimate.dof, best.estimate.excess, first_excess)
+    if good:
+        verdict = "found"
+    elif explained >= MOST_OF_IT:
+        verdict = "partly_explained"
+    else:
+        verdict = "unexplained"
+    left = best.estimate.excess / max(fitted.excess, 1.0)
+    before, after = fitted.chi2 / fitted.dof, best.estimate.chi2 / best.estimate.dof
+    reason = f"Adding {best.score.element.words} takes chi2/dof from {before:.4g} to {after:.4g}."
+    bounds = _bounds(test, fitted, name)
+    return Verdict(
+        verdict, finding, ranking, together, float(max(left, 0.0)), test.hidden, bounds, best.estimate, reason
+    )
+
+
+def _strength(element: AbstractElement) -> str:
+    """Give the unit of an element's strength."""
+    return dict(own_parameters(element))[element.strength].unit
+
+
+def _ranking(
+    test: ScoreTest, refits: list[Refit], usable: list[Refit], inflation: float
+) -> tuple[Candidate, ...]:
+    """List every candidate: refitted ones by evidence, then the others by score."""
+    best = usable[0] if usable else None
+    order = {score.element.name: index for index, score in enumerate(test.scores)}
+    done = {refit.score.element.name: refit for refit in refits}
+    lowest = _bic(best.estimate, inflation) if best is not None else float("nan")
+
+    def candidate(score: Score) -> Candidate:
+        refit = done.get(score.element.name)
+        strength, error = score.strength, score.error
+        chi2, delta, admissible = float("nan"), float("nan"), score.admissible
+        if refit is not None and refit.estimate.result != RESULTS.not_finite:
+            found = refit.estimate
+            listed = [entry.name for entry in list_parameters(found.model)]
+            label = next(
+                name
+                for name in reversed(listed)
+                if name.startswith(score.element.name) and name.endswith("." + score.element.strength)
+            )
+            place = found.places.index(listed.index(label))
+            strength = float(found.model[label])
+            error = float(found.uncertainty.standard_error[place])
+            chi2 = found.chi2 / found.dof
+            delta = _bic(found, inflation) - lowest
+            admissible = admissible and refit.violation is None
+        likeness = 0.0 if best is None else float(test.likeness[order[score.element.name], order[best.score.element.name]])
+        return Candidate(
+            score.element.name,
+            score.element.words,
+            score.z,
+            score.p_value,
+            score.visibility,
+            strength,
+            error,
+            _strength(score.element),
+            chi2,
+            delta,
+            likeness,
+            admissible,
+        )
+
+    names = [refit.score.element.name for refit in usable]
+    first = [test.scores[order[name]] for name in names]
+    rest = [score for score in test.scores if score.element.name not in names]
+    return tuple(candidate(score) for score in (*first, *rest))
+
+
+def _bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
+    """Say how large each effect that was not found could still be: |s| + 1.96 standard errors, inflated by the misfit."""
+    inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
+    return {
+        score.element.name: (abs(score.strength) + 1.96 * inflation * score.error, _strength(score.element))
+        for score in test.scores
+        if score.element.name != found
+    }

@@ -1,0 +1,178 @@
+"""The report of a fit as text, in the layout that users of lmfit know."""
+
+import math
+
+import numpy as np
+
+from .._parameters import Parameter, list_parameters
+from .._results import RESULTS, is_successful
+from ._errors import Errors
+from ._fit import Fit
+
+_UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}
+_ROLES = {"fit": "fitted", "holdout": "held out"}
+_STRONG = 0.9
+"""Correlations of this magnitude and more are listed."""
+
+_UNMOVED = 1e-12
+"""A coefficient that changed by less than this share of itself never moved."""
+
+
+def fit_report(fit: Fit) -> str:
+    """Give the report of a fit.
+
+    Coefficients with standard error, relative error and start value; those at a bound, never moved, or not
+    determined by the data by name; strong correlations; errors in physical units and over the noise.
+
+    Args:
+        fit: the fit.
+
+    Returns:
+        Lines of plain text, SI units.
+    """
+    sections = [
+        ("Model", _model(fit)),
+        ("Fit statistics", _statistics(fit)),
+        ("Errors", _errors(fit)),
+        ("Coefficients", _coefficients(fit)),
+        (f"Correlations of {_STRONG:g} and more", _correlations(fit)),
+        ("Warnings", warnings_of(fit)),
+    ]
+    blocks = [
+        "\n".join([f"[[{title}]]", *(f"    {line}" for line in lines)]) for title, lines in sections if lines
+    ]
+    return "\n".join(blocks)
+
+
+def _model(fit: Fit) -> list[str]:
+    campaign = fit.campaign
+    driven = "its base" if fit.model.excitation == "base_acceleration" else "a force"
+    fitted, held_out = len(campaign.fit_records), len(campaign.holdout_records)
+    return [
+        f"{campaign.title}: {fitted} records fitted, {held_out} held out",
+        f"{float(fit.model.mass):g} kg driven by {driven}, output {campaign.output.quantity}",
+        f"elements: {', '.join(element.name for element in fit.model.elements) or 'none'}",
+    ]
+
+
+def _statistics(fit: Fit) -> list[str]:
+    stats, unit = fit.stats, _UNITS[fit.campaign.output.quantity]
+    integrator = fit.estimate.bench.problem.integrator
+    rows = [
+        ("samples", f"{stats.samples}"),
+        ("coefficients", f"{stats.coefficients}"),
+        ("simulations", f"{stats.steps}"),
+        ("chi-square", f"{stats.chi2:.6g}"),
+        ("degrees of freedom", f"{stats.dof:.6g}"),
+        ("reduced chi-square", f"{stats.chi2 / stats.dof:.5g}"),
+        ("AIC", f"{stats.aic:.8g}"),
+        ("BIC", f"{stats.bic:.8g}"),
+        ("noise", f"{fit.noise.sigma:.4g} {unit} rms, from {fit.noise.method.replace('_', ' ')}"),
+        ("stiffness scatter", f"{100 * stats.stiffness_scatter:.2g} % between records"),
+        (
+            "integration",
+            f"{type(integrator.solver).__name__}, {integrator.steps_per_sample(fit.model)} a sample",
+        ),
+    ]
+    if math.isfinite(stats.integration_error):
+        rows.append(("integration error", f"{stats.integration_error:.2g} of the noise when halved"))
+    rows.append(("result", "successful" if is_successful(fit.result) else RESULTS[fit.result]))
+    return [f"{label:<20} = {value}" for label, value in rows]
+
+
+def _errors(fit: Fit) -> list[str]:
+    unit = _UNITS[fit.campaign.output.quantity]
+    lines = [f"{'records':<10}{'free run RMSE':>20}{'NRMSE':>10}{'restarted NRMSE':>18}{'chi2/dof':>11}"]
+    return lines + [
+        _error_line(_ROLES[role], errors, unit) for role, errors in fit.errors.items() if errors is not None
+    ]
+
+
+def _error_line(role: str, errors: Errors, unit: str) -> str:
+    rmse = f"{errors.rmse:.4g} {unit}"
+    free, restarted = f"{100 * errors.nrmse:.3g} %", f"{100 * errors.nrmse_segments:.3g} %"
+    return f"{role:<10}{rmse:>20}{free:>10}{restarted:>18}{errors.chi2_per_dof:>11.4g}"
+
+
+def _coefficients(fit: Fit) -> list[str]:
+    start = {entry.name: float(entry.value) for entry in list_parameters(fit.start)}
+    errors = fit.standard_errors
+    listed = list_parameters(fit.model)
+    width = max(len(entry.name) for entry in listed) + 1
+    return [
+        f"{entry.name + ':':<{width}} {_value(entry, errors.get(entry.name), start[entry.name])}"
+        for entry in listed
+    ]
+
+
+def _value(entry: Parameter, error: float | None, start: float) -> str:
+    value = float(entry.value)
+    if error is None:
+        return f"{value:<12.6g} {entry.spec.unit} (fixed)"
+    if not math.isfinite(error):
+        return f"{value:<12.6g} +/- unknown {entry.spec.unit} (init = {start:.6g})"
+    share = f" ({100 * error / abs(value):.2g} %)" if value != 0.0 else ""
+    return f"{value:<12.6g} +/- {error:.3g} {entry.spec.unit}{share} (init = {start:.6g})"
+
+
+def _correlations(fit: Fit) -> list[str]:
+    correlation = fit.estimate.uncertainty.correlation
+    pairs = [
+        (float(correlation[i, j]), fit.free[i], fit.free[j])
+        for i in range(len(fit.free))
+        for j in range(i + 1, len(fit.free))
+        if np.abs(correlation[i, j]) >= _STRONG
+    ]
+    return [f"C({one}, {other}) = {value:+.4f}" for value, one, other in sorted(pairs, key=lambda p: -abs(p[0]))]
+
+
+def warnings_of(fit: Fit) -> list[str]:
+    """Give what a reader must know before using the coefficients of a fit.
+
+    Args:
+        fit: the fit.
+
+    Returns:
+        One sentence each; none if there is nothing to warn of.
+    """
+    lines = [] if is_successful(fit.result) else [f"The search failed. {RESULTS[fit.result]}"]
+    lines += _not_determined(fit)
+    start = {entry.name: float(entry.value) for entry in list_parameters(fit.start)}
+    errors = fit.standard_errors
+    for entry in list_parameters(fit.model):
+        if entry.name not in errors:
+            continue
+        bound = _touched_bound(entry, errors[entry.name], start[entry.name])
+        if bound is not None:
+            lines.append(
+                f"{entry.name} is at its bound of {bound:g} {entry.spec.unit}: its error bar means little there."
+            )
+        moved = abs(float(entry.value) - start[entry.name])
+        if moved <= _UNMOVED * abs(start[entry.name]):
+            lines.append(f"{entry.name} never moved from its start value {start[entry.name]:g}.")
+    return lines
+
+
+def _not_determined(fit: Fit) -> list[str]:
+    known = fit.estimate.uncertainty
+    grouped = {place for group in known.partners for place in group}
+    lines = [
+        f"{fit.free[group[0]]} is not determined: the data hold no trace of it. Fix it."
+        if len(group) == 1
+        else f"{', '.join(fit.free[place] for place in group)} are not determined apart: the data fix only a "
+        "combination of them. Fix one, or add records that part them."
+        for group in known.partners
+    ]
+    return lines + [
+        f"{name} is not determined: the data hold no trace of it. Fix it."
+        for place, name in enumerate(fit.free)
+        if not known.determined[place] and place not in grouped
+    ]
+
+
+def _touched_bound(entry: Parameter, error: float, start: float) -> float | None:
+    """Give the bound that a value stands on: within its standard error, or all but exactly."""
+    value = float(entry.value)
+    near = error if math.isfinite(error) else 1e-6 * max(abs(value), abs(start))
+    bounds = (bound for bound in (entry.spec.lower, entry.spec.upper) if math.isfinite(bound))
+    return next((bound for bound in bounds if abs(value - bound) <= near), None)

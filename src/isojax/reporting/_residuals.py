@@ -1,0 +1,177 @@
+"""Pictures of what a model leaves: residual, its autocorrelation, where on the records it is large."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..identification import Fit, Residual, Run
+from ._quantities import OUTPUT_UNITS, typeset_unit
+from ._style import AFTER, BAND, BEFORE, ROLES, axes_for, entitle
+from ._time_history import extremes, worst_window
+
+_PHASES = 36
+"""Pieces of a cycle over which a residual is averaged."""
+
+
+def plot_residual(
+    before: Fit,
+    after: Fit | None = None,
+    *,
+    record: int | None = None,
+    window: tuple[float, float] | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw measured less model, every segment restarted, before and after on one scale.
+
+    Args:
+        before: the declared model, fitted.
+        after: the extended model, fitted; omitted where there is none.
+        record: place of the record in the campaign; the one where `before` is worst, if omitted.
+        window: start and end [s]; the whole record if omitted.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax)
+    place = worst_window(before)[0] if record is None else record
+    chosen = before.restarts.runs[place].record
+    low, high = (chosen.time[0], chosen.time[-1]) if window is None else window
+    shown = (chosen.time >= low) & (chosen.time <= high)
+    time = chosen.time[shown]
+    for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
+        if fit is None:
+            continue
+        values = fit.restarts.runs[place].residual[shown]
+        if values.size > 3000:
+            start, lowest, highest = extremes(time, values)
+            ax.fill_between(start, lowest, highest, color=colour, alpha=0.6, linewidth=0.3, label=label)
+        else:
+            ax.plot(time, values, color=colour, linewidth=0.9, label=label)
+    sigma = before.noise.sigma
+    ax.axhspan(-2 * sigma, 2 * sigma, color=BAND, zorder=0, label="noise, ±2σ")
+    quantity = before.campaign.output.quantity
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(f"residual [{typeset_unit(OUTPUT_UNITS[quantity])}]")
+    ax.set_xlim(low, high)
+    ax.legend(fontsize=8, loc="upper right", ncols=3)
+    entitle(ax, f"residual of {chosen.name} ({ROLES[chosen.role]}), segments restarted")
+    return figure
+
+
+def plot_autocorrelation(
+    before: Residual, after: Residual | None = None, *, ax: Axes | None = None
+) -> Figure:
+    """Draw the autocorrelation of the residual, one curve a record, with the 99 % band of white noise.
+
+    Args:
+        before: residual of the declared model.
+        after: residual of the extended model; omitted where there is none.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax)
+    for label, residual, colour in (("before", before, BEFORE), ("after", after, AFTER)):
+        if residual is None:
+            continue
+        inside = float(np.mean(residual.whiteness))
+        for place, row in enumerate(residual.autocorrelation):
+            name = f"{label}: {100 * inside:.0f} % of lags inside" if place == 0 else None
+            ax.plot(residual.lags, row, color=colour, linewidth=0.9, alpha=0.8, label=name)
+    band = float(np.max(before.band))
+    ax.axhspan(-band, band, color=BAND, zorder=0, label="white noise, 99 %")
+    ax.set_xlabel("lag [samples]")
+    ax.set_ylabel("autocorrelation [1]")
+    ax.legend(fontsize=8, loc="upper right")
+    entitle(ax, "residual autocorrelation, one curve a record")
+    return figure
+
+
+def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure:
+    """Draw the residual of each segment over the noise: against drive frequency, or time without dwells.
+
+    Args:
+        before: the declared model, fitted.
+        after: the extended model, fitted; omitted where there is none.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax)
+    dwelling = all(run.record.dwells for run in before.restarts.runs)
+    for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
+        for role, marker in (("fit", "o"), ("holdout", "D")):
+            runs = () if fit is None else tuple(run for run in fit.restarts.runs if run.record.role == role)
+            points = [point for run in runs for point in _sizes(run, dwelling)]
+            if points:
+                x, rms = np.array(points).T
+                name = f"{label}, {ROLES[role]}"
+                size = rms / before.noise.sigma
+                ax.plot(x, size, marker, color=colour, markersize=3.5, markeredgewidth=0, alpha=0.65, label=name)
+    ax.axhline(1.0, color="black", linewidth=0.8)
+    ax.set_xlabel("drive frequency [Hz]" if dwelling else "time in the record [s]")
+    ax.set_ylabel("rms residual / noise [1]")
+    ax.legend(fontsize=7.5, loc="upper right", ncols=2)
+    entitle(ax, "where the model errs: one point a " + ("dwell" if dwelling else "window"))
+    return figure
+
+
+def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure | None:
+    """Draw the residual of the worst dwell averaged over its cycles, where noise averages out and structure stays.
+
+    Args:
+        before: the declared model, fitted.
+        after: the extended model, fitted; omitted where there is none.
+        ax: axes to draw on.
+
+    Returns:
+        The figure; None without dwells.
+    """
+    dwells = [
+        (float(np.sum(run.residual[dwell.start : dwell.stop] ** 2)), place, dwell)
+        for place, run in enumerate(before.restarts.runs)
+        for dwell in run.record.dwells
+    ]
+    if not dwells:
+        return None
+    figure, ax = axes_for(ax)
+    _, place, dwell = max(dwells, key=lambda entry: entry[0])
+    record = before.restarts.runs[place].record
+    phase = np.arange(dwell.stop - dwell.start) * dwell.frequency / record.rate % 1.0
+    part = np.minimum((phase * _PHASES).astype(int), _PHASES - 1)
+    count = np.maximum(np.bincount(part, minlength=_PHASES), 1)
+    degrees = (np.arange(_PHASES) + 0.5) * 360.0 / _PHASES
+    for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
+        if fit is not None:
+            values = fit.restarts.runs[place].residual[dwell.start : dwell.stop]
+            mean = np.bincount(part, values, minlength=_PHASES) / count
+            ax.plot(degrees, mean, "o-", color=colour, markersize=3, linewidth=1.0, label=label)
+    band = 2.0 * before.noise.sigma / np.sqrt(count)
+    ax.fill_between(degrees, -band, band, color=BAND, zorder=0, label="noise of the mean, ±2σ")
+    quantity = before.campaign.output.quantity
+    ax.set_xlabel("phase in the cycle of the drive [°]")
+    ax.set_ylabel(f"mean residual [{typeset_unit(OUTPUT_UNITS[quantity])}]")
+    ax.set_xlim(0.0, 360.0)
+    ax.set_xticks(np.arange(0, 361, 60))
+    ax.legend(fontsize=8, loc="upper right", ncols=3)
+    entitle(ax, f"residual over the cycle: {record.name} at {dwell.frequency:.3g} Hz, worst dwell before")
+    return figure
+
+
+def _sizes(run: Run, dwelling: bool) -> list[tuple[float, float]]:
+    """Give frequency (or time in the middle) and rms residual of each dwell (or of forty windows)."""
+    if dwelling:
+        pieces = [(dwell.start, dwell.stop, dwell.frequency) for dwell in run.record.dwells]
+    else:
+        edges = np.linspace(0, run.record.output.size, 41).astype(int)
+        middle = run.record.time[(edges[:-1] + edges[1:]) // 2]
+        pieces = list(zip(edges[:-1], edges[1:], middle, strict=True))
+    residual = run.residual
+    return [
+        (float(place), float(np.sqrt(np.mean(residual[start:stop][kept] ** 2))))
+        for start, stop, place in pieces
+        if np.any(kept := run.counted[start:stop] > 0.0)
+    ]

@@ -1,0 +1,76 @@
+"""result.json: what the loop found, as plain numbers and words."""
+
+import math
+from typing import Any
+
+from .._parameters import list_parameters
+from ..identification import Errors, Finding, Fit, Loop
+
+SCHEMA = 1
+
+
+def result_dict(loop: Loop) -> dict[str, Any]:
+    """Give a closed loop as schema 1 of result.json.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        Numbers, words, lists and dictionaries that JSON holds; None where a number is not finite.
+    """
+    return {
+        "schema": SCHEMA,
+        "campaign": loop.campaign.title,
+        "before": _fit(loop.before),
+        "verdict": loop.verdict,
+        "findings": [_finding(finding) for finding in loop.findings],
+        "after": _fit(loop.after),
+        "bounds": {
+            effect: {"upper": _number(upper), "unit": unit} for effect, (upper, unit) in loop.bounds.items()
+        },
+        "seconds": _number(loop.seconds),
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _fit(fit: Fit) -> dict[str, Any]:
+    errors = fit.standard_errors
+    return {
+        "elements": [element.name for element in fit.model.elements],
+        "parameters": {
+            entry.name: {
+                "value": _number(float(entry.value)),
+                "standard_error": _number(errors.get(entry.name, math.nan)),
+                "unit": entry.spec.unit,
+            }
+            for entry in list_parameters(fit.model)
+        },
+        "error": {role: _errors(fit.errors[role]) for role in ("fit", "holdout")},
+    }
+
+
+def _errors(errors: Errors | None) -> dict[str, float | None] | None:
+    return None if errors is None else {name: _number(value) for name, value in errors._asdict().items()}
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {
+        "effect": finding.effect,
+        "indistinguishable": list(finding.indistinguishable),
+        "p_value": _number(finding.p_value),
+        "excess_explained": _number(finding.excess_explained),
+        "ranking": [
+            {
+                "effect": candidate.effect,
+                "z": _number(candidate.z),
+                "p_value": _number(candidate.p_value),
+                "delta_bic": _number(candidate.delta_bic),
+                "admissible": candidate.admissible,
+            }
+            for candidate in finding.ranking
+        ],
+        "separating_experiment": finding.separating_experiment,
+    }

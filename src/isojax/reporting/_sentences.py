@@ -1,0 +1,191 @@
+"""The finding in words: headline, what it rests on, what it does not say."""
+
+import math
+
+from .._parameters import Parameter, list_parameters
+from .._results import RESULTS, is_successful
+from ..elements import CATALOGUE
+from ..identification import Finding, Fit, Loop
+from ..records import DataHealth
+from ._quantities import typeset_number, typeset_p_value, typeset_share, typeset_unit, typeset_with_error
+
+
+def effect_words(effect: str) -> str:
+    """Give the words for a catalogue name.
+
+    Args:
+        effect: catalogue name.
+
+    Returns:
+        Its words.
+    """
+    return typeset_unit(CATALOGUE[effect].words) if effect in CATALOGUE else effect
+
+
+def own_strength(fit: Fit, effect: str) -> tuple[Parameter, float]:
+    """Give the strength of an effect in a fitted model.
+
+    Args:
+        fit: a fit whose model has the effect.
+        effect: catalogue name.
+
+    Returns:
+        The parameter, and its standard error (NaN where it has none).
+    """
+    name = f"{effect}.{CATALOGUE[effect].strength}"
+    entry = next(entry for entry in list_parameters(fit.model) if entry.name == name)
+    return entry, fit.standard_errors.get(name, math.nan)
+
+
+def strength_words(fit: Fit, effect: str) -> str:
+    """Give the strength of an effect with its error.
+
+    Args:
+        fit: a fit whose model has the effect.
+        effect: catalogue name.
+
+    Returns:
+        Such as "Fc = 3.983 ± 0.051 N".
+    """
+    entry, error = own_strength(fit, effect)
+    return f"{entry.spec.symbol} = {typeset_with_error(float(entry.value), error, entry.spec.unit)}"
+
+
+def error_words(before: Fit, after: Fit) -> str:
+    """Give what happened to the error: on held-out records, else on the fitted ones.
+
+    Args:
+        before: the declared model, fitted.
+        after: the final fit.
+
+    Returns:
+        Such as "held-out χ²/dof 3.00 → 1.02".
+    """
+    role = "holdout" if before.errors["holdout"] is not None else "fit"
+    place = "held-out χ²/dof" if role == "holdout" else "χ²/dof on the fitted records (none was held out)"
+    first, last = before.errors[role], after.errors[role]
+    if first is None or last is None:
+        return f"{place} unknown"
+    if before is after:
+        return f"{place} {typeset_number(last.chi2_per_dof, 3)}"
+    return f"{place} {typeset_number(first.chi2_per_dof, 3)} → {typeset_number(last.chi2_per_dof, 3)}"
+
+
+def headline(loop: Loop) -> str:
+    """Give the verdict in one sentence.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The sentence.
+    """
+    if not is_successful(loop.after.result):
+        return f"The fit failed, so nothing can be said of the model. {RESULTS[loop.after.result]}"
+    found = [f"{effect_words(one.effect)}, {strength_words(loop.after, one.effect)}" for one in loop.findings]
+    effects, error = " and ".join(found), error_words(loop.before, loop.after)
+    verb = "were" if len(found) > 1 else "was"
+    if loop.verdict == "none":
+        return f"Nothing is missing: the declared model explains the records down to their noise; {error}."
+    if loop.verdict == "found":
+        return f"{_capital(effects)}, {verb} missing; {error}."
+    if loop.verdict == "partly_explained":
+        return f"{_capital(effects)}, {verb} missing, but something else is too; {error}, noise alone would be 1."
+    known = f" even with {effects}" if found else ""
+    return f"Something is missing that no effect of the catalogue explains{known}; {error}, noise alone would be 1."
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def finding_words(finding: Finding) -> tuple[str, ...]:
+    """Give what a finding rests on, and what it leaves open.
+
+    Args:
+        finding: the finding.
+
+    Returns:
+        A sentence each.
+    """
+    chance = typeset_p_value(finding.p_value)
+    chance = chance if chance.startswith("<") else f"= {chance}"
+    lines = [
+        f"Adding it removes {typeset_share(finding.excess_explained)} of what the model left beyond the noise "
+        f"(family-wise p {chance})."
+    ]
+    if math.isfinite(finding.transfer):
+        lines.append(
+            f"Fitted without some of the records, it removes {typeset_share(finding.transfer)} of their excess."
+        )
+    others = [name for name in finding.indistinguishable if name != finding.effect]
+    if others:
+        lines.append(f"These data cannot tell it from: {', '.join(effect_words(name) for name in others)}.")
+        if finding.separating_experiment:
+            lines.append(f"What would part them: {finding.separating_experiment}")
+    return tuple(lines)
+
+
+def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
+    """Give the state of the data, before a model is blamed.
+
+    Args:
+        health: dwells and repeats.
+        fit: the final fit.
+
+    Returns:
+        A sentence each.
+    """
+    sigma = typeset_number(fit.noise.sigma, 3)
+    unit = {"acceleration": "m/s²", "velocity": "m/s", "displacement": "m"}[fit.campaign.output.quantity]
+    lines = [f"Noise of the output: {sigma} {unit} rms, from {fit.noise.method.replace('_', ' ')}."]
+    if fit.noise.note:
+        lines.append(f"{_capital(fit.noise.note)}.")
+    if health.dwells:
+        worst = sorted(health.unsettled, key=lambda one: -one.change)[:3]
+        examples = "; ".join(
+            f"{one.record} at {one.dwell.frequency:.3g} Hz ({typeset_share(one.change)})" for one in worst
+        )
+        lines.append(
+            f"{len(health.unsettled)} of {health.dwells} dwells never settled"
+            + (f"; the worst: {examples}." if worst else ".")
+        )
+    if health.repeats:
+        lines.append(f"Repeats agree to {typeset_share(health.repeatability)} (median of {len(health.repeats)}).")
+    scatter = fit.stats.stiffness_scatter
+    if math.isfinite(scatter):
+        lines.append(f"The linear stiffness scatters by {typeset_share(scatter)} between records.")
+    return tuple(lines)
+
+
+def caveats(loop: Loop) -> tuple[str, ...]:
+    """Give what the verdict does not say.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        A sentence each.
+    """
+    after = loop.after
+    lines = [
+        f"Effects are named from a catalogue of {len(CATALOGUE)}; a cause outside it can only show as unexplained.",
+        "χ²/dof is measured against the noise of the output channel; an error in that noise scales it.",
+    ]
+    if after.errors["holdout"] is None:
+        lines.append("No record was held out: the error after says nothing of unseen data.")
+    if loop.last.hidden:
+        names = ", ".join(effect_words(name) for name in loop.last.hidden)
+        lines.append(f"These data cannot show beside the fitted coefficients: {names}.")
+    held = {entry.name for entry in list_parameters(loop.before.model)}
+    for entry in list_parameters(after.model):
+        if not entry.spec.fitted and entry.name not in held:
+            value = f"{typeset_number(float(entry.value), 3)} {typeset_unit(entry.spec.unit)}"
+            lines.append(f"{entry.name} = {value} is declared, not fitted.")
+    jumps = after.errors["fit"]
+    if jumps is not None and jumps.nrmse > 2.0 * jumps.nrmse_segments:
+        lines.append(
+            "Free runs are far worse than restarted segments: near a fold a sweep may jump earlier or later than "
+            "its model. Judge by χ²/dof there."
+        )
+    return tuple(lines)

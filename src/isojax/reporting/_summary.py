@@ -1,0 +1,176 @@
+"""Summaries for the terminal: a diagnosis, a closed loop, the catalogue."""
+
+from collections.abc import Sequence
+from io import StringIO
+
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from .._parameters import list_parameters, own_parameters
+from ..elements import CATALOGUE
+from ..identification import Candidate, Fit, Loop, Verdict
+from ._quantities import OUTPUT_UNITS, typeset_number, typeset_p_value, typeset_share, typeset_unit
+from ._quantities import typeset_with_error as with_error
+from ._sentences import effect_words, finding_words, headline
+from ._style import ROLES
+
+_MOST = 8
+
+
+def render_text(content: RenderableType, width: int = 110) -> str:
+    """Give what the terminal would show as plain text.
+
+    Args:
+        content: what to render.
+        width: columns.
+
+    Returns:
+        The text, without colours.
+    """
+    page = StringIO()
+    Console(file=page, width=width, color_system=None, highlight=False).print(content)
+    return page.getvalue().rstrip("\n")
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="dim")
+    for place, column in enumerate(columns):
+        table.add_column(column, justify="left" if place == 0 else "right")
+    return table
+
+
+def error_table(before: Fit, after: Fit) -> Table:
+    """Give the errors before and after.
+
+    Args:
+        before: the declared model, fitted.
+        after: the final fit.
+
+    Returns:
+        A table for rich.
+    """
+    unit = typeset_unit(OUTPUT_UNITS[before.campaign.output.quantity])
+    table = _table("Error", "records", "", f"free-run RMSE [{unit}]", "NRMSE", "NRMSE, restarted", "χ²/dof")
+    rows = (("before", before),) if before is after else (("before", before), ("after", after))
+    for role, words in ROLES.items():
+        for label, fit in rows:
+            errors = fit.errors[role]
+            if errors is not None:
+                shares = (typeset_share(errors.nrmse), typeset_share(errors.nrmse_segments))
+                size, chi2 = typeset_number(errors.rmse, 3), typeset_number(errors.chi2_per_dof, 4)
+                table.add_row(words, label, size, *shares, chi2)
+    return table
+
+
+def parameter_table(before: Fit, after: Fit) -> Table:
+    """Give the coefficients before and after.
+
+    Args:
+        before: the declared model, fitted.
+        after: the final fit.
+
+    Returns:
+        A table for rich.
+    """
+    table = _table("Coefficients", "name", *(("fitted",) if before is after else ("before", "after")))
+    fits = (before,) if before is after else (before, after)
+    names = [entry.name for entry in list_parameters(after.model)]
+    for name in names:
+        table.add_row(name, *(parameter_words(fit, name) for fit in fits))
+    return table
+
+
+def parameter_words(fit: Fit, name: str) -> str:
+    """Give a coefficient of a fit with its error and unit.
+
+    Args:
+        fit: the fit.
+        name: of the coefficient.
+
+    Returns:
+        Such as "3.983 ± 0.051 N", "800.0 kg (fixed)"; "" if the model lacks it.
+    """
+    listed = {entry.name: entry for entry in list_parameters(fit.model)}
+    if name not in listed:
+        return ""
+    entry, error = listed[name], fit.standard_errors.get(name)
+    words = with_error(float(entry.value), float("nan") if error is None else error, entry.spec.unit)
+    if error is None:
+        return f"{words} (fixed)"
+    return words if error == error else f"{words} (not determined)"
+
+
+def ranking_table(ranking: Sequence[Candidate]) -> Table:
+    """Give the best candidates.
+
+    Args:
+        ranking: candidates, best first.
+
+    Returns:
+        A table for rich.
+    """
+    table = _table("Effects, best first", "effect", "z", "p", "strength", "χ²/dof", "ΔBIC", "admissible")
+    for one in ranking[:_MOST]:
+        table.add_row(
+            one.effect,
+            f"{one.z:.3g}",
+            typeset_p_value(one.p_value),
+            with_error(one.strength, one.strength_error, one.unit),
+            typeset_number(one.chi2_per_dof, 4),
+            typeset_number(one.delta_bic, 3),
+            "yes" if one.admissible else "no",
+        )
+    return table
+
+
+def loop_summary(loop: Loop) -> RenderableType:
+    """Give a closed loop for the terminal.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        Headline, errors, coefficients, evidence.
+    """
+    lines = [line for finding in loop.findings for line in finding_words(finding)]
+    return Group(
+        Text(headline(loop), style="bold"),
+        *(Text(line) for line in lines),
+        error_table(loop.before, loop.after),
+        parameter_table(loop.before, loop.after),
+    )
+
+
+def verdict_summary(verdict: Verdict) -> RenderableType:
+    """Give a diagnosis for the terminal.
+
+    Args:
+        verdict: the diagnosis.
+
+    Returns:
+        Verdict, reason, ranking.
+    """
+    finding = verdict.finding
+    named = "" if finding is None else f": {effect_words(finding.effect)}"
+    lines = () if finding is None else finding_words(finding)
+    return Group(
+        Text(f"{verdict.verdict.replace('_', ' ')}{named}", style="bold"),
+        Text(verdict.reason),
+        *(Text(line) for line in lines),
+        ranking_table(verdict.ranking),
+    )
+
+
+def catalogue_table() -> Table:
+    """Give the effects that isojax knows.
+
+    Returns:
+        A table for rich: name, words, strength with its unit, internal states, whether the strength is signed.
+    """
+    table = _table("Effects", "name", "what it is", "strength", "unit", "states", "signed")
+    for name, kind in sorted(CATALOGUE.items()):
+        spec = dict(own_parameters(kind))[kind.strength]
+        states, signed = str(kind.internal_states), "yes" if kind.signed else "no"
+        table.add_row(name, kind.words, kind.strength, typeset_unit(spec.unit), states, signed)
+    return table
