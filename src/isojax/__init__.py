@@ -1,0 +1,62 @@
+"""Identify nonlinear vibration isolators from measured time histories, and name what their model lacks."""
+
+from importlib.metadata import version as _version
+
+from . import elements as elements
+from . import paper as paper
+from ._results import RESULTS as RESULTS
+from ._results import is_successful as is_successful
+from .elements import CATALOGUE as CATALOGUE
+from .elements import AbsQuadraticDamping as AbsQuadraticDamping
+from .elements import AbsQuadraticStiffness as AbsQuadraticStiffness
+from .elements import AbstractElement as AbstractElement
+from .elements import AddedMass as AddedMass
+from .elements import BoucWen as BoucWen
+from .elements import CoulombFriction as CoulombFriction
+from .elements import CubicDamping as CubicDamping
+from .elements import CubicStiffness as CubicStiffness
+from .elements import DahlFriction as DahlFriction
+from .elements import InputDelay as InputDelay
+from .elements import InputGain as InputGain
+from .elements import InputOffset as InputOffset
+from .elements import LinearDamping as LinearDamping
+from .elements import LinearStiffness as LinearStiffness
+from .elements import MaxwellBranch as MaxwellBranch
+from .elements import PositionDamping as PositionDamping
+from .elements import QuadraticStiffness as QuadraticStiffness
+from .elements import Scales as Scales
+from .elements import SensorGain as SensorGain
+from .elements import SensorOffset as SensorOffset
+from .excitations import AbstractExcitation as AbstractExcitation
+from .excitations import Harmonic as Harmonic
+from .excitations import Multisine as Multisine
+from .excitations import Sampled as Sampled
+from .excitations import SteppedSine as SteppedSine
+from .excitations import SweptSine as SweptSine
+from .excitations import random_phase_multisine as random_phase_multisine
+from .identification import ClassicalGuess as ClassicalGuess
+from .identification import Extension as Extension
+from .identification import Fit as Fit
+from .identification import Residual as Residual
+from .identification import Verdict as Verdict
+from .identification import classical_guess as classical_guess
+from .identification import diagnose as diagnose
+from .identification import extend as extend
+from .identification import fit as fit
+from .identification import residual as residual
+from .models import Integrator as Integrator
+from .models import Isolator as Isolator
+from .models import Simulation as Simulation
+from .models import load_model as load_model
+from .models import save_model as save_model
+from .models import simulate as simulate
+from .records import Campaign as Campaign
+from .records import Record as Record
+from .records import data_health as data_health
+from .records import estimate_noise as estimate_noise
+from .records import read_campaign as read_campaign
+from .reporting import ClosedLoop as ClosedLoop
+from .reporting import close_loop as close_loop
+from .reporting import write_report as write_report
+
+__version__ = _version("isojax")

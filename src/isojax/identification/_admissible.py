@@ -5,28 +5,33 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..models import Isolator
-from ..records import Record, measured_state
+from ..models import Isolator, Quantity
+from ..records import Record
+from ._batch import coordinate_motion
 
 
-def visited_range(records: tuple[Record, ...], quantity: str) -> tuple[float, float]:
+def visited_range(
+    model: Isolator, records: tuple[Record, ...], quantity: Quantity
+) -> tuple[float, float]:
     """Give the largest displacement [m] and velocity [m/s] that dwells and windows reached.
 
     Args:
+        model: the isolator, for what its coordinate is.
         records: the records.
         quantity: what the sensor measures.
 
     Returns:
         Both, as 99.5 % quantiles: integrals of a measured acceleration are rough at the ends of a record.
     """
-    states = [measured_state(record, quantity)[:2] for record in records]
+    based = model.excitation == "base_acceleration"
+    states = [coordinate_motion(record, quantity, based) for record in records]
     return (
         float(max(np.quantile(np.abs(x), 0.995) for x, _ in states)),
         float(max(np.quantile(np.abs(v), 0.995) for _, v in states)),
     )
 
 
-def find_violation(model: Isolator, records: tuple[Record, ...], quantity: str) -> str | None:
+def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
     """Find what is unphysical in a model over the visited motion, if anything.
 
     The static tangent stiffness must be positive wherever the model has a spring, and the static damping force must
@@ -40,7 +45,7 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: str) 
     Returns:
         A sentence, or None.
     """
-    largest_x, largest_v = visited_range(records, quantity)
+    largest_x, largest_v = visited_range(model, records, quantity)
     rest = tuple(jnp.zeros(()) for _ in range(model.internal_states))
 
     def static(x: Float[jax.Array, ""], v: Float[jax.Array, ""]) -> Float[jax.Array, ""]:

@@ -1,5 +1,6 @@
 """Segments side by side: what one compiled scan takes."""
 
+import dataclasses
 import os
 from typing import NamedTuple
 
@@ -43,7 +44,7 @@ class Prepared(NamedTuple):
         spread: rms displacement and velocity of each lane; shape (2, lanes).
         quantity: what the sensor measures.
         sample_time: time between samples [s].
-        count: samples that count in each record.
+        samples: samples that count in each record.
     """
 
     batches: tuple[Batch, ...]
@@ -53,7 +54,26 @@ class Prepared(NamedTuple):
     spread: Float[np.ndarray, "2 lanes"]
     quantity: Quantity
     sample_time: float
-    count: Float[np.ndarray, " record"]
+    samples: Float[np.ndarray, " record"]
+
+
+def coordinate_motion(
+    record: Record, quantity: Quantity, based: bool
+) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"]]:
+    """Give the measured motion of the model's coordinate.
+
+    Args:
+        record: the record.
+        quantity: what the sensor measures.
+        based: whether the drive is the acceleration of the base, so that the coordinate is relative to it and a
+            measured acceleration is not.
+
+    Returns:
+        Displacement [m] and velocity [m/s].
+    """
+    if based and quantity == "acceleration":
+        record = dataclasses.replace(record, output=record.output - record.input)
+    return measured_state(record, quantity)[:2]
 
 
 def workers() -> int:
@@ -71,6 +91,7 @@ def prepare(
     hold: Hold,
     substeps: int,
     shift: float = 0.0,
+    based: bool = False,
 ) -> Prepared:
     """Lay segments side by side.
 
@@ -81,6 +102,7 @@ def prepare(
         hold: what the drive does between samples.
         substeps: integration steps a sample.
         shift: time by which the drive acts later than it was recorded [s].
+        based: whether the drive is the acceleration of the base.
 
     Returns:
         The batches and what belongs to their lanes.
@@ -102,7 +124,7 @@ def prepare(
         if segment.record != place:
             place = segment.record
             table, slopes = tabulate(record.input, record.rate, hold, substeps, shift)
-            motion = measured_state(record, quantity)[:2]
+            motion = coordinate_motion(record, quantity, based)
         window = slice(segment.start, segment.stop)
         size = segment.stop - segment.start
         drive[:size, :, lane], rates[:size, :, lane] = table[window], slopes[window]
@@ -176,7 +198,7 @@ def internal_starts(
     length = max(record.input.size for record in records)
     motions = np.zeros((3, length, len(records)))
     for place, record in enumerate(records):
-        x, v, _ = measured_state(record, prepared.quantity)
+        x, v = coordinate_motion(record, prepared.quantity, model.excitation == "base_acceleration")
         motions[:, : x.size, place] = x, v, record.input
         motions[:, x.size :, place] = motions[:, x.size - 1, place][:, None]
     x, v, drive = (jnp.asarray(motion) for motion in motions)

@@ -100,7 +100,9 @@ def _respond(
     size = starts.shape[0]
     solver = RK4()
 
-    def field(t: float, d: tuple[Array, ...], table: tuple[Array, ...]) -> tuple[Array, ...]:
+    def field(
+        t: float, d: tuple[Array, ...], table: tuple[tuple[Array, ...], ...]
+    ) -> tuple[Array, ...]:
         place = round(2.0 * t)
         a, b = table[0][place], table[1][place]
         rows = [step * d[1]]
@@ -202,7 +204,7 @@ def _products(
     by_state: list[Array],
     batch: Batch,
     steps: int,
-) -> Float[Array, "lanes column column"]:
+) -> Float[Array, "lanes entry entry"]:
     """Form the readings' columns and multiply them out, lane by lane."""
     rows = sum(
         response[::steps, index] * slope[::steps, None] for index, slope in enumerate(by_state)

@@ -41,11 +41,13 @@ def uncertainty(matrix: Float[np.ndarray, "column column"], inflation: float = 1
         inflation: factor on the covariance: max(1, chi2/dof) where the model does not explain all of the data.
 
     Returns:
-        The uncertainty.
+        The uncertainty; all NaN and nothing determined where the matrix is not finite.
 
     Source: Seber & Wild 1989, Nonlinear Regression, eq. (2.21).
     """
     count = matrix.shape[0]
+    if not np.all(np.isfinite(matrix)):
+        return unknown(count)
     size = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     dead = ~(size > 0.0)
     safe = np.where(dead, 1.0, size)
@@ -65,3 +67,16 @@ def uncertainty(matrix: Float[np.ndarray, "column column"], inflation: float = 1
     covariance[:, ~determined] = np.nan
     error = np.sqrt(np.diag(covariance))
     return Uncertainty(covariance, error, covariance / np.outer(error, error), determined, partners)
+
+
+def unknown(count: int) -> Uncertainty:
+    """Give what is known after a search that failed: nothing.
+
+    Args:
+        count: coefficients.
+
+    Returns:
+        The uncertainty, all NaN.
+    """
+    nothing = np.full((count, count), np.nan)
+    return Uncertainty(nothing, np.full(count, np.nan), nothing, np.zeros(count, dtype=bool), ())

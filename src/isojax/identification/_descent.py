@@ -19,6 +19,12 @@ from ._problem import Bench, Point, one_hot
 FIRST_DAMPING = 1e-3
 """Marquardt's damping at the first step, over the diagonal of the normal equations: light, since starts are good."""
 
+MOST_REFUSALS = 8
+"""Refused steps in a row after which the search stops."""
+
+STALLED = 1e-2
+"""Predicted share of chi2 still to gain below which a search stopped by refusals counts as converged."""
+
 RUNAWAY = 1e75
 """Residual that stands for a simulation that ran away: finite, so that the solver steps back and not out."""
 
@@ -154,12 +160,18 @@ def descend(
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
         progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
         if accepted:
-            gained = float("inf") if best is None else best.chi2 - point.chi2
-            best, best_free = point, trial
+            gained = float("inf") if best is None or refused else best.chi2 - point.chi2
+            best, best_free, refused = point, trial, 0
             # What a full linear step would still gain, and what the last one did gain: either may say that it is over.
             decrement = float(np.sum(residual[:-1] ** 2))
             if min(decrement, gained) < tolerance * max(1.0, chi2):
                 result = RESULTS.successful
+                break
+        else:
+            refused += 1
+            # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
+            if refused == MOST_REFUSALS:
+                result = RESULTS.where(decrement < STALLED * best.chi2, RESULTS.successful, RESULTS.not_converged)
                 break
         if bool(state.terminate):
             result = RESULTS.successful

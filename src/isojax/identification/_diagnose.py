@@ -33,6 +33,9 @@ MOST_OF_IT = 0.8
 SMALLEST_GAIN = 0.005
 """Gain in chi2/dof below which an effect is not named: with half a million samples anything is significant."""
 
+SMALLEST_SHARE = 0.2
+"""Share of the remaining excess that an effect must explain to be named where the fit is not good."""
+
 SURVIVORS = 4
 """Families that are refitted."""
 
@@ -151,7 +154,7 @@ def diagnose(
     significance: float = 0.01,
     excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
-    max_steps: int = 25,
+    max_steps: int = 40,
     progress: Callable[[str], None] = silent,
 ) -> Verdict:
     """Name the effect that a fitted model lacks, with its evidence; or say that nothing is, or that none explains it.
@@ -189,12 +192,29 @@ def diagnose(
         progress(f"refit with {score.element.name}")
         found = refit_candidate(test, index, scales, solver, max_steps, progress)
         violation = None
-        if found.result == RESULTS.not_finite or found.excess >= fitted.excess:
-            violation = "its refit failed"
+        if found.result != RESULTS.successful or found.excess >= fitted.excess:
+            violation = "its refit did not converge"
+        elif not _is_determined(found, score):
+            violation = "its strength is not determined"
         else:
             violation = find_violation(found.model, fit.campaign.fit_records, fitted.bench.problem.quantity)
         refits.append(Refit(score, found, violation))
     return _judge(fit, test, refits, first, scales, significance, solver, progress)
+
+
+def _is_determined(found: Estimate, score: Score) -> bool:
+    """Say whether a refitted strength is at least two standard errors from zero."""
+    place = _strength_place(found, score)
+    error = float(found.uncertainty.standard_error[place])
+    strength = float(list_parameters(found.model)[found.places[place]].value)
+    return abs(strength) > 2.0 * error
+
+
+def _strength_place(found: Estimate, score: Score) -> int:
+    """Give the place of a candidate's strength among the free coefficients of its refit."""
+    listed = [entry.name for entry in list_parameters(found.model)]
+    fields = [name for name, _ in own_parameters(score.element)]
+    return found.places.index(len(listed) - len(fields) + fields.index(score.element.strength))
 
 
 def _bic(found: Estimate, inflation: float) -> float:
@@ -223,7 +243,8 @@ def _judge(
         best = usable[0]
         gain = fitted.chi2 - best.estimate.chi2
         extra = len(best.estimate.places) - len(fitted.places)
-        enough = gain / fitted.dof >= (SMALLEST_GAIN if good else min(SMALLEST_GAIN, LEFT_OVER * first_excess / fitted.dof))
+        needed = SMALLEST_GAIN if good else max(SMALLEST_GAIN, SMALLEST_SHARE * fitted.excess / fitted.dof)
+        enough = gain / fitted.dof >= needed
         clear = _bic(fitted, inflation) - _bic(best.estimate, inflation) > CLOSE_BIC
         share = transferred_share(fit, best.estimate, scales, solver, progress) if enough and clear else 0.0
         if enough and clear and share > 0.0:
@@ -257,7 +278,7 @@ def _found(
         for entry in ranking
         if entry.effect != name
         and entry.admissible
-        and (entry.delta_bic <= CLOSE_BIC or abs(entry.likeness) > CLOSE_LIKENESS)
+        and (entry.delta_bic <= CLOSE_BIC or (np.isnan(entry.delta_bic) and abs(entry.likeness) > CLOSE_LIKENESS))
     )
     finding = Finding(
         name,
@@ -302,16 +323,10 @@ def _ranking(
         refit = done.get(score.element.name)
         strength, error = score.strength, score.error
         chi2, delta, admissible = float("nan"), float("nan"), score.admissible
-        if refit is not None and refit.estimate.result != RESULTS.not_finite:
+        if refit is not None and len(refit.estimate.places) > len(test.fitted.places):
             found = refit.estimate
-            listed = [entry.name for entry in list_parameters(found.model)]
-            label = next(
-                name
-                for name in reversed(listed)
-                if name.startswith(score.element.name) and name.endswith("." + score.element.strength)
-            )
-            place = found.places.index(listed.index(label))
-            strength = float(found.model[label])
+            place = _strength_place(found, score)
+            strength = float(list_parameters(found.model)[found.places[place]].value)
             error = float(found.uncertainty.standard_error[place])
             chi2 = found.chi2 / found.dof
             delta = _bic(found, inflation) - lowest

@@ -61,8 +61,12 @@ def eliminate(
     columns: int,
     has_scale: bool,
     nuisances: Nuisances,
+    heads: Float[np.ndarray, "lanes column column"] | None = None,
 ) -> Reduced:
     """Eliminate the initial states of each segment, then the stiffness scale of each record.
+
+    Where `heads` is given, the initial states follow from the beginnings of the records alone, as those of a free run
+    do; the rest of a record then has no say in its own start.
 
     Args:
         matrices: from `information`.
@@ -73,6 +77,7 @@ def eliminate(
         columns: count of coefficient columns.
         has_scale: whether the stiffness scale has a column.
         nuisances: where they stand, and their priors.
+        heads: the same matrices over the beginning of each lane only.
 
     Returns:
         The reduced equations.
@@ -85,13 +90,19 @@ def eliminate(
 
     # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
     offset = nuisances.states[:used]
-    inner = matrices[:, drop[:, None], drop] + np.eye(states)
-    cross = matrices[:, drop[:, None], keep].copy()
+    source = matrices if heads is None else heads[:used] / noise**2
+    inner = source[:, drop[:, None], drop] + np.eye(states)
+    cross = source[:, drop[:, None], keep].copy()
     cross[:, :, -1] -= offset
-    outer = matrices[:, keep[:, None], keep].copy()
-    outer[:, -1, -1] += np.sum(offset**2, axis=1)
     states_map = np.linalg.solve(inner, cross)
-    left = outer - np.swapaxes(cross, 1, 2) @ states_map
+    left = matrices[:, keep[:, None], keep].copy()
+    if heads is None:
+        left[:, -1, -1] += np.sum(offset**2, axis=1)
+        left -= np.swapaxes(cross, 1, 2) @ states_map
+    else:
+        mixed = np.swapaxes(matrices[:, drop[:, None], keep], 1, 2) @ states_map
+        curved = np.swapaxes(states_map, 1, 2) @ matrices[:, drop[:, None], drop] @ states_map
+        left += curved - mixed - np.swapaxes(mixed, 1, 2)
     eliminated = np.zeros(records)
     np.add.at(eliminated, owner[:used], states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2))
 

@@ -5,17 +5,13 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from .._parameters import list_parameters
 from ..models import Isolator
 from ..records import Record
-from ._elimination import Nuisances, step_nuisances
+from ._beginning import beginning_states, best_nuisances
+from ._elimination import Nuisances
 from ._information import readings
 from ._problem import Bench, Point, Problem, stiffness_deviation
 from ._segments import Segment
-
-ROUNDS = 3
-"""Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
-
 
 class Errors(NamedTuple):
     """Errors of one role's records.
@@ -69,18 +65,16 @@ class Restarts(NamedTuple):
         return stiffness_deviation(self.point.nuisances)
 
 
-def _best_nuisances(bench: Bench, model: Isolator, spread: float) -> Point:
-    """Find the nuisances at given coefficients."""
-    nothing = np.zeros((len(list_parameters(model)), 0))
-    carried = len(model.elements)
-    point = bench.evaluate(model, nothing, bench.settle(None, model, carried, spread))
-    owner = bench.prepared(model, carried).record
-    for _ in range(ROUNDS):
-        if not point.is_finite:
-            break
-        moved = step_nuisances(point.reduced, owner, point.nuisances, np.zeros(0))
-        point = bench.evaluate(model, nothing, moved)
-    return point
+def without_values(run: Run) -> Run:
+    """Give the run of a search that failed: no number may pass for its simulation.
+
+    Args:
+        run: the run.
+
+    Returns:
+        The same, its simulation NaN.
+    """
+    return run._replace(simulated=np.full_like(run.simulated, np.nan))
 
 
 def _simulate_lanes(
@@ -107,7 +101,7 @@ def restart_records(problem: Problem, model: Isolator, spread: float) -> Restart
         The records against their restarted simulations.
     """
     bench = Bench(problem)
-    point = _best_nuisances(bench, model, spread)
+    point = best_nuisances(bench, model, spread)
     simulated = [np.full(record.output.size, np.nan) for record in problem.records]
     counted = [np.zeros(record.output.size) for record in problem.records]
     for part, values in zip(problem.segments, _simulate_lanes(bench, model, point.nuisances), strict=True):
@@ -131,26 +125,9 @@ def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
         One run a record.
     """
     records = problem.records
-
-    def heading(place: int, record: Record) -> Segment:
-        length = record.settle if record.settle >= 8 else int(round(record.rate))
-        return Segment(place, 0, min(length, record.output.size), 0)
-
-    heads = Problem(
-        records,
-        tuple(heading(place, record) for place, record in enumerate(records)),
-        problem.quantity,
-        problem.hold,
-        problem.noise,
-        problem.integrator,
-    )
-    bench = Bench(heads)
-    point = _best_nuisances(bench, model, 1e-9)
-    prepared = bench.prepared(model, len(model.elements))
-    starts, scales = bench.starts(model, prepared)
-    begin = (starts + scales * point.nuisances.states.T)[:, : len(records)]
-
-    whole = heads._replace(
+    begin = beginning_states(problem, model)
+    whole = problem._replace(
+        heads=(),
         segments=tuple(
             Segment(place, 0, record.output.size, record.settle) for place, record in enumerate(records)
         )
@@ -194,10 +171,11 @@ def summarise(free: tuple[Run, ...], restarts: Restarts, role: str, coefficients
             error += float(np.sum(run.residual[kept] ** 2))
             signal += float(np.sum((measured - measured.mean()) ** 2))
             count += kept.sum()
-        return float(np.sqrt(error / count)), float(np.sqrt(error / signal))
+        return float(np.sqrt(error / count)), float(np.sqrt(error / signal)) if signal > 0.0 else float("nan")
 
     rmse, nrmse = rms(free)
     point = restarts.point
-    chi2 = float(point.reduced.by_record[places, -1, -1].sum())
+    known = np.isfinite(rmse)
+    chi2 = float(point.reduced.by_record[places, -1, -1].sum()) if known else float("nan")
     dof = float(np.sum(point.samples[places] - point.reduced.eliminated[places])) - coefficients
     return Errors(rmse, nrmse, rms(restarts.runs)[1], chi2 / max(1.0, dof))

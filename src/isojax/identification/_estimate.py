@@ -8,11 +8,11 @@ import numpy as np
 import optimistix as optx
 
 from .._parameters import Parameter, list_parameters
-from .._results import RESULTS
+from .._results import RESULTS, is_successful
 from ..elements import Scales
 from ..models import Isolator
 from ..records import Record
-from ._covariance import Uncertainty, uncertainty
+from ._covariance import Uncertainty, uncertainty, unknown
 from ._descent import descend
 from ._elimination import Nuisances
 from ._information import STIFFNESS_SCALE_UNIT, has_stiffness_scale
@@ -207,7 +207,7 @@ def estimate(
     )
     steps = found.steps
     single = len(bench.problem.records) == 1
-    if found.result == RESULTS.successful and has_stiffness_scale(model) and not known:
+    if is_successful(found.result) and has_stiffness_scale(model) and not known:
         freedom = max(1.0, found.point.free_samples)
         inflation = found.point.chi2 / freedom
         spread = (
@@ -231,5 +231,9 @@ def estimate(
         steps += found.steps
     point = found.point
     dof = max(1.0, point.free_samples - len(places))
-    error = uncertainty(point.reduced.matrix[:-1, :-1], max(1.0, point.chi2 / dof))
+    error = (
+        uncertainty(point.reduced.matrix[:-1, :-1], max(1.0, point.chi2 / dof))
+        if is_successful(found.result)
+        else unknown(len(places))
+    )
     return Estimate(point.model, places, bench, point, error, found.result, steps)

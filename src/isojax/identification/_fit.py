@@ -1,5 +1,6 @@
 """The fit: coefficients straight from the time histories of all records together."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -8,13 +9,14 @@ import optimistix as optx
 from jaxtyping import Float
 
 from .._parameters import list_parameters
-from .._results import RESULTS
+from .._results import RESULTS, is_successful
 from .._types import check_float64
 from ..models import Integrator, Isolator
 from ..records import Campaign, NoiseEstimate, estimate_noise
 from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise
 from ._estimate import Estimate, estimate, free_places
-from ._problem import Bench, Problem, build_problem
+from ._problem import Bench
+from ._setup import build_problem
 from ._scales import scales as campaign_scales
 from ._steps import find_integrator
 
@@ -136,12 +138,15 @@ def fit(
         The fit. Where the search failed, `result` says why and every error is NaN.
 
     Raises:
-        ValueError: if a name is no parameter of the model.
+        ValueError: if a name is no parameter of the model, the model is not driven as the campaign's isolator is, or
+            records differ in sampling rate.
         RuntimeError: if JAX is not in 64-bit mode.
     """
     check_float64()
     places = free_places(model, fixed, free, campaign.mass_free)
-    noise = estimate_noise(campaign)
+    _check_excitation(model, campaign)
+    # Held-out records must not even weigh the others.
+    noise = estimate_noise(dataclasses.replace(campaign, records=campaign.fit_records))
     bench = bench_for(model, campaign, noise.sigma, integrator)
     found = estimate(
         bench,
@@ -154,6 +159,16 @@ def fit(
         progress=progress,
     )
     return complete(found, model, campaign, noise)
+
+
+def _check_excitation(model: Isolator, campaign: Campaign) -> None:
+    """Refuse a model that is driven otherwise than the isolator was."""
+    wanted = "base_acceleration" if campaign.input.quantity == "base_acceleration" else "force"
+    if model.excitation != wanted:
+        raise ValueError(
+            f'Argument `model` must have excitation "{wanted}", because the input of {campaign.file} is '
+            f'"{campaign.input.quantity}", but has "{model.excitation}".'
+        )
 
 
 def bench_for(model: Isolator, campaign: Campaign, noise: float, integrator: Integrator | None) -> Bench:
@@ -203,8 +218,12 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         integrator=fitted.integrator,
     )
     spread = found.point.nuisances.stiffness_spread
-    free_runs = run_freely(everything, found.model)
-    restarts = restart_records(everything, found.model, spread)
+    with np.errstate(over="ignore", invalid="ignore"):
+        free_runs = run_freely(everything, found.model)
+        restarts = restart_records(everything, found.model, spread)
+    if not is_successful(found.result):
+        free_runs = tuple(without_values(run) for run in free_runs)
+        restarts = restarts._replace(runs=tuple(without_values(run) for run in restarts.runs))
     errors = {
         "fit": summarise(free_runs, restarts, "fit", len(found.places)),
         "holdout": summarise(free_runs, restarts, "holdout", 0),

@@ -100,19 +100,20 @@ def _coefficients(fit: Fit) -> list[str]:
     listed = list_parameters(fit.model)
     width = max(len(entry.name) for entry in listed) + 1
     return [
-        f"{entry.name + ':':<{width}} {_value(entry, errors.get(entry.name), start[entry.name])}"
+        f"{entry.name + ':':<{width}} {_value(entry, errors.get(entry.name), start.get(entry.name))}"
         for entry in listed
     ]
 
 
-def _value(entry: Parameter, error: float | None, start: float) -> str:
+def _value(entry: Parameter, error: float | None, start: float | None) -> str:
     value = float(entry.value)
     if error is None:
         return f"{value:<12.6g} {entry.spec.unit} (fixed)"
+    begun = "(added)" if start is None else f"(init = {start:.6g})"
     if not math.isfinite(error):
-        return f"{value:<12.6g} +/- unknown {entry.spec.unit} (init = {start:.6g})"
+        return f"{value:<12.6g} +/- unknown {entry.spec.unit} {begun}"
     share = f" ({100 * error / abs(value):.2g} %)" if value != 0.0 else ""
-    return f"{value:<12.6g} +/- {error:.3g} {entry.spec.unit}{share} (init = {start:.6g})"
+    return f"{value:<12.6g} +/- {error:.3g} {entry.spec.unit}{share} {begun}"
 
 
 def _correlations(fit: Fit) -> list[str]:
@@ -123,7 +124,9 @@ def _correlations(fit: Fit) -> list[str]:
         for j in range(i + 1, len(fit.free))
         if np.abs(correlation[i, j]) >= _STRONG
     ]
-    return [f"C({one}, {other}) = {value:+.4f}" for value, one, other in sorted(pairs, key=lambda p: -abs(p[0]))]
+    return [
+        f"C({one}, {other}) = {value:+.4f}" for value, one, other in sorted(pairs, key=lambda p: -abs(p[0]))
+    ]
 
 
 def warnings_of(fit: Fit) -> list[str]:
@@ -142,14 +145,14 @@ def warnings_of(fit: Fit) -> list[str]:
     for entry in list_parameters(fit.model):
         if entry.name not in errors:
             continue
-        bound = _touched_bound(entry, errors[entry.name], start[entry.name])
+        bound = _touched_bound(entry, errors[entry.name])
         if bound is not None:
             lines.append(
-                f"{entry.name} is at its bound of {bound:g} {entry.spec.unit}: its error bar means little there."
+                f"{entry.name} is at its bound of {bound:g} {entry.spec.unit}; its error bar means little."
             )
-        moved = abs(float(entry.value) - start[entry.name])
-        if moved <= _UNMOVED * abs(start[entry.name]):
-            lines.append(f"{entry.name} never moved from its start value {start[entry.name]:g}.")
+        begun = start.get(entry.name, math.nan)
+        if abs(float(entry.value) - begun) <= _UNMOVED * abs(begun):
+            lines.append(f"{entry.name} never moved from its start value {begun:g}.")
     return lines
 
 
@@ -170,9 +173,9 @@ def _not_determined(fit: Fit) -> list[str]:
     ]
 
 
-def _touched_bound(entry: Parameter, error: float, start: float) -> float | None:
-    """Give the bound that a value stands on: within its standard error, or all but exactly."""
+def _touched_bound(entry: Parameter, error: float) -> float | None:
+    """Give the bound that a value stands on: within its standard error, or exactly."""
     value = float(entry.value)
-    near = error if math.isfinite(error) else 1e-6 * max(abs(value), abs(start))
+    near = error if math.isfinite(error) else 0.0
     bounds = (bound for bound in (entry.spec.lower, entry.spec.upper) if math.isfinite(bound))
     return next((bound for bound in bounds if abs(value - bound) <= near), None)

@@ -141,7 +141,7 @@ def _lane_information(
             return primal, change
 
         (reading, state), change = jax.vmap(along, out_axes=(None, 0))(seeds, scale_seed, tangent)
-        rows = jnp.concatenate([change[0], (measured - reading)[None]]) * weight
+        rows = jnp.concatenate([change[0], (measured - reading)[None]]) * weight[None]
         return (state, change[1], gram + rows[:, None] * rows[None]), None
 
     start = (states, tangents, jnp.zeros((total + 1, total + 1, lanes)))

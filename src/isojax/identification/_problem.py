@@ -14,7 +14,7 @@ from ._batch import Prepared, internal_starts, prepare
 from ._columns import column_information
 from ._elimination import Nuisances, Reduced, eliminate
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, information
-from ._segments import Segment, cut_segments
+from ._segments import Segment
 
 
 class Problem(NamedTuple):
@@ -27,6 +27,8 @@ class Problem(NamedTuple):
         hold: what the drive does between samples.
         noise: rms of the noise [SI unit of the output].
         integrator: solver and steps.
+        heads: the beginning of each record, where records are left whole and only their beginnings may set the
+            initial states; empty where every segment settles its own.
     """
 
     records: tuple[Record, ...]
@@ -35,6 +37,7 @@ class Problem(NamedTuple):
     hold: Hold
     noise: float
     integrator: Integrator
+    heads: tuple[Segment, ...] = ()
 
 
 class Point(NamedTuple):
@@ -68,6 +71,27 @@ class Point(NamedTuple):
         return bool(np.all(np.isfinite(self.reduced.matrix)))
 
 
+HUGE = 1e150
+"""A product of residuals or derivatives above this comes of a simulation that ran away, finite or not."""
+
+
+def element_names(model: Isolator) -> tuple[str, ...]:
+    """Give each element's name in reports.
+
+    Args:
+        model: the isolator.
+
+    Returns:
+        Catalogue names; a second element of a kind carries `_2`.
+    """
+    seen: dict[str, int] = {}
+    names = []
+    for element in model.elements:
+        seen[element.name] = seen.get(element.name, 0) + 1
+        names.append(element.name if seen[element.name] == 1 else f"{element.name}_{seen[element.name]}")
+    return tuple(names)
+
+
 class Bench:
     """Simulates a model against a problem; keeps the batches and start states that do not change.
 
@@ -75,13 +99,18 @@ class Bench:
     only; both are remade when those change and at no other time.
     """
 
-    def __init__(self, problem: Problem):
-        """Keep the problem; nothing is simulated yet."""
+    def __init__(self, problem: Problem, at_rest: bool = False):
+        """Keep the problem; nothing is simulated yet.
+
+        Args:
+            problem: the records.
+            at_rest: whether internal states start at zero and are no nuisances.
+        """
         self.problem = problem
+        self.at_rest = at_rest
+        self._heads = Bench(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
         self._prepared: dict[tuple[int, float], Prepared] = {}
-        self._starts: (
-            tuple[object, Float[np.ndarray, "state lanes"], Float[np.ndarray, "state lanes"]] | None
-        ) = None
+        self._memories: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
 
     def prepared(self, model: Isolator, carried: int) -> Prepared:
         """Give the batches for a model.
@@ -107,26 +136,37 @@ class Bench:
                 hold=problem.hold,
                 substeps=steps,
                 shift=key[1],
+                based=model.excitation == "base_acceleration",
             )
         return self._prepared[key]
 
     def starts(
-        self, model: Isolator, prepared: Prepared
+        self, model: Isolator, prepared: Prepared, carried: int | None = None
     ) -> tuple[Float[np.ndarray, "state lanes"], Float[np.ndarray, "state lanes"]]:
         """Give measured start states and their scales.
 
         Args:
             model: the isolator; the memories of its elements follow the measured motion.
             prepared: the batches.
+            carried: count of its elements that move the state; all if omitted.
 
         Returns:
             States and scales, one row a state.
         """
-        key = tuple(element.name for element in model.elements if element.internal_states)
-        if self._starts is None or self._starts[0] != key:
-            inner, spread = internal_starts(model, self.problem.records, prepared)
-            self._starts = (key, np.vstack([prepared.starts, inner]), np.vstack([prepared.spread, spread]))
-        return self._starts[1], self._starts[2]
+        carried = len(model.elements) if carried is None else carried
+        names = element_names(model)
+        known = [self._memories.get(name) for name in names[:carried]] + [None] * len(names[carried:])
+        if any(memory is None for memory in known):
+            memories = np.stack(internal_starts(model, self.problem.records, prepared))
+            ends = np.cumsum([element.internal_states for element in model.elements])
+            fresh = np.split(memories, ends[:-1], axis=1)
+            # Nuisances are deviations from the starts, which must therefore stay while they are carried on.
+            known = [new if old is None else old for old, new in zip(known, fresh, strict=True)]
+            self._memories.update(zip(names[:carried], known[:carried], strict=True))
+        rows = np.concatenate([np.stack([prepared.starts, prepared.spread]), *known], axis=1)
+        if self.at_rest:
+            rows[:, 2:] = 0.0
+        return rows[0], rows[1]
 
     def settle(self, nuisances: Nuisances | None, model: Isolator, carried: int, spread: float) -> Nuisances:
         """Give nuisances to begin with: those given, else none but the measured states.
@@ -168,16 +208,16 @@ class Bench:
         """
         carried = len(model.elements) if carried is None else carried
         prepared = self.prepared(model, carried)
-        starts, scales = self.starts(model, prepared)
+        starts, scales = self.starts(model, prepared, carried)
         own = nuisances.states.shape[1]
         states = starts.copy()
         states[:own] += scales[:own] * nuisances.states.T
         factor = 1.0 + stiffness_deviation(nuisances)[prepared.record]
         unknowns = Unknowns(model, directions, factor, states, scales)
-        if carried == len(model.elements):
-            matrices = information(unknowns, prepared)
-        else:
-            matrices = column_information(unknowns, carried, prepared)
+        matrices = _matrices(unknowns, carried, prepared)
+        heads = None
+        if self._heads is not None:
+            heads = _matrices(unknowns, carried, self._heads.prepared(model, carried))
         reduced = eliminate(
             matrices,
             self.problem.noise,
@@ -187,8 +227,18 @@ class Bench:
             directions.shape[1],
             has_stiffness_scale(model),
             nuisances,
+            heads,
         )
-        return Point(model, nuisances, reduced, prepared.count)
+        return Point(model, nuisances, reduced, prepared.samples)
+
+
+def _matrices(unknowns: Unknowns, carried: int, prepared: Prepared) -> Float[np.ndarray, "lanes column column"]:
+    """Give the information matrices, NaN where a simulation left every bound."""
+    if carried == len(unknowns.model.elements):
+        matrices = information(unknowns, prepared)
+    else:
+        matrices = column_information(unknowns, carried, prepared)
+    return np.where(np.abs(matrices) < HUGE, matrices, np.nan)
 
 
 def stiffness_deviation(nuisances: Nuisances) -> Float[np.ndarray, " record"]:
@@ -219,28 +269,3 @@ def one_hot(
     directions = np.zeros((len(list_parameters(model)), len(places)))
     directions[list(places), range(len(places))] = sizes
     return directions
-
-
-def build_problem(
-    records: tuple[Record, ...],
-    model: Isolator,
-    *,
-    quantity: Quantity,
-    hold: Hold,
-    noise: float,
-    integrator: Integrator,
-) -> Problem:
-    """Cut records into segments for a model.
-
-    Args:
-        records: the records.
-        model: the isolator, for its memory.
-        quantity: what the sensor measures.
-        hold: what the drive does between samples.
-        noise: rms of the noise [SI unit of the output].
-        integrator: solver and steps.
-
-    Returns:
-        The problem.
-    """
-    return Problem(records, cut_segments(records, model), quantity, hold, noise, integrator)

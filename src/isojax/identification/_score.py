@@ -11,7 +11,7 @@ from ..elements import CATALOGUE, AbstractElement, Scales
 from ..models import Isolator
 from ._estimate import Estimate
 from ._elimination import Nuisances, step_nuisances
-from ._problem import one_hot
+from ._problem import element_names, one_hot
 
 SMALLEST_VISIBILITY = 0.005
 """Share of a candidate's column that must be left after projection; less is numerical dust."""
@@ -105,8 +105,8 @@ def score_test(
     carried = len(fitted.model.elements)
     places = list(fitted.places)
     sizes = list(np.sqrt(1.0 / np.maximum(np.diag(fitted.point.reduced.matrix)[:-1], 1e-300)))
-    names = _strength_names(model)[carried:]
-    places += [find_parameter(model, name) for name in names]
+    for name, element in zip(element_names(model)[carried:], probes, strict=True):
+        places.append(find_parameter(model, f"{name}.{element.strength}"))
     sizes += [1e-3 * probe.typical_strength(scales) for probe in probes]
     point = fitted.bench.evaluate(model, one_hot(model, places, sizes), fitted.point.nuisances, carried)
     count = len(fitted.places)
@@ -128,9 +128,12 @@ def score_test(
     spread = np.sqrt(np.maximum(np.sum(shares**2, axis=0), size**2))
     robust = np.where(seen, score / np.maximum(spread, 1e-300), 0.0)
 
+    # Within a family a shape of admissible sign goes before any other: the others are evidence against those shapes.
+    physical = np.array([probe.signed for probe in probes], dtype=bool) | (score > 0.0)
+    weight = np.where(physical, np.abs(z), -1.0 / np.maximum(np.abs(z), 1e-300))
     best: dict[str, int] = {}
     for column, probe in enumerate(probes):
-        if seen[column] and (probe.name not in best or abs(z[column]) > abs(z[best[probe.name]])):
+        if seen[column] and (probe.name not in best or weight[column] > weight[best[probe.name]]):
             best[probe.name] = column
     order = sorted(best.values(), key=lambda column: -abs(z[column]))
     correlation = information / np.outer(safe, safe)
@@ -163,17 +166,6 @@ def score_test(
     hidden = tuple(sorted({probe.name for probe in probes} - set(best)))
     likeness = correlation[np.ix_(order, order)]
     return ScoreTest(tuple(scores), hidden, likeness, fitted, tuple(steps), tuple(moved))
-
-
-def _strength_names(model: Isolator) -> list[str]:
-    """Give the name of each element's strength; a second element of a kind carries `_2`."""
-    seen: dict[str, int] = {}
-    names = []
-    for element in model.elements:
-        seen[element.name] = seen.get(element.name, 0) + 1
-        suffix = "" if seen[element.name] == 1 else f"_{seen[element.name]}"
-        names.append(f"{element.name}{suffix}.{element.strength}")
-    return names
 
 
 def _family_wise(

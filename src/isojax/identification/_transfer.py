@@ -29,7 +29,7 @@ def _split(problem: Problem) -> tuple[Problem, Problem]:
             middle = (part.start + part.stop) // 2
             seen += (part._replace(stop=middle),)
             unseen += (part._replace(start=middle, counted=max(middle, part.counted)),)
-    return problem._replace(segments=seen), problem._replace(segments=unseen)
+    return problem._replace(segments=seen, heads=()), problem._replace(segments=unseen, heads=())
 
 
 def transferred_share(

@@ -5,6 +5,7 @@ from typing import Any
 
 import diffrax
 import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ._isolator import Isolator, Quantity, State
@@ -34,6 +35,10 @@ def sampled_term(model: Isolator, quantity: Quantity, sample_time: float) -> dif
     return diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
 
 
+UNROLLED = 2
+"""Substeps a sample up to which they are written out."""
+
+
 def advance(
     model: Isolator,
     solver: diffrax.AbstractSolver,
@@ -57,12 +62,25 @@ def advance(
     Returns:
         State one sample later.
     """
-    term = sampled_term(model, quantity, sample_time)
     substeps = (len(drive) - 1) // 2
-    for substep in range(substeps):
-        t0, t1 = substep / substeps, (substep + 1) / substeps
-        state, *_ = solver.step(term, t0, t1, state, (drive, drive_rate), None, False)
-    return state
+    if substeps <= UNROLLED:
+        term = sampled_term(model, quantity, sample_time)
+        for substep in range(substeps):
+            t0, t1 = substep / substeps, (substep + 1) / substeps
+            state, *_ = solver.step(term, t0, t1, state, (drive, drive_rate), None, False)
+        return state
+    # Many substeps are looped over: unrolled they take long to compile and run no faster.
+    term = sampled_term(model, quantity, sample_time / substeps)
+
+    def stages(values: tuple[Array | float, ...], offset: int) -> Array:
+        return jnp.stack([jnp.asarray(value) for value in values[offset : len(values) - 2 + offset : 2]])
+
+    def body(carry: State, table: tuple[Array, ...]) -> tuple[State, None]:
+        moved, *_ = solver.step(term, 0.0, 1.0, carry, (table[:3], table[3:]), None, False)
+        return moved, None
+
+    tables = tuple(stages(values, offset) for values in (drive, drive_rate) for offset in range(3))
+    return jax.lax.scan(body, state, tables)[0]
 
 
 def scan_records(

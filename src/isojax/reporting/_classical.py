@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..identification import ClassicalGuess, Fit
 from ._cycles import equivalent_curves
-from ._style import AFTER, BEFORE, LEVELS, MEASURED, NEUTRAL, axes_for, entitle
+from ._style import AFTER, BEFORE, CURVES, LEVELS, MEASURED, NEUTRAL, axes_for, entitle
 
 _LINES = {"forward": "-", "backward": "--", "none": "-"}
 _MARKERS = {"forward": "^", "backward": "v", "none": "o"}
@@ -55,8 +55,8 @@ def plot_receptance(
         ax.plot(line.frequency, scale * np.abs(line.receptance), linewidth=0.9, label=line.record)
     _resonance_points(guess, what, ax)
     if what == "displacement":
-        for (label, fit), colour in zip(fits, (BEFORE, AFTER), strict=False):
-            _backbone(guess, fit, label, colour, ax)
+        for (label, fit), colour, width in zip(fits, (BEFORE, AFTER), CURVES, strict=False):
+            _backbone(guess, fit, label, colour, width, ax)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("receptance [mm/kN]" if what == "receptance" else "displacement amplitude [mm]")
     ax.set_yscale("log" if guess.linear and what == "receptance" else "linear")
@@ -87,14 +87,28 @@ def _resonance_points(guess: ClassicalGuess, what: str, ax: Axes) -> None:
         )
 
 
-def _visited(guess: ClassicalGuess) -> tuple[float, float]:
-    """Give the smallest and the largest displacement amplitude of the dwells [m]."""
+def visited_amplitudes(guess: ClassicalGuess) -> tuple[float, float]:
+    """Give the range of displacement amplitudes of the dwells.
+
+    Args:
+        guess: the classical start, with stepped-sine records.
+
+    Returns:
+        Smallest and largest amplitude [m].
+    """
     sizes = np.concatenate([np.abs(response.displacement[:, 0]) for response in guess.responses])
     return float(np.min(sizes)), float(np.max(sizes))
 
 
-def _centre(guess: ClassicalGuess) -> float:
-    """Give the frequency at which equivalent curves are drawn: the mean resonance [Hz]."""
+def centre_frequency(guess: ClassicalGuess) -> float:
+    """Give the frequency at which equivalent curves are drawn: the mean resonance, else that of the dwells.
+
+    Args:
+        guess: the classical start, with stepped-sine records.
+
+    Returns:
+        Frequency [Hz].
+    """
     found = () if guess.table is None else guess.table.resonances
     resonances = [one.frequency for one in found if np.isfinite(one.frequency)]
     if resonances:
@@ -102,13 +116,13 @@ def _centre(guess: ClassicalGuess) -> float:
     return float(np.mean(np.concatenate([response.frequency for response in guess.responses])))
 
 
-def _backbone(guess: ClassicalGuess, fit: Fit, label: str, colour: str, ax: Axes) -> None:
-    lowest, highest = _visited(guess)
+def _backbone(guess: ClassicalGuess, fit: Fit, label: str, colour: str, width: float, ax: Axes) -> None:
+    lowest, highest = visited_amplitudes(guess)
     amplitudes = np.linspace(lowest, 1.05 * highest, 60)
-    stiffness, _ = equivalent_curves(fit.model, amplitudes, _centre(guess))
+    stiffness, _ = equivalent_curves(fit.model, amplitudes, centre_frequency(guess))
     physical = stiffness > 0.0
     frequency = np.sqrt(stiffness[physical] / float(fit.model.mass)) / (2.0 * np.pi)
-    ax.plot(frequency, 1e3 * amplitudes[physical], color=colour, linewidth=1.8, label=f"backbone {label}")
+    ax.plot(frequency, 1e3 * amplitudes[physical], color=colour, linewidth=width, label=f"backbone {label}")
 
 
 def plot_equivalent(
@@ -130,15 +144,15 @@ def plot_equivalent(
         The figure.
     """
     figure, ax = axes_for(ax)
-    lowest, highest = _visited(guess)
+    lowest, highest = visited_amplitudes(guess)
     amplitudes = np.linspace(lowest, 1.05 * highest, 80)
-    frequency = _centre(guess)
+    frequency = centre_frequency(guess)
     speeds = 2.0 * np.pi * frequency * amplitudes
     # mm on the abscissa; N/mm for stiffness and kN s/m (= N s/mm) for damping on the ordinate.
-    for (label, fit), colour in zip(fits, (BEFORE, AFTER), strict=False):
+    for (label, fit), colour, width in zip(fits, (BEFORE, AFTER), CURVES, strict=False):
         stiffness, damping = equivalent_curves(fit.model, amplitudes, frequency)
         x, y = (amplitudes, stiffness) if what == "stiffness" else (speeds, damping)
-        ax.plot(1e3 * x, 1e-3 * y, color=colour, linewidth=1.6, label=f"model {label}")
+        ax.plot(1e3 * x, 1e-3 * y, color=colour, linewidth=width, label=f"model {label}")
     law = None if guess.table is None else getattr(guess.table, what)
     if law is not None:
         for direction, rows in zip(law.directions, law.points, strict=True):
@@ -150,7 +164,7 @@ def plot_equivalent(
         ax.plot(1e3 * grid, 1e-3 * curve, ":", color=NEUTRAL, linewidth=1.4, label="classical law")
     side = "displacement amplitude X [mm]" if what == "stiffness" else "velocity amplitude V [mm/s]"
     ax.set_xlabel(side)
-    ax.set_ylabel("K_eq [N/mm]" if what == "stiffness" else "C_eq [N s/mm]")
+    ax.set_ylabel(r"$K_\mathrm{eq}$ [N/mm]" if what == "stiffness" else r"$C_\mathrm{eq}$ [N s/mm]")
     ax.legend(fontsize=7.5)
     entitle(ax, f"equivalent {what} at {frequency:.3g} Hz, visited amplitudes")
     return figure

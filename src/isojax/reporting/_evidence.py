@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..identification import Candidate, Fit
-from ._quantities import typeset_unit
+from ._quantities import typeset_number, typeset_unit
 from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle
 
 _LIKE = "#8fb8de"
@@ -38,21 +38,21 @@ def plot_ranking(
     figure, ax = axes_for(ax, height=0.9 + 0.27 * max(3, len(shown)))
     kinds = [_kind(candidate, effect, indistinguishable) for candidate in shown]
     styles = {
-        "found": {"color": AFTER},
-        "cannot be told apart": {"color": _LIKE, "hatch": "//", "edgecolor": AFTER},
-        "wrong sign or gains energy": {"color": _WRONG, "hatch": "xx", "edgecolor": BEFORE},
-        "weaker": {"color": NEUTRAL},
+        "found": (AFTER, "", AFTER),
+        "cannot be told apart": (_LIKE, "//", AFTER),
+        "wrong sign or gains energy": (_WRONG, "xx", BEFORE),
+        "weaker": (NEUTRAL, "", NEUTRAL),
     }
     rows = np.arange(len(shown))
     sizes = np.array([max(abs(candidate.z), 1e-2) for candidate in shown])
-    for kind, style in styles.items():
+    for kind, (colour, hatch, edge) in styles.items():
         mine = np.array([found == kind for found in kinds], dtype=bool)
         if np.any(mine):
-            ax.barh(rows[mine], sizes[mine], height=0.65, label=kind, linewidth=0.6, **style)
-    for row, candidate in zip(rows, shown, strict=True):
-        ax.text(
-            1.01, row, _beside(candidate), fontsize=7.5, va="center", transform=ax.get_yaxis_transform()
-        )
+            bars = ax.barh(rows[mine], sizes[mine], height=0.65, color=colour, label=kind, linewidth=0.6)
+            for bar in bars:
+                bar.set(hatch=hatch, edgecolor=edge)
+    for row, candidate in enumerate(shown):
+        ax.text(1.01, row, _beside(candidate), fontsize=7.5, va="center", transform=ax.get_yaxis_transform())
     ax.set_yticks(rows, [typeset_unit(candidate.words) for candidate in shown])
     ax.invert_yaxis()
     ax.set_xscale("log")
@@ -76,7 +76,7 @@ def _kind(candidate: Candidate, effect: str | None, indistinguishable: Sequence[
 def _beside(candidate: Candidate) -> str:
     refitted = np.isfinite(candidate.chi2_per_dof)
     words = f"χ²/dof {candidate.chi2_per_dof:.3f}" if refitted else "not refitted"
-    return f"|z| {abs(candidate.z):.3g}, {words}"
+    return f"|z| {typeset_number(abs(candidate.z), 3)}, {words}"
 
 
 def plot_errors(
@@ -136,7 +136,9 @@ def plot_stiffness_scatter(before: Fit, after: Fit | None = None, *, ax: Axes | 
     for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
         if fit is not None:
             deviation = 100.0 * fit.restarts.stiffness
-            ax.plot(range(len(names)), deviation, "o-", color=colour, markersize=4, linewidth=0.8, label=label)
+            ax.plot(
+                range(len(names)), deviation, "o-", color=colour, markersize=4, linewidth=0.8, label=label
+            )
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
     ax.set_xlabel("record, in the order of the test")

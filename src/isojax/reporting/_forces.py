@@ -1,4 +1,4 @@
-"""Pictures of forces: the restoring force of a model over measured points, and the force of one effect alone."""
+"""Pictures of forces: that of a model over measured points, and that of one effect by itself."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,10 +14,7 @@ from ..identification import Fit
 from ..models import Isolator
 from ..records import Record, measured_state
 from ._cycles import trace_cycles
-from ._style import AFTER, BAND, BEFORE, NEUTRAL, axes_for, entitle
-
-_SLICE = 0.03
-"""Points count as standing still, or as passing the middle, within this share of the largest motion."""
+from ._style import AFTER, BAND, BEFORE, CURVES, MEASURED, NEUTRAL, axes_for, entitle
 
 _MOST_POINTS = 4000
 
@@ -51,9 +48,9 @@ def plot_restoring_force(
     what: Literal["stiffness", "damping"] = "stiffness",
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw the force of the models over displacement at rest, or over velocity in the middle, with its points.
+    """Draw the force of the models over displacement at v = 0, or over velocity at x = 0.
 
-    Points are slices through the measured restoring force F - m a (Masri & Caughey 1979).
+    The points are those where the measured motion crosses that axis, force F - m a (Masri & Caughey 1979).
 
     Args:
         before: the declared model, fitted.
@@ -65,19 +62,28 @@ def plot_restoring_force(
         The figure.
     """
     figure, ax = axes_for(ax)
-    parts = [measured_forces(before, record) for record in before.campaign.fit_records]
-    x, v, force = (np.concatenate(column) for column in zip(*parts, strict=True))
-    along, across = (x, v) if what == "stiffness" else (v, x)
-    near = np.flatnonzero(np.abs(across) < _SLICE * np.max(np.abs(across)))
-    near = near[:: max(1, near.size // _MOST_POINTS)]
+    crossings, reach = [], 0.0
+    for record in before.campaign.fit_records:
+        x, v, force = measured_forces(before, record)
+        along, across = (x, v) if what == "stiffness" else (v, x)
+        crossings.append(_crossings(along, across, force))
+        reach = max(reach, float(np.max(np.abs(along))))
+    points = np.concatenate(crossings)
+    points = points[:: max(1, len(points) // _MOST_POINTS)]
     ax.plot(
-        1e3 * along[near], force[near], ".", color=NEUTRAL, markersize=1.8, alpha=0.6, label="measured F − m a"
+        1e3 * points[:, 0],
+        points[:, 1],
+        ".",
+        color=MEASURED,
+        markersize=1.5,
+        zorder=3,
+        label="measured F − m a",
     )
-    reach = float(np.max(np.abs(along)))
     grid = np.linspace(-1.25 * reach, 1.25 * reach, 801)
-    for label, fit, colour in (("model before", before, BEFORE), ("model after", after, AFTER)):
+    pairs = (("model before", before, BEFORE), ("model after", after, AFTER))
+    for (label, fit, colour), width in zip(pairs, CURVES, strict=True):
         if fit is not None:
-            ax.plot(1e3 * grid, _slice(fit.model, grid, what), color=colour, linewidth=1.3, label=label)
+            ax.plot(1e3 * grid, _slice(fit.model, grid, what), color=colour, linewidth=width, label=label)
     ax.axvspan(-1e3 * reach, 1e3 * reach, color=BAND, alpha=0.6, zorder=0, label="visited")
     ax.set_xlim(1e3 * grid[0], 1e3 * grid[-1])
     ax.set_xlabel("displacement [mm]" if what == "stiffness" else "velocity [mm/s]")
@@ -85,6 +91,15 @@ def plot_restoring_force(
     ax.legend(fontsize=7.5, loc="upper left")
     entitle(ax, "restoring force at v = 0" if what == "stiffness" else "restoring force at x = 0")
     return figure
+
+
+def _crossings(
+    along: Float[np.ndarray, " time"], across: Float[np.ndarray, " time"], force: Float[np.ndarray, " time"]
+) -> Float[np.ndarray, "point 2"]:
+    """Give motion and force where `across` passes zero, interpolated between the samples."""
+    before = np.flatnonzero(across[:-1] * across[1:] < 0.0)
+    share = across[before] / (across[before] - across[before + 1])
+    return np.stack([one[before] + share * (one[before + 1] - one[before]) for one in (along, force)], axis=1)
 
 
 def _slice(model: Isolator, grid: Float[np.ndarray, " point"], what: str) -> Float[np.ndarray, " point"]:
@@ -129,7 +144,9 @@ def plot_effect(
         The figure.
     """
     figure, ax = axes_for(ax)
-    cycles = trace_cycles(effect_on_its_own(fit.model, effect), np.asarray(amplitudes, dtype=float), frequency)
+    cycles = trace_cycles(
+        effect_on_its_own(fit.model, effect), np.asarray(amplitudes, dtype=float), frequency
+    )
     for column, amplitude in enumerate(amplitudes):
         x, force = cycles.displacement[:, column], cycles.force[:, column]
         colour = AFTER if column == len(amplitudes) - 1 else NEUTRAL

@@ -10,8 +10,21 @@ _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _UNKNOWN = "–"
 
 
+def plain_unit(unit: str, quantity: str) -> str:
+    """Give the unit of a parameter, where that depends on what was measured.
+
+    Args:
+        unit: as the element declares it.
+        quantity: what the output measures.
+
+    Returns:
+        The unit.
+    """
+    return OUTPUT_UNITS[quantity] if unit == "SI unit of the output" else unit
+
+
 def typeset_unit(unit: str) -> str:
-    """Give a unit with raised exponents.
+    """Give a unit with raised exponents; nothing for a pure number.
 
     Args:
         unit: such as "N s^2/m^2".
@@ -19,7 +32,7 @@ def typeset_unit(unit: str) -> str:
     Returns:
         Such as "N s²/m²".
     """
-    return re.sub(r"\^(-?\d+)", lambda found: found.group(1).translate(_RAISED), unit)
+    return "" if unit == "1" else re.sub(r"\^(-?\d+)", lambda found: found.group(1).translate(_RAISED), unit)
 
 
 def typeset_number(value: float, digits: int = 4) -> str:
@@ -77,7 +90,23 @@ def typeset_p_value(p_value: float) -> str:
     """
     if not math.isfinite(p_value):
         return _UNKNOWN
-    return "< 10⁻⁶" if p_value < 1e-6 else f"{p_value:.2g}"
+    if p_value < 1e-6:
+        return "< 10⁻⁶"
+    return f"{p_value:.2g}" if p_value >= 1e-3 else typeset_number(p_value, 2)
+
+
+def typeset_goodness(chi2_per_dof: float, decimals: int = 3) -> str:
+    """Give chi2/dof with fixed decimals, so that rows compare.
+
+    Args:
+        chi2_per_dof: the number.
+        decimals: how many, below a hundred.
+
+    Returns:
+        Such as "0.986", "2.855".
+    """
+    known = math.isfinite(chi2_per_dof) and abs(chi2_per_dof) < 100.0
+    return f"{chi2_per_dof:.{decimals}f}" if known else typeset_number(chi2_per_dof, 3)
 
 
 def typeset_share(share: float) -> str:
@@ -91,9 +120,7 @@ def typeset_share(share: float) -> str:
     """
     if not math.isfinite(share):
         return _UNKNOWN
-    percent = 100.0 * share
-    decimals = 1 if abs(percent) >= 10.0 else 2
-    return f"{percent:.{decimals}f} %" if percent == 0.0 or abs(percent) >= 0.01 else f"{percent:.1g} %"
+    return f"{typeset_number(100.0 * share, 3)} %"
 
 
 def _power(value: float) -> int:

@@ -1,5 +1,7 @@
 """Pictures of what a model leaves: residual, its autocorrelation, where on the records it is large."""
 
+from typing import Literal
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -8,6 +10,9 @@ from ..identification import Fit, Residual, Run
 from ._quantities import OUTPUT_UNITS, typeset_unit
 from ._style import AFTER, BAND, BEFORE, ROLES, axes_for, entitle
 from ._time_history import extremes, worst_window
+
+_SMOOTH = 60
+"""A window is smoothed over this share of its length, where it is short enough for a curve."""
 
 _PHASES = 36
 """Pieces of a cycle over which a residual is averaged."""
@@ -47,7 +52,10 @@ def plot_residual(
             start, lowest, highest = extremes(time, values)
             ax.fill_between(start, lowest, highest, color=colour, alpha=0.6, linewidth=0.3, label=label)
         else:
-            ax.plot(time, values, color=colour, linewidth=0.9, label=label)
+            length = max(1, values.size // _SMOOTH)
+            smooth = np.convolve(values, np.ones(length) / length, mode="same")
+            ax.plot(time, values, color=colour, linewidth=0.6, alpha=0.3)
+            ax.plot(time, smooth, color=colour, linewidth=1.6, label=f"{label}, smoothed")
     sigma = before.noise.sigma
     ax.axhspan(-2 * sigma, 2 * sigma, color=BAND, zorder=0, label="noise, ±2σ")
     quantity = before.campaign.output.quantity
@@ -55,18 +63,24 @@ def plot_residual(
     ax.set_ylabel(f"residual [{typeset_unit(OUTPUT_UNITS[quantity])}]")
     ax.set_xlim(low, high)
     ax.legend(fontsize=8, loc="upper right", ncols=3)
+    ax.margins(y=0.18)
     entitle(ax, f"residual of {chosen.name} ({ROLES[chosen.role]}), segments restarted")
     return figure
 
 
-def plot_autocorrelation(
-    before: Residual, after: Residual | None = None, *, ax: Axes | None = None
+def plot_correlation(
+    before: Residual,
+    after: Residual | None = None,
+    *,
+    what: Literal["residual", "drive"] = "residual",
+    ax: Axes | None = None,
 ) -> Figure:
-    """Draw the autocorrelation of the residual, one curve a record, with the 99 % band of white noise.
+    """Draw the correlation of the residual with itself or with the drive, with the 99 % band of white noise.
 
     Args:
         before: residual of the declared model.
         after: residual of the extended model; omitted where there is none.
+        what: what the residual is held against.
         ax: axes to draw on.
 
     Returns:
@@ -76,16 +90,19 @@ def plot_autocorrelation(
     for label, residual, colour in (("before", before, BEFORE), ("after", after, AFTER)):
         if residual is None:
             continue
-        inside = float(np.mean(residual.whiteness))
-        for place, row in enumerate(residual.autocorrelation):
+        rows = residual.autocorrelation if what == "residual" else residual.cross_correlation
+        shown = residual.lags > 0 if what == "residual" else np.full(residual.lags.size, True)
+        inside = float(np.mean(np.abs(rows[:, shown]) <= residual.band[:, None]))
+        for place, row in enumerate(rows):
             name = f"{label}: {100 * inside:.0f} % of lags inside" if place == 0 else None
-            ax.plot(residual.lags, row, color=colour, linewidth=0.9, alpha=0.8, label=name)
+            ax.plot(residual.lags[shown], row[shown], color=colour, linewidth=0.9, alpha=0.8, label=name)
     band = float(np.max(before.band))
     ax.axhspan(-band, band, color=BAND, zorder=0, label="white noise, 99 %")
     ax.set_xlabel("lag [samples]")
-    ax.set_ylabel("autocorrelation [1]")
+    ax.set_ylabel(("autocorrelation" if what == "residual" else "cross-correlation") + " [1]")
+    ax.margins(y=0.2)
     ax.legend(fontsize=8, loc="upper right")
-    entitle(ax, "residual autocorrelation, one curve a record")
+    entitle(ax, f"residual against {'itself' if what == 'residual' else 'the drive'}, one curve a record")
     return figure
 
 
@@ -110,17 +127,20 @@ def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None)
                 x, rms = np.array(points).T
                 name = f"{label}, {ROLES[role]}"
                 size = rms / before.noise.sigma
-                ax.plot(x, size, marker, color=colour, markersize=3.5, markeredgewidth=0, alpha=0.65, label=name)
+                ax.plot(
+                    x, size, marker, color=colour, markersize=3.5, markeredgewidth=0, alpha=0.65, label=name
+                )
     ax.axhline(1.0, color="black", linewidth=0.8)
     ax.set_xlabel("drive frequency [Hz]" if dwelling else "time in the record [s]")
     ax.set_ylabel("rms residual / noise [1]")
+    ax.margins(y=0.25)
     ax.legend(fontsize=7.5, loc="upper right", ncols=2)
     entitle(ax, "where the model errs: one point a " + ("dwell" if dwelling else "window"))
     return figure
 
 
 def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure | None:
-    """Draw the residual of the worst dwell averaged over its cycles, where noise averages out and structure stays.
+    """Draw the residual of the worst dwell, averaged over its cycles.
 
     Args:
         before: the declared model, fitted.
@@ -156,8 +176,9 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
     ax.set_ylabel(f"mean residual [{typeset_unit(OUTPUT_UNITS[quantity])}]")
     ax.set_xlim(0.0, 360.0)
     ax.set_xticks(np.arange(0, 361, 60))
+    ax.margins(y=0.18)
     ax.legend(fontsize=8, loc="upper right", ncols=3)
-    entitle(ax, f"residual over the cycle: {record.name} at {dwell.frequency:.3g} Hz, worst dwell before")
+    entitle(ax, f"cycle-averaged residual: {record.name} at {dwell.frequency:.3g} Hz")
     return figure
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from .._parameters import list_parameters
 from ..identification import Errors, Finding, Fit, Loop
+from ._quantities import plain_unit
 
 SCHEMA = 1
 
@@ -26,7 +27,8 @@ def result_dict(loop: Loop) -> dict[str, Any]:
         "findings": [_finding(finding) for finding in loop.findings],
         "after": _fit(loop.after),
         "bounds": {
-            effect: {"upper": _number(upper), "unit": unit} for effect, (upper, unit) in loop.bounds.items()
+            effect: {"upper": _number(upper), "unit": plain_unit(unit, loop.campaign.output.quantity)}
+            for effect, (upper, unit) in loop.bounds.items()
         },
         "seconds": _number(loop.seconds),
     }
@@ -44,7 +46,7 @@ def _fit(fit: Fit) -> dict[str, Any]:
             entry.name: {
                 "value": _number(float(entry.value)),
                 "standard_error": _number(errors.get(entry.name, math.nan)),
-                "unit": entry.spec.unit,
+                "unit": plain_unit(entry.spec.unit, fit.campaign.output.quantity),
             }
             for entry in list_parameters(fit.model)
         },

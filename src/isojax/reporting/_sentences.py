@@ -7,7 +7,16 @@ from .._results import RESULTS, is_successful
 from ..elements import CATALOGUE
 from ..identification import Finding, Fit, Loop
 from ..records import DataHealth
-from ._quantities import typeset_number, typeset_p_value, typeset_share, typeset_unit, typeset_with_error
+from ._quantities import (
+    OUTPUT_UNITS,
+    plain_unit,
+    typeset_goodness,
+    typeset_number,
+    typeset_p_value,
+    typeset_share,
+    typeset_unit,
+    typeset_with_error,
+)
 
 
 def effect_words(effect: str) -> str:
@@ -48,7 +57,8 @@ def strength_words(fit: Fit, effect: str) -> str:
         Such as "Fc = 3.983 ± 0.051 N".
     """
     entry, error = own_strength(fit, effect)
-    return f"{entry.spec.symbol} = {typeset_with_error(float(entry.value), error, entry.spec.unit)}"
+    unit = plain_unit(entry.spec.unit, fit.campaign.output.quantity)
+    return f"{entry.spec.symbol} = {typeset_with_error(float(entry.value), error, unit)}"
 
 
 def error_words(before: Fit, after: Fit) -> str:
@@ -67,8 +77,8 @@ def error_words(before: Fit, after: Fit) -> str:
     if first is None or last is None:
         return f"{place} unknown"
     if before is after:
-        return f"{place} {typeset_number(last.chi2_per_dof, 3)}"
-    return f"{place} {typeset_number(first.chi2_per_dof, 3)} → {typeset_number(last.chi2_per_dof, 3)}"
+        return f"{place} {typeset_goodness(last.chi2_per_dof, 2)}"
+    return f"{place} {typeset_goodness(first.chi2_per_dof, 2)} → {typeset_goodness(last.chi2_per_dof, 2)}"
 
 
 def headline(loop: Loop) -> str:
@@ -82,17 +92,23 @@ def headline(loop: Loop) -> str:
     """
     if not is_successful(loop.after.result):
         return f"The fit failed, so nothing can be said of the model. {RESULTS[loop.after.result]}"
-    found = [f"{effect_words(one.effect)}, {strength_words(loop.after, one.effect)}" for one in loop.findings]
+    found = [_found(loop.after, one) for one in loop.findings]
     effects, error = " and ".join(found), error_words(loop.before, loop.after)
     verb = "were" if len(found) > 1 else "was"
     if loop.verdict == "none":
         return f"Nothing is missing: the declared model explains the records down to their noise; {error}."
-    if loop.verdict == "found":
+    if loop.verdict == "found" and found:
         return f"{_capital(effects)}, {verb} missing; {error}."
-    if loop.verdict == "partly_explained":
-        return f"{_capital(effects)}, {verb} missing, but something else is too; {error}, noise alone would be 1."
+    if loop.verdict == "partly_explained" and found:
+        return f"{_capital(effects)}, {verb} missing, but something else is too; {error} (noise alone: 1)."
     known = f" even with {effects}" if found else ""
-    return f"Something is missing that no effect of the catalogue explains{known}; {error}, noise alone would be 1."
+    return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
+
+
+def _found(fit: Fit, finding: Finding) -> str:
+    others = [effect_words(name) for name in finding.indistinguishable if name != finding.effect]
+    words = f"{effect_words(finding.effect)}, {strength_words(fit, finding.effect)}"
+    return f"{words} (or {' or '.join(others)}, which these data cannot tell from it)" if others else words
 
 
 def _capital(text: str) -> str:
@@ -111,12 +127,12 @@ def finding_words(finding: Finding) -> tuple[str, ...]:
     chance = typeset_p_value(finding.p_value)
     chance = chance if chance.startswith("<") else f"= {chance}"
     lines = [
-        f"Adding it removes {typeset_share(finding.excess_explained)} of what the model left beyond the noise "
-        f"(family-wise p {chance})."
+        f"Adding it removes {typeset_share(finding.excess_explained)} of what the model left beyond the "
+        f"noise (family-wise p {chance})."
     ]
     if math.isfinite(finding.transfer):
         lines.append(
-            f"Fitted without some of the records, it removes {typeset_share(finding.transfer)} of their excess."
+            f"On data that its refit did not see, it removes {typeset_share(finding.transfer)} of the excess."
         )
     others = [name for name in finding.indistinguishable if name != finding.effect]
     if others:
@@ -137,7 +153,7 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
         A sentence each.
     """
     sigma = typeset_number(fit.noise.sigma, 3)
-    unit = {"acceleration": "m/s²", "velocity": "m/s", "displacement": "m"}[fit.campaign.output.quantity]
+    unit = typeset_unit(OUTPUT_UNITS[fit.campaign.output.quantity])
     lines = [f"Noise of the output: {sigma} {unit} rms, from {fit.noise.method.replace('_', ' ')}."]
     if fit.noise.note:
         lines.append(f"{_capital(fit.noise.note)}.")
@@ -151,7 +167,9 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
             + (f"; the worst: {examples}." if worst else ".")
         )
     if health.repeats:
-        lines.append(f"Repeats agree to {typeset_share(health.repeatability)} (median of {len(health.repeats)}).")
+        lines.append(
+            f"Repeats agree to {typeset_share(health.repeatability)} (median of {len(health.repeats)})."
+        )
     scatter = fit.stats.stiffness_scatter
     if math.isfinite(scatter):
         lines.append(f"The linear stiffness scatters by {typeset_share(scatter)} between records.")
@@ -169,7 +187,7 @@ def caveats(loop: Loop) -> tuple[str, ...]:
     """
     after = loop.after
     lines = [
-        f"Effects are named from a catalogue of {len(CATALOGUE)}; a cause outside it can only show as unexplained.",
+        f"Effects are named from a catalogue of {len(CATALOGUE)}; other causes can only show as unexplained.",
         "χ²/dof is measured against the noise of the output channel; an error in that noise scales it.",
     ]
     if after.errors["holdout"] is None:
@@ -185,7 +203,7 @@ def caveats(loop: Loop) -> tuple[str, ...]:
     jumps = after.errors["fit"]
     if jumps is not None and jumps.nrmse > 2.0 * jumps.nrmse_segments:
         lines.append(
-            "Free runs are far worse than restarted segments: near a fold a sweep may jump earlier or later than "
-            "its model. Judge by χ²/dof there."
+            "Free runs are far worse than restarted segments: near a fold a sweep may jump earlier or later "
+            "than its model. Judge by χ²/dof there."
         )
     return tuple(lines)

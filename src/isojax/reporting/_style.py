@@ -10,6 +10,9 @@ BEFORE = "#d1495b"
 AFTER = "#1f6fb2"
 NEUTRAL = "#9aa3ad"
 BAND = "#dfe6ec"
+CURVES = (3.0, 1.4)
+"""Widths of curves before and after, so that the one shows where it coincides with the other."""
+
 LEVELS = ("#0b3c6f", "#2a9d8f", "#e08e0b", "#a23b72", "#5f0f40", "#6b705c")
 """Colours of excitation levels, lowest first."""
 
@@ -37,8 +40,8 @@ def axes_for(ax: Axes | None, width: float = 7.0, height: float = 3.2) -> tuple[
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
     ax.tick_params(labelsize=8)
-    ax.xaxis.label.set_size(9)
-    ax.yaxis.label.set_size(9)
+    ax.xaxis.label.set_fontsize(9)
+    ax.yaxis.label.set_fontsize(9)
     return figure, ax
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from io import StringIO
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -10,7 +11,15 @@ from rich.text import Text
 from .._parameters import list_parameters, own_parameters
 from ..elements import CATALOGUE
 from ..identification import Candidate, Fit, Loop, Verdict
-from ._quantities import OUTPUT_UNITS, typeset_number, typeset_p_value, typeset_share, typeset_unit
+from ._quantities import (
+    OUTPUT_UNITS,
+    plain_unit,
+    typeset_goodness,
+    typeset_number,
+    typeset_p_value,
+    typeset_share,
+    typeset_unit,
+)
 from ._quantities import typeset_with_error as with_error
 from ._sentences import effect_words, finding_words, headline
 from ._style import ROLES
@@ -34,9 +43,9 @@ def render_text(content: RenderableType, width: int = 110) -> str:
 
 
 def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", header_style="dim")
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="dim", box=SIMPLE_HEAD)
     for place, column in enumerate(columns):
-        table.add_column(column, justify="left" if place == 0 else "right")
+        table.add_column(column, justify="right" if place else "left", no_wrap=place == 0)
     return table
 
 
@@ -58,7 +67,7 @@ def error_table(before: Fit, after: Fit) -> Table:
             errors = fit.errors[role]
             if errors is not None:
                 shares = (typeset_share(errors.nrmse), typeset_share(errors.nrmse_segments))
-                size, chi2 = typeset_number(errors.rmse, 3), typeset_number(errors.chi2_per_dof, 4)
+                size, chi2 = typeset_number(errors.rmse, 3), typeset_goodness(errors.chi2_per_dof)
                 table.add_row(words, label, size, *shares, chi2)
     return table
 
@@ -95,7 +104,8 @@ def parameter_words(fit: Fit, name: str) -> str:
     if name not in listed:
         return ""
     entry, error = listed[name], fit.standard_errors.get(name)
-    words = with_error(float(entry.value), float("nan") if error is None else error, entry.spec.unit)
+    unit = plain_unit(entry.spec.unit, fit.campaign.output.quantity)
+    words = with_error(float(entry.value), float("nan") if error is None else error, unit)
     if error is None:
         return f"{words} (fixed)"
     return words if error == error else f"{words} (not determined)"
@@ -114,10 +124,10 @@ def ranking_table(ranking: Sequence[Candidate]) -> Table:
     for one in ranking[:_MOST]:
         table.add_row(
             one.effect,
-            f"{one.z:.3g}",
+            typeset_number(one.z, 3),
             typeset_p_value(one.p_value),
             with_error(one.strength, one.strength_error, one.unit),
-            typeset_number(one.chi2_per_dof, 4),
+            typeset_goodness(one.chi2_per_dof),
             typeset_number(one.delta_bic, 3),
             "yes" if one.admissible else "no",
         )
@@ -166,11 +176,12 @@ def catalogue_table() -> Table:
     """Give the effects that isojax knows.
 
     Returns:
-        A table for rich: name, words, strength with its unit, internal states, whether the strength is signed.
+        A table for rich.
     """
-    table = _table("Effects", "name", "what it is", "strength", "unit", "states", "signed")
+    table = _table("Effects", "name", "strength", "unit", "states", "signed")
+    table.add_column("what it is")
     for name, kind in sorted(CATALOGUE.items()):
         spec = dict(own_parameters(kind))[kind.strength]
         states, signed = str(kind.internal_states), "yes" if kind.signed else "no"
-        table.add_row(name, kind.words, kind.strength, typeset_unit(spec.unit), states, signed)
+        table.add_row(name, kind.strength, spec.unit, states, signed, kind.words)
     return table

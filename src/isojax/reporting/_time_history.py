@@ -113,6 +113,7 @@ def plot_time_history(
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"{quantity} [{typeset_unit(OUTPUT_UNITS[quantity])}]")
     ax.set_xlim(low, high)
+    ax.margins(y=0.18)
     ax.legend(fontsize=8, loc="upper right", ncols=3)
     entitle(ax, f"{chosen.name} ({ROLES[chosen.role]})")
     return figure

@@ -1,0 +1,96 @@
+"""The closed loop with its report: what `isojax.close_loop` gives."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+from ..identification import ClassicalGuess, Finding, Fit, Loop
+from ..identification import close_loop as find_loop
+from ..records import Campaign
+from ._summary import loop_summary, render_text
+from ._write import write_report
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """From records to a model that explains them, or to the admission that it does not.
+
+    Attributes:
+        loop: all of it.
+    """
+
+    loop: Loop
+
+    @property
+    def before(self) -> Fit:
+        """The declared model, fitted."""
+        return self.loop.before
+
+    @property
+    def after(self) -> Fit:
+        """The final fit; the same as `before` where nothing was added."""
+        return self.loop.after
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The effects found, in the order of discovery."""
+        return self.loop.findings
+
+    @property
+    def verdict(self) -> str:
+        """Over all iterations: "none", "found", "partly_explained" or "unexplained"."""
+        return self.loop.verdict
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, str]]:
+        """For each effect not found: how large its strength could still be, with its unit."""
+        return self.loop.bounds
+
+    @property
+    def guess(self) -> ClassicalGuess:
+        """The classical start."""
+        return self.loop.guess
+
+    @property
+    def seconds(self) -> float:
+        """Wall time [s]."""
+        return self.loop.seconds
+
+    def report(self, folder: str | Path) -> None:
+        """Write report.html, result.json and model.json.
+
+        Args:
+            folder: where they go; made if it is not there.
+
+        Raises:
+            ValueError: if something else than a folder is in the way, or the model is not finite.
+        """
+        write_report(self.loop, folder)
+
+    def __str__(self) -> str:
+        """Give the summary that the terminal shows."""
+        return render_text(loop_summary(self.loop))
+
+
+def _silent(line: str) -> None:
+    """Take a line of progress and say nothing."""
+
+
+def close_loop(
+    campaign: Campaign, *, max_iterations: int = 3, progress: Callable[[str], None] = _silent
+) -> ClosedLoop:
+    """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
+
+    Args:
+        campaign: the measurements.
+        max_iterations: effects that may be added at most.
+        progress: told a line a step.
+
+    Returns:
+        The closed loop; `.report(folder)` writes it, `print` shows it.
+
+    Raises:
+        ValueError: if the campaign has no record to fit, or names an effect that is not in the catalogue.
+        RuntimeError: if JAX is not in 64-bit mode.
+    """
+    return ClosedLoop(find_loop(campaign, max_iterations=max_iterations, progress=progress))

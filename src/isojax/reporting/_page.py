@@ -1,0 +1,158 @@
+"""report.html: one page that holds everything, pictures included."""
+
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+
+from .._parameters import list_parameters
+from ..identification import Candidate, Loop
+from ..records import data_health
+from ._pictures import error_pictures, evidence_pictures, force_pictures, health_pictures, record_pictures
+from ._quantities import (
+    OUTPUT_UNITS,
+    plain_unit,
+    typeset_goodness,
+    typeset_number,
+    typeset_p_value,
+    typeset_share,
+    typeset_unit,
+)
+from ._quantities import typeset_with_error as with_error
+from ._sentences import caveats, effect_words, finding_words, headline, health_words
+from ._style import ROLES
+from ._summary import parameter_words
+
+_VERDICTS = {
+    "none": "nothing missing",
+    "found": "found",
+    "partly_explained": "partly explained",
+    "unexplained": "unexplained",
+}
+_MOST = 12
+
+
+def render_page(loop: Loop) -> str:
+    """Give report.html: self-contained, no script, no outside resource.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The page.
+    """
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    source = files("isojax.reporting").joinpath("report.html.jinja").read_text(encoding="utf-8")
+    return environment.from_string(source).render(_content(loop))
+
+
+def _content(loop: Loop) -> dict[str, Any]:
+    before, after = loop.before, loop.after
+    same = before is after
+    campaign = loop.campaign
+    quantity = campaign.output.quantity
+    return {
+        "title": campaign.title,
+        "verdict": loop.verdict,
+        "verdict_words": _VERDICTS[loop.verdict],
+        "headline": headline(loop),
+        "reason": loop.last.reason,
+        "same": same,
+        "findings": [
+            {
+                "effect": one.effect,
+                "words": effect_words(one.effect),
+                "lines": finding_words(one),
+                "ranking": [_candidate(candidate, quantity) for candidate in one.ranking[:_MOST]],
+            }
+            for one in loop.findings
+        ],
+        "last_ranking": [_candidate(candidate, quantity) for candidate in loop.last.ranking[:_MOST]],
+        "unit": typeset_unit(OUTPUT_UNITS[quantity]),
+        "errors": _errors(loop),
+        "parameters": [
+            (
+                entry.name,
+                entry.spec.symbol,
+                parameter_words(before, entry.name),
+                parameter_words(after, entry.name),
+            )
+            for entry in list_parameters(after.model)
+        ],
+        "bounds": [
+            (
+                effect,
+                effect_words(effect),
+                f"{typeset_number(upper, 3)} {typeset_unit(plain_unit(unit, quantity))}",
+            )
+            for effect, (upper, unit) in loop.bounds.items()
+        ],
+        "facts": _facts(loop),
+        "health": health_words(data_health(campaign), after),
+        "guess_notes": loop.guess.notes,
+        "caveats": caveats(loop),
+        "fit_report_before": str(before),
+        "fit_report_after": str(after),
+        "error_pictures": error_pictures(loop),
+        "evidence_pictures": evidence_pictures(loop),
+        "record_pictures": record_pictures(loop),
+        "force_pictures": force_pictures(loop),
+        "health_pictures": health_pictures(loop),
+        "version": version("isojax"),
+        "seconds": f"{loop.seconds:.0f}",
+    }
+
+
+def _facts(loop: Loop) -> list[tuple[str, str]]:
+    campaign = loop.campaign
+    length = sum(record.time.size for record in campaign.records) / campaign.rate
+    levels = sorted({record.level for record in campaign.records if record.level is not None})
+    kinds = sorted({record.kind.replace("_", " ") for record in campaign.records})
+    facts = [
+        ("isolated mass", f"{campaign.mass:g} kg"),
+        ("input", campaign.input.quantity.replace("_", " ")),
+        ("output", campaign.output.quantity),
+        ("records", f"{len(campaign.fit_records)} fitted, {len(campaign.holdout_records)} held out"),
+        ("length", f"{length:.0f} s at {campaign.rate:g} Hz"),
+        ("excitation", ", ".join(kinds)),
+    ]
+    if levels:
+        facts.append(("levels", ", ".join(f"{level:g}" for level in levels)))
+    return facts
+
+
+def _errors(loop: Loop) -> list[dict[str, str]]:
+    rows = (
+        (("", loop.before),)
+        if loop.before is loop.after
+        else (("before", loop.before), ("after", loop.after))
+    )
+    return [
+        {
+            "role": words,
+            "label": label,
+            "rmse": typeset_number(errors.rmse, 3),
+            "nrmse": typeset_share(errors.nrmse),
+            "nrmse_segments": typeset_share(errors.nrmse_segments),
+            "chi2_per_dof": typeset_goodness(errors.chi2_per_dof),
+        }
+        for role, words in ROLES.items()
+        for label, fit in rows
+        if (errors := fit.errors[role]) is not None
+    ]
+
+
+def _candidate(one: Candidate, quantity: str) -> dict[str, Any]:
+    return {
+        "effect": one.effect,
+        "words": effect_words(one.effect),
+        "z": typeset_number(one.z, 3),
+        "p": typeset_p_value(one.p_value),
+        "strength": with_error(one.strength, one.strength_error, plain_unit(one.unit, quantity)),
+        "visibility": typeset_share(one.visibility),
+        "chi2_per_dof": typeset_goodness(one.chi2_per_dof),
+        "delta_bic": typeset_number(one.delta_bic, 3),
+        "likeness": f"{one.likeness:.2f}",
+        "admissible": one.admissible,
+    }

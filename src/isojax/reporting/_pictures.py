@@ -1,0 +1,240 @@
+"""The pictures of the report, drawn and encoded."""
+
+import base64
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .._results import is_successful
+from ..identification import Fit, Loop, residual
+from ._classical import centre_frequency, plot_equivalent, plot_receptance, visited_amplitudes
+from ._cycles import trace_cycles
+from ._evidence import plot_errors, plot_ranking, plot_stiffness_scatter
+from ._forces import effect_on_its_own, measured_forces, plot_effect, plot_restoring_force
+from ._residuals import plot_correlation, plot_cycle_residual, plot_residual, plot_where
+from ._time_history import plot_time_history, worst_window
+
+_DPI = 144
+_HALF, _WHOLE, _HEIGHT = 5.4, 11.0, 3.1
+
+
+class Picture(NamedTuple):
+    """A picture in the report.
+
+    Attributes:
+        name: what it shows, a few words.
+        caption: how to read it.
+        data: PNG as base64.
+        wide: whether it takes the whole width.
+    """
+
+    name: str
+    caption: str
+    data: str
+    wide: bool = False
+
+
+def encode(figure: Figure) -> str:
+    """Give a figure as PNG in base64.
+
+    Args:
+        figure: the figure.
+
+    Returns:
+        The text.
+    """
+    page = BytesIO()
+    figure.savefig(page, format="png", dpi=_DPI)
+    return base64.b64encode(page.getvalue()).decode("ascii")
+
+
+def _draw(
+    name: str,
+    caption: str,
+    plot: Callable[..., Figure | None],
+    *args: Any,
+    wide: bool = False,
+    **options: Any,
+) -> tuple[Picture, ...]:
+    """Draw one picture; none where there is nothing to draw."""
+    size = (_WHOLE if wide else _HALF, _HEIGHT)
+    ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
+    figure = plot(*args, ax=ax, **options)
+    return () if figure is None else (Picture(name, caption, encode(figure), wide),)
+
+
+def error_pictures(loop: Loop) -> tuple[Picture, ...]:
+    """Draw the errors before and after.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The pictures.
+    """
+    before, after = _models(loop)
+    if before is None:
+        return ()
+    goodness = "Segments restarted, over the noise. One is all that noise allows."
+    free = "Each record simulated from start to end, nothing fed back."
+    return (
+        *_draw("goodness of fit", goodness, plot_errors, before, after),
+        *_draw("free-run error", free, plot_errors, before, after, measure="nrmse"),
+    )
+
+
+def evidence_pictures(loop: Loop) -> tuple[Picture, ...]:
+    """Draw the ranking behind each finding, or behind the verdict, and the effects by themselves.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The pictures.
+    """
+    caption = "Score of each absent effect, what a refit would absorb projected out; χ²/dof where refitted."
+    rankings = [(one.ranking, one.effect, one.indistinguishable) for one in loop.findings]
+    if not rankings:
+        rankings = [(loop.last.ranking, None, ())]
+    pictures: list[Picture] = []
+    for ranking, effect, others in rankings:
+        if ranking:
+            name = "ranking" if effect is None else f"ranking that found {effect}"
+            figure = plot_ranking(
+                ranking,
+                effect=effect,
+                indistinguishable=others,
+                ax=Figure(
+                    figsize=(_WHOLE, 1.3 + 0.27 * min(10, max(3, len(ranking)))), layout="constrained"
+                ).add_subplot(),
+            )
+            pictures.append(Picture(name, caption, encode(figure), True))
+    before, after = _models(loop)
+    if before is not None:
+        caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force stays."
+        pictures += _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
+    return tuple(pictures) + _effect_pictures(loop)
+
+
+def _effect_pictures(loop: Loop) -> tuple[Picture, ...]:
+    lowest, highest, frequency = _motion(loop)
+    pictures: tuple[Picture, ...] = ()
+    for finding in loop.findings if is_successful(loop.after.result) else ():
+        own = effect_on_its_own(loop.after.model, finding.effect)
+        if np.any(trace_cycles(own, np.array([highest]), frequency).force):
+            caption = "The force it adds around one cycle, at the smallest and the largest visited amplitude."
+            pictures += _draw(
+                finding.effect, caption, plot_effect, loop.after, finding.effect, (lowest, highest), frequency
+            )
+    return pictures
+
+
+def _motion(loop: Loop) -> tuple[float, float, float]:
+    """Give smallest and largest displacement amplitude [m] and a typical frequency [Hz]."""
+    if loop.guess.responses:
+        return *visited_amplitudes(loop.guess), centre_frequency(loop.guess)
+    parts = [measured_forces(loop.before, record)[:2] for record in loop.campaign.fit_records]
+    sizes = [float(np.sqrt(2.0) * np.std(x)) for x, _ in parts]
+    frequencies = [float(np.std(v) / np.std(x) / (2.0 * np.pi)) for x, v in parts]
+    return min(sizes), max(sizes), float(np.mean(frequencies))
+
+
+def record_pictures(loop: Loop) -> tuple[Picture, ...]:
+    """Draw the worst record against the models, and what they leave.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The pictures.
+    """
+    before, after = _models(loop)
+    if before is None:
+        return ()
+    place, low, high = worst_window(before)
+    caption = "Free run, nothing fed back; the record on which the model before is worst."
+    zoomed = "The same, at the cycles where the model before is worst."
+    left, right = residual(before), None if after is None else residual(after)
+    return (
+        *_draw("time history", caption, plot_time_history, before, after, record=place, wide=True),
+        *_draw("zoom", zoomed, plot_time_history, before, after, record=place, window=(low, high)),
+        *_draw(
+            "residual there",
+            "Measured less model.",
+            plot_residual,
+            before,
+            after,
+            record=place,
+            window=(low, high),
+        ),
+        *_draw(
+            "where the model errs",
+            "One is the noise. A trend over frequency is a hint.",
+            plot_where,
+            before,
+            after,
+        ),
+        *_draw("residual", "Whole record, one scale.", plot_residual, before, after, record=place),
+        *_draw("autocorrelation", "Fitted records; white noise stays inside.", plot_correlation, left, right),
+        *_draw(
+            "cross-correlation", "Inside the band: nothing of the drive is left in it.", plot_correlation, left, right, what="drive"
+        ),
+    )
+
+
+def force_pictures(loop: Loop) -> tuple[Picture, ...]:
+    """Draw the force laws of the models beside what the classical route sees.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The pictures.
+    """
+    before, after = _models(loop)
+    guess = loop.guess
+    fits = [(label, fit) for label, fit in (("before", before), ("after", after)) if fit is not None]
+    pictures: tuple[Picture, ...] = ()
+    if guess.responses or guess.linear:
+        caption = "Displacement over the measured force, by level and sweep direction."
+        pictures += _draw("receptance", caption, plot_receptance, guess)
+    if guess.responses and fits:
+        caption = "Free resonance of the fitted model over amplitude, through the measured curves."
+        pictures += _draw("backbone", caption, plot_receptance, guess, what="displacement", fits=fits)
+        caption = "Models by harmonic balance; marks are the classical route, exact only for light damping."
+        for what in ("stiffness", "damping"):
+            pictures += _draw(f"equivalent {what}", caption, plot_equivalent, guess, fits, what=what)
+    if before is not None:
+        caption = "Drive less inertia; models with memories at rest. Beyond the visited range: extrapolation."
+        for what in ("stiffness", "damping"):
+            pictures += _draw(
+                f"restoring force, {what}", caption, plot_restoring_force, before, after, what=what
+            )
+    return pictures
+
+
+def health_pictures(loop: Loop) -> tuple[Picture, ...]:
+    """Draw how the stiffness scatters between records.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The pictures.
+    """
+    before, after = _models(loop)
+    if before is None or not np.any(before.restarts.stiffness):
+        return ()
+    caption = "Scatter is data health; a trend in the order of the test is drift."
+    return _draw("stiffness of each record", caption, plot_stiffness_scatter, before, after, wide=True)
+
+
+def _models(loop: Loop) -> tuple[Fit | None, Fit | None]:
+    """Give the fits that can be drawn: before, and after where it is another and succeeded."""
+    before = loop.before if is_successful(loop.before.result) else None
+    differs = loop.after is not loop.before and is_successful(loop.after.result)
+    return before, loop.after if differs else None

@@ -1,0 +1,116 @@
+"""Eliminating nuisances gives exactly what a dense least squares over everything gives."""
+
+import numpy as np
+import pytest
+
+from isojax.identification._elimination import Nuisances, eliminate, step_nuisances
+from isojax.identification._information import STIFFNESS_SCALE_UNIT
+
+NOISE, SPREAD = 0.3, 2e-3
+COLUMNS, STATES, SAMPLES = 3, 2, 40
+OWNER = np.array([0, 0, 1, 1, 1, 0])
+USED, RECORDS = 5, 2
+
+
+def _blocks(has_scale):
+    """One matrix of columns a lane: coefficients, stiffness scale, states, residual."""
+    rng = np.random.default_rng(3)
+    width = COLUMNS + has_scale + STATES + 1
+    blocks = rng.standard_normal((OWNER.size, SAMPLES, width))
+    blocks[:, :, COLUMNS] *= 0.02
+    return blocks
+
+
+def _dense(blocks, has_scale, nuisances):
+    """Stack every sample and every prior as a row; unknowns: coefficients, scales, states of each lane."""
+    scales = RECORDS if has_scale else 0
+    unknowns = COLUMNS + scales + USED * STATES
+    rows, right, owner = [], [], []
+    for lane in range(USED):
+        block = blocks[lane] / NOISE
+        part = np.zeros((SAMPLES, unknowns))
+        part[:, :COLUMNS] = block[:, :COLUMNS]
+        if has_scale:
+            part[:, COLUMNS + OWNER[lane]] = block[:, COLUMNS]
+        first = COLUMNS + scales + lane * STATES
+        part[:, first : first + STATES] = block[:, COLUMNS + has_scale : -1]
+        rows.append(part)
+        right.append(block[:, -1])
+        prior = np.zeros((STATES, unknowns))
+        prior[:, first : first + STATES] = np.eye(STATES)
+        rows.append(prior)
+        right.append(-nuisances.states[lane])
+        owner += [OWNER[lane]] * (SAMPLES + STATES)
+    for record in range(scales):
+        prior = np.zeros((1, unknowns))
+        prior[0, COLUMNS + record] = STIFFNESS_SCALE_UNIT / SPREAD
+        rows.append(prior)
+        right.append(-nuisances.stiffness[[record]] * STIFFNESS_SCALE_UNIT / SPREAD)
+        owner.append(record)
+    return np.concatenate(rows), np.concatenate(right), np.array(owner)
+
+
+@pytest.fixture(params=[True, False], ids=["spring", "no spring"])
+def setting(request):
+    has_scale = request.param
+    rng = np.random.default_rng(8)
+    nuisances = Nuisances(rng.standard_normal((OWNER.size, STATES)), rng.standard_normal(RECORDS), SPREAD)
+    blocks = _blocks(has_scale)
+    matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)
+    reduced = eliminate(matrices, NOISE, OWNER, USED, RECORDS, COLUMNS, has_scale, nuisances)
+    rows, right, owner = _dense(blocks, has_scale, nuisances)
+    return reduced, nuisances, has_scale, rows, right, owner
+
+
+def test_reduced_equations_are_the_schur_complement_of_the_dense_ones(setting):
+    reduced, _, _, rows, right, owner = setting
+    outer, inner = rows[:, :COLUMNS], rows[:, COLUMNS:]
+    table = np.concatenate([outer, right[:, None]], axis=1)
+    for record in range(RECORDS):
+        mine = owner == record
+        part = inner[mine]
+        left = table[mine] - part @ np.linalg.lstsq(part, table[mine], rcond=None)[0]
+        np.testing.assert_allclose(reduced.by_record[record], left.T @ left, rtol=1e-9, atol=1e-9)
+
+
+def test_a_step_of_coefficients_and_nuisances_is_that_of_dense_least_squares(setting):
+    reduced, nuisances, has_scale, rows, right, _ = setting
+    solution = np.linalg.lstsq(rows, right, rcond=None)[0]
+    step = np.linalg.solve(reduced.matrix[:-1, :-1], reduced.matrix[:-1, -1])
+    np.testing.assert_allclose(step, solution[:COLUMNS], rtol=1e-9)
+    moved = step_nuisances(reduced, OWNER, nuisances, step)
+    scales = RECORDS if has_scale else 0
+    if has_scale:
+        np.testing.assert_allclose(
+            moved.stiffness - nuisances.stiffness, solution[COLUMNS : COLUMNS + scales], rtol=1e-9
+        )
+    states = (moved.states - nuisances.states)[:USED].ravel()
+    np.testing.assert_allclose(states, solution[COLUMNS + scales :], rtol=1e-8, atol=1e-10)
+    np.testing.assert_array_equal(moved.states[USED:], nuisances.states[USED:])
+
+
+def test_eliminated_degrees_of_freedom_are_those_of_the_dense_projection(setting):
+    reduced, _, has_scale, rows, _, owner = setting
+    inner = rows[:, COLUMNS:]
+    hat = inner @ np.linalg.pinv(inner)
+    priors = np.zeros(rows.shape[0], dtype=bool)
+    for lane in range(USED):
+        first = lane * (SAMPLES + STATES) + SAMPLES
+        priors[first : first + STATES] = True
+    if has_scale:
+        priors[-RECORDS:] = True
+    for record in range(RECORDS):
+        taken = np.diag(hat)[~priors & (owner == record)].sum()
+        # The stiffness scale is eliminated after the states, each with what its prior has left of it.
+        assert reduced.eliminated[record] == pytest.approx(taken, rel=2e-2)
+
+
+def test_variance_of_the_stiffness_scale_is_that_of_the_dense_inverse(setting):
+    reduced, _, has_scale, rows, _, _ = setting
+    if not has_scale:
+        assert not reduced.stiffness_variance.any()
+        return
+    inner = rows[:, COLUMNS:]
+    covariance = np.linalg.inv(inner.T @ inner)
+    wanted = np.diag(covariance)[:RECORDS] * STIFFNESS_SCALE_UNIT**2
+    np.testing.assert_allclose(reduced.stiffness_variance, wanted, rtol=1e-9)

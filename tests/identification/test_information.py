@@ -1,0 +1,247 @@
+"""The information that segments hold is that of a dense Jacobian of an independent simulation."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from isojax._parameters import list_parameters, replace_parameters
+from isojax.elements import (
+    AddedMass,
+    BoucWen,
+    CoulombFriction,
+    CubicDamping,
+    CubicStiffness,
+    DahlFriction,
+    InputDelay,
+    InputGain,
+    InputOffset,
+    LinearDamping,
+    LinearStiffness,
+    MaxwellBranch,
+    PositionDamping,
+    QuadraticStiffness,
+    SensorGain,
+    SensorOffset,
+)
+from isojax.excitations import Sampled
+from isojax.identification._batch import Prepared, prepare
+from isojax.identification._columns import column_information
+from isojax.identification._information import STIFFNESS_SCALE_UNIT, Unknowns, information, readings
+from isojax.identification._problem import one_hot
+from isojax.identification._segments import Segment
+from isojax.models import Integrator, Isolator, simulate
+from isojax.records import Record
+
+RATE = 500.0
+SPRING = (LinearStiffness(1.08e6), CubicStiffness(2.5e11), LinearDamping(1.0e4))
+
+
+def _records(lengths, amplitude=120.0):
+    """Two tones that fade in and out, and a reading that belongs to no model: residuals must not vanish."""
+    rng = np.random.default_rng(5)
+    records = []
+    for place, length in enumerate(lengths):
+        time = np.arange(length) / RATE
+        fade = np.sin(0.5 * np.pi * np.clip(10.0 * np.minimum(time, time[-1] - time), 0.0, 1.0)) ** 6
+        tones = np.sin(2 * np.pi * 5.3 * time + place) + 0.4 * np.sin(2 * np.pi * 8.1 * time)
+        drive = amplitude * fade * tones
+        output = 0.2 * rng.standard_normal(length)
+        records.append(Record(f"r{place}", Path("r.npz"), time, RATE, drive, output, drive, output))
+    return tuple(records)
+
+
+class Case(NamedTuple):
+    model: Isolator
+    quantity: str = "acceleration"
+    hold: str = "band_limited"
+    amplitude: float = 120.0
+
+
+CASES = {
+    "friction": Case(Isolator(800.0, (*SPRING, CoulombFriction(8.0, 2e-3)))),
+    "maxwell": Case(Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))), hold="linear"),
+    "hysteresis": Case(Isolator(800.0, (*SPRING, BoucWen(1e5, 800.0, -300.0, 1.0), DahlFriction(5.0, 2e-4)))),
+    "delay": Case(Isolator(800.0, (*SPRING, InputDelay(7e-4)))),
+    "instruments": Case(
+        Isolator(800.0, (*SPRING, InputGain(0.1), InputOffset(9.0), SensorGain(-0.05), SensorOffset(0.02))),
+        quantity="displacement",
+    ),
+    "base excitation": Case(
+        Isolator(800.0, (*SPRING, AddedMass(20.0), SensorGain(0.03)), "base_acceleration"), amplitude=0.15
+    ),
+    "no spring": Case(Isolator(800.0, (LinearDamping(1.0e4),)), quantity="velocity", hold="zero_order"),
+}
+
+
+def _setting(case: Case) -> tuple[Prepared, Unknowns, tuple[int, ...]]:
+    records = _records((300, 220), case.amplitude)
+    model = case.model
+    segments = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0))
+    prepared = prepare(
+        records,
+        segments,
+        quantity=case.quantity,
+        hold=case.hold,
+        substeps=model.substeps,
+        shift=float(model.shift()),
+        based=model.excitation == "base_acceleration",
+    )
+    listed = list_parameters(model)
+    places = tuple(place for place, entry in enumerate(listed) if entry.spec.fitted or entry.name == "mass")
+    sizes = [0.1 * abs(float(listed[place].value)) for place in places]
+    lanes, states = prepared.record.size, 2 + model.internal_states
+    inner = [0.1 if element.name == "dahl_friction" else 5e-5 for element in model.elements if element.internal_states]
+    scales = np.ones((states, lanes)) * np.array([1e-4, 3e-3, *inner])[:, None]
+    start = 0.7 * scales
+    factor = np.linspace(1.01, 0.99, lanes)
+    return prepared, Unknowns(model, one_hot(model, places, sizes), factor, start, scales), places
+
+
+def _columns(case: Case, unknowns: Unknowns, lane: int, length: int) -> np.ndarray:
+    """Dense central differences of `models.simulate`, one column an unknown, the residual last."""
+    record = _records((300, 220), case.amplitude)[lane]
+    model = unknowns.model
+    listed = list_parameters(model)
+    stiffness = [entry.name for entry in listed].index("linear_stiffness.coefficient") if (
+        model.element("linear_stiffness") is not None
+    ) else None
+    columns = unknowns.directions.shape[1]
+
+    def reading(steps):
+        numbers = [entry.value for entry in listed]
+        moved = unknowns.directions @ steps[:columns]
+        numbers = [number + moved[place] for place, number in enumerate(numbers)]
+        if stiffness is not None:
+            factor = unknowns.stiffness_scale[lane] + STIFFNESS_SCALE_UNIT * steps[columns]
+            numbers[stiffness] = numbers[stiffness] * factor
+        inner = steps[columns + (stiffness is not None) :]
+        start = [
+            unknowns.states[index, lane] + unknowns.state_scales[index, lane] * inner[index]
+            for index in range(unknowns.states.shape[0])
+        ]
+        run = simulate(
+            replace_parameters(model, numbers),
+            Sampled(record.input, RATE, case.hold),
+            duration=(length - 1) / RATE,
+            rate=RATE,
+            initial_state=start,
+            quantity=case.quantity,
+            integrator=Integrator(substeps=model.substeps),
+        )
+        return run.reading
+
+    count = columns + (stiffness is not None) + unknowns.states.shape[0]
+    step = 1e-4
+    sides = [np.asarray(reading(sign * step * unit)) for unit in np.eye(count) for sign in (1.0, -1.0)]
+    slopes = [(up - down) / (2.0 * step) for up, down in zip(sides[::2], sides[1::2], strict=True)]
+    left = record.output[:length] - np.asarray(reading(np.zeros(count)))
+    return np.stack([*slopes, left], axis=1)
+
+
+def _deviation(found: np.ndarray, wanted: np.ndarray) -> float:
+    size = np.sqrt(np.maximum(np.diag(wanted), 1e-20))
+    return float(np.max(np.abs(found - wanted) / np.outer(size, size)))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_information_is_that_of_a_dense_jacobian(name):
+    case = CASES[name]
+    prepared, unknowns, _ = _setting(case)
+    found = information(unknowns, prepared)
+    for lane, (length, counted) in enumerate(((300, 40), (220, 0))):
+        dense = _columns(case, unknowns, lane, length)[counted:]
+        wanted = dense.T @ dense
+        assert _deviation(found[lane], wanted) < 3e-6
+
+
+@pytest.mark.parametrize("name", ["friction", "delay", "base excitation"])
+def test_information_follows_central_differences(name):
+    case = CASES[name]
+    prepared, unknowns, places = _setting(case)
+    gram = information(unknowns, prepared)[0]
+    listed = list_parameters(unknowns.model)
+    base = case.model
+    for column, place in enumerate(places):
+        size = unknowns.directions[place, column]
+        sides = []
+        for sign in (1.0, -1.0):
+            numbers = [entry.value for entry in listed]
+            numbers[place] = numbers[place] + sign * 1e-4 * size
+            model = replace_parameters(base, numbers)
+            again = prepare(
+                _records((300, 220), case.amplitude),
+                prepared.segments,
+                quantity=case.quantity,
+                hold=case.hold,
+                substeps=base.substeps,
+                shift=float(model.shift()),
+                based=model.excitation == "base_acceleration",
+            )
+            sides.append(readings(model, unknowns.stiffness_scale, unknowns.states, again)[40:300, 0])
+        slope = (sides[0] - sides[1]) / 2e-4
+        assert gram[column, column] == pytest.approx(np.sum(slope**2), rel=1e-5)
+
+
+def test_samples_that_do_not_count_add_nothing():
+    prepared, unknowns, _ = _setting(CASES["maxwell"])
+    whole = information(unknowns, prepared)
+    records = _records((300, 220))
+    spoiled = tuple(
+        Record(r.name, r.file, r.time, r.rate, r.input, r.output + 1e3 * (np.arange(r.output.size) < 40), r.input, r.output)
+        for r in records[:1]
+    ) + records[1:]
+    again = prepare(spoiled, prepared.segments, quantity="acceleration", hold="linear", substeps=1)
+    np.testing.assert_allclose(information(unknowns, again), whole, rtol=1e-10, atol=1e-6)
+
+
+PROBES = (
+    QuadraticStiffness(0.0),
+    CubicDamping(0.0),
+    PositionDamping(0.0),
+    CoulombFriction(0.0, 1e-2),
+    MaxwellBranch(0.0, 0.03),
+    MaxwellBranch(0.0, 0.1),
+    BoucWen(0.0, 2e3, -1e3, 1.0),
+    AddedMass(0.0),
+    InputDelay(0.0),
+    InputGain(0.0),
+    InputOffset(0.0),
+    SensorGain(0.0),
+    SensorOffset(0.0),
+)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        Isolator(800.0, (*SPRING,)),
+        Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))),
+        Isolator(800.0, (LinearDamping(1e4), CubicStiffness(2e13)), "base_acceleration"),
+    ],
+    ids=["spring", "memory", "base excitation"],
+)
+def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
+    probes = tuple(probe for probe in PROBES if model.element(probe.name) is None)
+    full = model.with_elements(*probes)
+    amplitude = 120.0 if model.excitation == "force" else 0.15
+    prepared, unknowns, _ = _setting(Case(model, amplitude=amplitude))
+    names = [entry.name for entry in list_parameters(full)]
+    wanted = [name for name in names if name.split(".")[-1] in ("coefficient", "stiffness", "force_level")]
+    wanted += [name for name in names if name.split(".")[-1] in ("delay", "deviation", "offset")]
+    places = [names.index(name) for name in wanted]
+    sizes = [1e-3 * max(1.0, float(list_parameters(full)[place].value)) for place in places]
+    lanes, own, states = prepared.record.size, 2 + model.internal_states, 2 + full.internal_states
+    start = np.zeros((states, lanes))
+    start[:own] = unknowns.states
+    scales = np.ones((states, lanes))
+    scales[:own] = unknowns.state_scales
+    moved = Unknowns(full, one_hot(full, places, sizes), unknowns.stiffness_scale, start, scales)
+    exact = information(moved, prepared)
+    first = len(places) + (model.element("linear_stiffness") is not None)
+    keep = np.r_[0 : first + own, first + states]
+    found = column_information(moved, len(model.elements), prepared)
+    for lane in range(2):
+        reference = exact[lane][np.ix_(keep, keep)]
+        assert _deviation(found[lane], reference) < 1e-4

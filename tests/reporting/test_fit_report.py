@@ -1,0 +1,78 @@
+"""The fit report: layout of lmfit, and what a reader is warned of."""
+
+import dataclasses
+
+import numpy as np
+
+from isojax import RESULTS
+from isojax.identification import uncertainty
+
+
+def with_uncertainty(fit, matrix):
+    found = fit.estimate._replace(uncertainty=uncertainty(matrix))
+    return fit._replace(estimate=found)
+
+
+def test_report_gives_value_error_and_start_of_every_coefficient(found):
+    fit = found.after
+    report = str(fit)
+    for place, name in enumerate(fit.free):
+        line = next(line for line in report.splitlines() if line.strip().startswith(f"{name}:"))
+        value, error = float(fit.model[name]), float(np.sqrt(fit.covariance[place, place]))
+        assert f"{value:.6g}" in line
+        assert f"+/- {error:.3g}" in line
+        assert "(init = " in line
+    assert "800          kg (fixed)" in report
+    assert f"{fit.stats.bic:.8g}" in report
+    assert "successful" in report
+    assert "[[Warnings]]" not in report
+
+
+def test_report_lists_strong_correlations_only(found):
+    lines = [line for line in str(found.before).splitlines() if line.strip().startswith("C(")]
+    sizes = [abs(float(line.rpartition("=")[2])) for line in lines]
+    assert lines
+    assert min(sizes) >= 0.9
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_report_names_partners_that_the_data_cannot_part(found):
+    count = len(found.before.free)
+    matrix = np.eye(count)
+    matrix[0, 1] = matrix[1, 0] = 1.0
+    report = str(with_uncertainty(found.before, matrix))
+    first, second = found.before.free[:2]
+    assert f"{first}, {second} are not determined apart" in report
+    assert report.count("+/- unknown") == 2
+
+
+def test_report_names_a_coefficient_without_a_trace(found):
+    matrix = np.eye(len(found.before.free))
+    matrix[3, 3] = 0.0
+    report = str(with_uncertainty(found.before, matrix))
+    assert f"{found.before.free[3]} is not determined: the data hold no trace of it" in report
+
+
+def test_report_names_a_coefficient_at_its_bound_or_unmoved(found):
+    standing = found.after.model.replace(coulomb_friction__force_level=0.0)
+    report = str(found.after._replace(model=standing, start=standing))
+    assert "coulomb_friction.force_level is at its bound of 0 N" in report
+    assert "linear_stiffness.coefficient never moved" in report
+
+
+def test_report_of_an_extended_model_marks_what_was_added(found):
+    report = str(found.after._replace(start=found.before.model))
+    line = next(line for line in report.splitlines() if "coulomb_friction.force_level:" in line)
+    assert "(added)" in line
+
+
+def test_report_says_why_a_search_failed(found):
+    report = str(found.after._replace(result=RESULTS.not_converged))
+    assert RESULTS[RESULTS.not_converged] in report
+
+
+def test_report_shows_integration_error_where_it_is_known(found):
+    stats = found.after.stats._replace(integration_error=0.012)
+    assert "0.012 of the noise when halved" in str(found.after._replace(stats=stats))
+    quiet = dataclasses.replace(found.campaign, records=found.campaign.fit_records)
+    assert "0 held out" in str(found.after._replace(campaign=quiet))

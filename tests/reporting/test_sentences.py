@@ -1,0 +1,60 @@
+import pytest
+
+from isojax.records import data_health
+from isojax.reporting import render_text, verdict_summary
+from isojax.reporting._sentences import caveats, finding_words, headline, health_words
+
+
+@pytest.mark.parametrize(
+    ("verdict", "start"),
+    [
+        ("found", "Dry (Coulomb) friction, Fc = "),
+        ("partly_explained", "Dry (Coulomb) friction, Fc = "),
+        (
+            "unexplained",
+            "Something is missing that no known effect explains even with dry (Coulomb) friction",
+        ),
+    ],
+)
+def test_headline_says_what_the_verdict_says(found, verdict, start):
+    sentence = headline(found._replace(verdict=verdict))
+    assert sentence.startswith(start)
+    assert ("something else is too" in sentence) == (verdict == "partly_explained")
+    assert sentence.endswith(".")
+
+
+def test_headline_without_findings_names_nothing(found):
+    alone = found._replace(extensions=(), after=found.before)
+    assert headline(alone._replace(verdict="none")).startswith("Nothing is missing")
+    for verdict in ("partly_explained", "unexplained"):
+        sentence = headline(alone._replace(verdict=verdict))
+        assert sentence.startswith("Something is missing that no known effect explains; held-out χ²/dof")
+        assert "→" not in sentence
+
+
+def test_finding_without_rivals_asks_for_no_experiment(found):
+    alone = found.findings[0]._replace(indistinguishable=("coulomb_friction",), transfer=0.9)
+    lines = finding_words(alone)
+    assert not any("cannot tell" in line or "part them" in line for line in lines)
+    assert any("90.0 %" in line for line in lines)
+
+
+def test_caveats_name_what_is_declared_and_what_is_hidden(found):
+    text = " ".join(caveats(found))
+    assert "coulomb_friction.width = 1.00×10⁻⁴ m/s is declared, not fitted" in text
+    assert "additional moving mass" in text
+    assert "No record was held out" not in text
+
+
+def test_health_counts_dwells_and_gives_the_noise(found):
+    text = " ".join(health_words(data_health(found.campaign), found.after))
+    dwells = sum(len(record.dwells) for record in found.campaign.records)
+    assert f"of {dwells} dwells never settled" in text
+    assert f"{found.after.noise.sigma:.5f} m/s² rms" in text
+
+
+def test_diagnosis_prints_verdict_reason_and_ranking(found):
+    text = render_text(verdict_summary(found.extensions[0].verdict))
+    assert text.startswith("found: dry (Coulomb) friction")
+    assert "It fits." in text
+    assert "bouc_wen" in text

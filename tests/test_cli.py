@@ -1,0 +1,122 @@
+"""The command line, in this process; the demo from end to end."""
+
+import json
+import shutil
+import subprocess
+import sys
+from importlib.metadata import version
+
+import pytest
+
+import isojax
+from isojax._cli import main
+from isojax.demo import campaign_folder
+
+
+def test_effects_lists_the_whole_catalogue_unabridged(capsys):
+    assert main(["effects"]) == 0
+    text = capsys.readouterr().out
+    for name, kind in isojax.CATALOGUE.items():
+        line = next(line for line in text.splitlines() if line.split()[:1] == [name])
+        assert kind.strength in line
+
+
+def test_version_is_that_of_the_package(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"isojax {version('isojax')}\n"
+    assert isojax.__version__ == version("isojax")
+
+
+@pytest.mark.parametrize("command", ["close-loop", "fit"])
+def test_bad_campaign_ends_with_code_two_one_line_and_no_file(command, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main([command, str(tmp_path / "missing"), "--out", str(out)]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert len(shown.err.splitlines()) == 1
+    assert shown.err.startswith("isojax: ")
+    assert "missing" in shown.err
+    assert not out.exists()
+
+
+def test_bad_row_of_a_data_file_is_named_and_nothing_is_written(tmp_path, capsys):
+    (tmp_path / "campaign.toml").write_text(
+        '[campaign]\ntitle = "t"\nmass = 1.0\n'
+        '[input]\nquantity = "force"\ncolumn = "f"\nunit = "N"\n'
+        '[output]\nquantity = "acceleration"\ncolumn = "a"\nunit = "m/s^2"\n'
+        '[sampling]\nrate = 100.0\n[model]\nstiffness = ["linear"]\ndamping = ["linear"]\n'
+        '[[record]]\nfile = "r.csv"\nrole = "fit"\n',
+        encoding="utf-8",
+    )
+    rows = [f"{i % 7},{i % 5}" for i in range(200)]
+    rows[57] = "oops,1"
+    (tmp_path / "r.csv").write_text("f,a\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    assert main(["close-loop", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert "r.csv" in error
+    assert "oops" in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_in_place_of_the_folder_is_refused_before_any_work(tmp_path, capsys):
+    (tmp_path / "out").write_text("mine", encoding="utf-8")
+    assert main(["demo", "--out", str(tmp_path / "out")]) == 2
+    assert "must be a folder" in capsys.readouterr().err
+    assert (tmp_path / "out").read_text(encoding="utf-8") == "mine"
+
+
+def test_no_command_is_an_error_of_usage(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main([])
+    assert ended.value.code == 2
+    assert "COMMAND" in capsys.readouterr().err
+
+
+def test_module_runs_as_a_command():
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "isojax", "--version"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("isojax ")
+    assert done.stderr == ""
+
+
+def small_campaign(folder):
+    """Two records of the demo."""
+    shutil.copytree(campaign_folder(), folder)
+    head, *records = (folder / "campaign.toml").read_text(encoding="utf-8").split("[[record]]")
+    kept = "[[record]]".join([head, *(text for text in records if "90N" in text)])
+    (folder / "campaign.toml").write_text(kept, encoding="utf-8")
+    return folder
+
+
+def test_fit_prints_its_report_and_writes_it(tmp_path, capsys):
+    campaign = small_campaign(tmp_path / "campaign")
+    assert main(["fit", str(campaign), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    report = (tmp_path / "out" / "fit.txt").read_text(encoding="utf-8")
+    assert report in shown.out
+    assert "[[Coefficients]]" in report
+    model = isojax.load_model(tmp_path / "out" / "model.json")
+    assert float(model["linear_stiffness.coefficient"]) == pytest.approx(1.12e6, rel=0.02)
+
+
+@pytest.mark.slow
+def test_demo_finds_the_friction_that_was_put_in(tmp_path, capsys):
+    assert main(["demo", "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr()
+    result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    truth = json.loads((campaign_folder() / "truth.json").read_text(encoding="utf-8"))
+    assert result["verdict"] == "found"
+    assert [finding["effect"] for finding in result["findings"]] == [truth["effect"]]
+    level = result["after"]["parameters"]["coulomb_friction.force_level"]
+    assert level["value"] == pytest.approx(truth["spec"]["q"][0], abs=3.0 * level["standard_error"])
+    assert result["after"]["error"]["holdout"]["chi2_per_dof"] < 1.05
+    assert "report.html" in shown.out
+    assert "records read" in shown.err
