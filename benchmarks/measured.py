@@ -148,9 +148,8 @@ def tell(loop: Loop) -> None:
     errors = loop.after.standard_errors
     for parameter in loop.after.model.parameters:
         if parameter.name in errors:
-            print(
-                f"    {parameter.name:38s} {float(parameter.value):14.6g} +- {errors[parameter.name]:.2g} {parameter.spec.unit}"
-            )
+            value, error = float(parameter.value), errors[parameter.name]
+            print(f"    {parameter.name:38s} {value:14.6g} +- {error:.2g} {parameter.spec.unit}")
 
 
 def judge(words: str, value: float, mark: float, unit: str) -> bool:

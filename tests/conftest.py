@@ -1,4 +1,4 @@
-"""Shared fixtures: float64 before any array is made, runtime shape checks, and the folder of third-party data."""
+"""Shared fixtures: float64 before any array is made, shape checks, and the folder of third-party data."""
 
 import os
 from pathlib import Path

@@ -20,7 +20,9 @@ def _as_record(one: rig.SimulatedRecord) -> Record:
         for place, (_, frequency, cycles) in enumerate(one.schedule)
     )
     released = not np.any(np.abs(one.force) > 1e-6 * max(1.0, one.level))
-    kind = "stepped_sine" if dwells else "periodic" if one.period else "free_decay" if released else "broadband"
+    kind = (
+        "stepped_sine" if dwells else "periodic" if one.period else "free_decay" if released else "broadband"
+    )
     return Record(
         one.name,
         Path(f"{one.name}.npz"),

@@ -92,7 +92,11 @@ def _setting(case: Case) -> tuple[Prepared, Unknowns, tuple[int, ...]]:
     places = tuple(place for place, entry in enumerate(listed) if entry.spec.fitted or entry.name == "mass")
     sizes = [0.1 * abs(float(listed[place].value)) for place in places]
     lanes, states = prepared.record.size, 2 + model.internal_states
-    inner = [0.1 if element.name == "dahl_friction" else 5e-5 for element in model.elements if element.internal_states]
+    inner = [
+        0.1 if element.name == "dahl_friction" else 5e-5
+        for element in model.elements
+        if element.internal_states
+    ]
     scales = np.ones((states, lanes)) * np.array([1e-4, 3e-3, *inner])[:, None]
     start = 0.7 * scales
     factor = np.linspace(1.01, 0.99, lanes)
@@ -104,9 +108,11 @@ def _columns(case: Case, unknowns: Unknowns, lane: int, length: int) -> np.ndarr
     record = _records((300, 220), case.amplitude)[lane]
     model = unknowns.model
     listed = list_parameters(model)
-    stiffness = [entry.name for entry in listed].index("linear_stiffness.coefficient") if (
-        model.element("linear_stiffness") is not None
-    ) else None
+    stiffness = (
+        [entry.name for entry in listed].index("linear_stiffness.coefficient")
+        if (model.element("linear_stiffness") is not None)
+        else None
+    )
     columns = unknowns.directions.shape[1]
 
     def reading(steps):
@@ -188,10 +194,22 @@ def test_samples_that_do_not_count_add_nothing():
     prepared, unknowns, _ = _setting(CASES["maxwell"])
     whole = information(unknowns, prepared)
     records = _records((300, 220))
-    spoiled = tuple(
-        Record(r.name, r.file, r.time, r.rate, r.input, r.output + 1e3 * (np.arange(r.output.size) < 40), r.input, r.output)
-        for r in records[:1]
-    ) + records[1:]
+    spoiled = (
+        tuple(
+            Record(
+                r.name,
+                r.file,
+                r.time,
+                r.rate,
+                r.input,
+                r.output + 1e3 * (np.arange(r.output.size) < 40),
+                r.input,
+                r.output,
+            )
+            for r in records[:1]
+        )
+        + records[1:]
+    )
     again = prepare(spoiled, prepared.segments, quantity="acceleration", hold="linear", substeps=1)
     np.testing.assert_allclose(information(unknowns, again), whole, rtol=1e-10, atol=1e-6)
 

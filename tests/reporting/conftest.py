@@ -53,7 +53,9 @@ def found(campaign):
     last = Verdict(
         "none", None, RANKING[3:], (), 0.0, ("added_mass",), bounds, None, "Nothing is significant."
     )
-    return Loop(campaign, guess, before, (Extension(before, after, verdict),), after, "found", last, 12.5)
+    return Loop(
+        campaign, guess, before, (Extension(before, after, verdict),), after, "found", last, last.bounds, 12.5
+    )
 
 
 @pytest.fixture(scope="session")
@@ -74,4 +76,4 @@ def plain(campaign):
     guess = classical_guess(alone)
     only = fit(guess.model, alone)
     last = Verdict("none", None, (), (), 0.0, (), {}, None, "Nothing is significant.")
-    return Loop(alone, guess, only, (), only, "none", last, 3.0)
+    return Loop(alone, guess, only, (), only, "none", last, last.bounds, 3.0)

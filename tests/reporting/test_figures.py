@@ -60,7 +60,7 @@ def test_curves_show_what_was_measured_and_simulated(found):
     record = found.campaign.records[2]
     shown = (record.time >= 1.0) & (record.time <= 2.0)
     np.testing.assert_array_equal(lines["measured"], record.output[shown])
-    np.testing.assert_array_equal(lines["model after"], found.after.free_runs[2].simulated[shown])
+    np.testing.assert_array_equal(lines["after"], found.after.free_runs[2].simulated[shown])
 
 
 def test_bars_have_the_height_of_the_errors(found):

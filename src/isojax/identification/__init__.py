@@ -1,4 +1,4 @@
-"""From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop over all."""
+"""From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop."""
 
 from ._base_model import base_model as base_model
 from ._circle_fit import CircleFit as CircleFit

@@ -10,9 +10,7 @@ from ..records import Record
 from ._batch import coordinate_motion
 
 
-def visited_range(
-    model: Isolator, records: tuple[Record, ...], quantity: Quantity
-) -> tuple[float, float]:
+def visited_range(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> tuple[float, float]:
     """Give the largest displacement [m] and velocity [m/s] that dwells and windows reached.
 
     Args:
@@ -34,8 +32,9 @@ def visited_range(
 def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
     """Find what is unphysical in a model over the visited motion, if anything.
 
-    The static tangent stiffness must be positive wherever the model has a spring, and the static damping force must
-    not drive the motion. Memories are judged by the sign of their strengths, which the bounds hold.
+    The static tangent stiffness must be positive wherever the model has a spring, and the static damping
+    force must not drive the motion. Memories are judged by the sign of their strengths, which the bounds
+    hold.
 
     Args:
         model: the isolator.

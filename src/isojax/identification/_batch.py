@@ -65,8 +65,8 @@ def coordinate_motion(
     Args:
         record: the record.
         quantity: what the sensor measures.
-        based: whether the drive is the acceleration of the base, so that the coordinate is relative to it and a
-            measured acceleration is not.
+        based: whether the drive is the acceleration of the base, so that the coordinate is relative to it and
+            a measured acceleration is not.
 
     Returns:
         Displacement [m] and velocity [m/s].

@@ -38,7 +38,7 @@ def best_nuisances(bench: Bench, model: Isolator, spread: float) -> Point:
 
 
 def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
-    """Give the beginning of each record: the samples that the campaign gives for it (`settle`), else the first second.
+    """Give the beginning of each record: the samples that the campaign gives for it, else the first second.
 
     Args:
         records: the records.
@@ -48,7 +48,7 @@ def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
     """
 
     def head(place: int, record: Record) -> Segment:
-        length = record.settle if record.settle >= 8 else int(round(record.rate))
+        length = record.settle if record.settle >= 8 else round(record.rate)
         return Segment(place, 0, min(length, record.output.size), 0)
 
     return tuple(head(place, record) for place, record in enumerate(records))
@@ -66,7 +66,7 @@ def beginning_states(problem: Problem, model: Isolator) -> Float[np.ndarray, "st
     Returns:
         States, one column a record.
     """
-    bench = Bench(problem._replace(segments=head_segments(problem.records), heads=()))
+    bench = Bench(problem._replace(segments=head_segments(problem.records), heads=()), at_rest=True)
     point = best_nuisances(bench, model, 1e-9)
     starts, scales = bench.starts(model, bench.prepared(model, len(model.elements)))
     return (starts + scales * point.nuisances.states.T)[:, : len(problem.records)]

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..records import Campaign
 from ._classical_guess import classical_guess
-from ._diagnose import MOST_OF_IT, diagnose, is_good
+from ._diagnose import MOST_OF_IT, diagnose, is_good, remaining_bounds
 from ._findings import Extension, Loop, Verdict, VerdictWord
 from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
 
@@ -26,7 +26,8 @@ def extend(before: Fit, verdict: Verdict) -> Extension:
     """
     if verdict.refit is None:
         raise ValueError(
-            f'Argument `verdict` must have found an effect to add, but its verdict is "{verdict.verdict}": {verdict.reason}'
+            "Argument `verdict` must have found an effect to add, but its verdict is "
+            f'"{verdict.verdict}": {verdict.reason}'
         )
     after = complete(verdict.refit, before.model, before.campaign, before.noise)
     return Extension(before, after, verdict)
@@ -59,8 +60,8 @@ def close_loop(
     before = current = fit(guess.model, campaign, solver=solver, progress=progress)
     first = before.estimate.excess
     extensions: list[Extension] = []
-    significance = 0.01
-    while True:
+    significance, stopped_good = 0.01, False
+    while not stopped_good:
         verdict = diagnose(
             current, first_excess=first, significance=significance, solver=solver, progress=progress
         )
@@ -71,8 +72,10 @@ def close_loop(
         current = extensions[-1].after
         significance *= 0.5
         found = current.estimate
-        if is_good(found.chi2 / found.dof, found.excess, first):
-            break
+        stopped_good = is_good(found.chi2 / found.dof, found.excess, first)
+    if stopped_good:
+        progress("how large the effects that were not found could still be")
+    bounds = remaining_bounds(current) if stopped_good else verdict.bounds
     return Loop(
         campaign,
         guess,
@@ -81,6 +84,7 @@ def close_loop(
         current,
         _overall(current, first, bool(extensions), verdict),
         verdict,
+        bounds,
         time.perf_counter() - begin,
     )
 

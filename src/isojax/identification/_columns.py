@@ -1,9 +1,9 @@
-"""Many columns at once: how each segment's readings answer small forces, from one simulation and one linear solve.
+"""Many columns at once: how readings answer small forces, from one simulation and one linear solve.
 
-The derivatives of `information` cost a full step of the model a column. For dozens of absent effects the motion is
-simulated once, with the memories of the absent effects following it; the force that each effect would add and the
-linearised force balance are worked out along the motion, all samples at once; and one linear, time-varying solve, which
-knows nothing of the effects, carries all columns.
+The derivatives of `information` cost a full step of the model a column. For dozens of absent effects the
+motion is simulated once, with the memories of the absent effects following it; the force that each effect
+would add and the linearised force balance are worked out along the motion, all samples at once; and one
+linear, time-varying solve, which knows nothing of the effects, carries all columns.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -56,8 +56,9 @@ def _partials(
     """Differentiate rates and reading along the path.
 
     Returns:
-        The reading; then, for each parameter that moves and for the stiffness scale, and for each carried state, the
-        change of the rates of the carried states but the first (whose rate is the velocity) and of the reading.
+        The reading; then, for each parameter that moves and for the stiffness scale, and for each carried
+        state, the change of the rates of the carried states but the first (whose rate is the velocity) and of
+        the reading.
     """
     values = tuple(entry.value for entry in list_parameters(model))
 
@@ -96,13 +97,11 @@ def _respond(
     starts: Float[Array, "state column lanes"],
     step: float,
 ) -> Float[Array, "node state column lanes"]:
-    """Solve `d' = A(t) d + b(t)` for all columns; between nodes A and b follow cubics through four of them."""
+    """Solve `d' = A(t) d + b(t)` for all columns; between nodes A and b follow cubics through four."""
     size = starts.shape[0]
     solver = RK4()
 
-    def field(
-        t: float, d: tuple[Array, ...], table: tuple[tuple[Array, ...], ...]
-    ) -> tuple[Array, ...]:
+    def field(t: float, d: tuple[Array, ...], table: tuple[tuple[Array, ...], ...]) -> tuple[Array, ...]:
         place = round(2.0 * t)
         a, b = table[0][place], table[1][place]
         rows = [step * d[1]]
@@ -121,7 +120,10 @@ def _respond(
     def body(carry: tuple, ahead: tuple[Array, Array]) -> tuple[tuple, tuple[Array, ...]]:
         d, a, b = carry
         a, b = (*a, ahead[0]), (*b, ahead[1])
-        table = ((a[1], middle(*a), a[2]), (b[1], middle(*b), b[2]))
+        table = (
+            (a[1], middle(a[0], a[1], a[2], a[3]), a[2]),
+            (b[1], middle(b[0], b[1], b[2], b[3]), b[2]),
+        )
         moved, *_ = solver.step(term, 0.0, 1.0, d, table, None, False)
         return (moved, a[1:], b[1:]), d
 
@@ -138,9 +140,9 @@ def column_information(
 ) -> Float[np.ndarray, "lanes column column"]:
     """Give the information matrix of each segment, absent effects among the columns.
 
-    The columns are those of `information`; each direction must move one parameter alone. Elements beyond the carried
-    ones are at zero strength: their memories follow the motion and do not act back, so that only their strengths have
-    columns and only the carried states have initial values to eliminate.
+    The columns are those of `information`; each direction must move one parameter alone. Elements beyond the
+    carried ones are at zero strength: their memories follow the motion and do not act back, so that only
+    their strengths have columns and only the carried states have initial values to eliminate.
 
     Args:
         unknowns: where the simulation stands and its directions.
@@ -170,7 +172,10 @@ def column_information(
         rest = [jnp.zeros_like(u)] * size
         forcing = jnp.stack(
             [
-                jnp.stack([unit * entry[0][row] for unit, entry in zip(units, by_parameter, strict=True)] + rest, axis=1)
+                jnp.stack(
+                    [unit * entry[0][row] for unit, entry in zip(units, by_parameter, strict=True)] + rest,
+                    axis=1,
+                )
                 for row in range(size - 1)
             ],
             axis=1,
@@ -188,7 +193,9 @@ def column_information(
         readings_by_parameter = [entry[1] for entry in by_parameter]
         readings_by_state = [entry[1] for entry in by_state]
         return np.asarray(
-            _products(response, reading, jnp.asarray(units), readings_by_parameter, readings_by_state, batch, steps)
+            _products(
+                response, reading, jnp.asarray(units), readings_by_parameter, readings_by_state, batch, steps
+            )
         )
 
     with ThreadPoolExecutor(workers()) as pool:
@@ -206,9 +213,7 @@ def _products(
     steps: int,
 ) -> Float[Array, "lanes entry entry"]:
     """Form the readings' columns and multiply them out, lane by lane."""
-    rows = sum(
-        response[::steps, index] * slope[::steps, None] for index, slope in enumerate(by_state)
-    )
+    rows = sum(response[::steps, index] * slope[::steps, None] for index, slope in enumerate(by_state))
     direct = jnp.stack([slope[::steps] for slope in by_parameter], axis=1) * units[None, :, None]
     rows = rows + jnp.pad(direct, ((0, 0), (0, len(by_state)), (0, 0)))
     last = (batch.measured - reading[::steps])[:, None]

@@ -1,4 +1,4 @@
-"""Uncertainty of fitted coefficients, in physical units: the one module that turns information into error bars."""
+"""Uncertainty of fitted coefficients, in physical units: where information turns into error bars."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,8 @@ from jaxtyping import Bool, Float
 SMALLEST_SHARE = 1e-11
 """Relative eigenvalue of the scaled information below which a combination counts as undetermined.
 
-Products are accumulated in float64, so that shares of about 1e-13 are rounding; a hundred times that is the margin.
+Products are accumulated in float64, so that shares of about 1e-13 are rounding; a hundred times that is the
+margin.
 """
 
 
@@ -33,12 +34,13 @@ class Uncertainty(NamedTuple):
 def uncertainty(matrix: Float[np.ndarray, "column column"], inflation: float = 1.0) -> Uncertainty:
     """Invert an information matrix.
 
-    `C = inflation (J'J)^-1` with J the whitened derivatives after the nuisances. The matrix is first scaled to a unit
-    diagonal, so that stiffness in N/m and in N/m^3 do not spoil each other.
+    `C = inflation (J'J)^-1` with J the whitened derivatives after the nuisances. The matrix is first scaled
+    to a unit diagonal, so that stiffness in N/m and in N/m^3 do not spoil each other.
 
     Args:
         matrix: J'J [inverse product of units], coefficients only.
-        inflation: factor on the covariance: max(1, chi2/dof) where the model does not explain all of the data.
+        inflation: factor on the covariance: max(1, chi2/dof) where the model does not explain all of the
+            data.
 
     Returns:
         The uncertainty; all NaN and nothing determined where the matrix is not finite.

@@ -17,7 +17,7 @@ from ._elimination import Nuisances, step_nuisances
 from ._problem import Bench, Point, one_hot
 
 FIRST_DAMPING = 1e-3
-"""Marquardt's damping at the first step, over the diagonal of the normal equations: light, since starts are good."""
+"""Marquardt's damping at the first step, over the diagonal of the normal equations: starts are good."""
 
 MOST_REFUSALS = 8
 """Refused steps in a row after which the search stops."""
@@ -100,8 +100,8 @@ def descend(
 ) -> Descent:
     """Fit coefficients to the records, nuisances eliminated on the way.
 
-    Each step simulates every segment once with its exact forward derivatives. optimistix sees the compressed residual
-    at the point it asks for; the nuisances of a trial point are those that its step implies.
+    Each step simulates every segment once with its exact forward derivatives. optimistix sees the compressed
+    residual at the point it asks for; the nuisances of a trial point are those that its step implies.
 
     Args:
         bench: the records.
@@ -136,12 +136,14 @@ def descend(
         ]
 
     free = jnp.stack([to_free(values[place], specs[c], scales[c]) for c, place in enumerate(places)])
-    # Marquardt's scaling: the solver's variables are those in which the first normal equations have an equal diagonal.
+    # Marquardt's scaling: the solver's variables are those in which the first normal equations have an equal
+    # diagonal.
     unit = np.ones(len(places))
     trial, trial_nuisances, best_free, scaled = free, nuisances, free, free
     best: Point | None = None
     state: Any = None
-    result, evaluations, accepted_before = RESULTS.not_converged, 0, 0
+    result: Any = RESULTS.not_converged
+    evaluations, refused, decrement = 0, 0, float("inf")
     while evaluations < max_steps:
         current = physical(trial)
         point = bench.evaluate(current, one_hot(current, places, slopes(trial)), trial_nuisances)
@@ -159,10 +161,11 @@ def descend(
         accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
         progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
-        if accepted:
+        if best is None or accepted:
             gained = float("inf") if best is None or refused else best.chi2 - point.chi2
             best, best_free, refused = point, trial, 0
-            # What a full linear step would still gain, and what the last one did gain: either may say that it is over.
+            # What a full linear step would still gain, and what the last one did gain: either may say that it
+            # is over.
             decrement = float(np.sum(residual[:-1] ** 2))
             if min(decrement, gained) < tolerance * max(1.0, chi2):
                 result = RESULTS.successful
@@ -171,7 +174,7 @@ def descend(
             refused += 1
             # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
             if refused == MOST_REFUSALS:
-                result = RESULTS.where(decrement < STALLED * best.chi2, RESULTS.successful, RESULTS.not_converged)
+                result = RESULTS.successful if decrement < STALLED * best.chi2 else RESULTS.not_converged
                 break
         if bool(state.terminate):
             result = RESULTS.successful

@@ -14,10 +14,8 @@ from ._elimination import Nuisances
 from ._estimate import Estimate, estimate
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
-from ._problem import Bench
 from ._scales import scales as campaign_scales
 from ._score import Score, ScoreTest, absent_effects, score_test
-from ._segments import cut_segments
 from ._separate import separating_experiment
 from ._transfer import transferred_share
 
@@ -30,8 +28,8 @@ LEFT_OVER = 0.03
 MOST_OF_IT = 0.8
 """Share of the excess that an effect must explain to be the explanation."""
 
-SMALLEST_GAIN = 0.005
-"""Gain in chi2/dof below which an effect is not named: with half a million samples anything is significant."""
+SMALLEST_GAIN = 0.002
+"""Gain in chi2/dof below which no effect is named: with half a million samples anything is significant."""
 
 SMALLEST_SHARE = 0.2
 """Share of the remaining excess that an effect must explain to be named where the fit is not good."""
@@ -157,7 +155,7 @@ def diagnose(
     max_steps: int = 40,
     progress: Callable[[str], None] = silent,
 ) -> Verdict:
-    """Name the effect that a fitted model lacks, with its evidence; or say that nothing is, or that none explains it.
+    """Name the effect that a fitted model lacks, with its evidence; or say that it lacks none.
 
     Held-out records take no part.
 
@@ -174,6 +172,9 @@ def diagnose(
         The verdict.
     """
     fitted = fit.estimate
+    if not fitted.point.is_finite:
+        reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[fit.result]}"
+        return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
     scales = campaign_scales(fit.campaign)
     probes = absent_effects(fitted.model, scales, excluded)
     progress(f"score test of {len({probe.name for probe in probes})} absent effects")
@@ -186,7 +187,8 @@ def diagnose(
             break
         if not score.admissible or score.p_value > significance:
             continue
-        # The score says what one linear step could gain at most when the model is near; far away it only ranks.
+        # The score says what one linear step could gain at most when the model is near; far away it only
+        # ranks.
         if chi2_per_dof <= GOOD and score.z**2 / fitted.dof < SMALLEST_GAIN / 5.0:
             continue
         progress(f"refit with {score.element.name}")
@@ -217,6 +219,20 @@ def _strength_place(found: Estimate, score: Score) -> int:
     return found.places.index(len(listed) - len(fields) + fields.index(score.element.strength))
 
 
+def remaining_bounds(fit: Fit) -> dict[str, tuple[float, str]]:
+    """Say how large each absent effect could still be beside a fitted model.
+
+    Args:
+        fit: the fit.
+
+    Returns:
+        Upper bound of each strength and its unit, by catalogue name.
+    """
+    scales = campaign_scales(fit.campaign)
+    test = score_test(fit.estimate, scales, absent_effects(fit.model, scales))
+    return _bounds(test, fit.estimate, None)
+
+
 def _bic(found: Estimate, inflation: float) -> float:
     return found.chi2 / inflation + len(found.places) * float(np.log(found.point.samples.sum()))
 
@@ -234,7 +250,8 @@ def _judge(
     """Weigh the refits, and word the verdict."""
     fitted = fit.estimate
     usable = [refit for refit in refits if refit.violation is None]
-    inflation = max([1.0] + [min(refit.estimate.chi2 / refit.estimate.dof for refit in usable)] if usable else [1.0])
+    smallest = min((refit.estimate.chi2 / refit.estimate.dof for refit in usable), default=1.0)
+    inflation = max(1.0, smallest)
     usable.sort(key=lambda refit: _bic(refit.estimate, inflation))
     good = is_good(fitted.chi2 / fitted.dof, fitted.excess, first_excess)
     ranking = _ranking(test, refits, usable, inflation)
@@ -250,8 +267,13 @@ def _judge(
         if enough and clear and share > 0.0:
             return _found(fit, test, usable, ranking, first_excess, share, inflation)
         reason = (
-            f"adding {best.score.element.name} gains {gain / fitted.dof:.2g} of chi2/dof for {extra} more coefficients"
-            + ("" if share > 0.0 or not (enough and clear) else ", but it does not carry over to data left out of its refit")
+            f"adding {best.score.element.name} gains {gain / fitted.dof:.2g} of chi2/dof for {extra} more "
+            "coefficients"
+            + (
+                ""
+                if share > 0.0 or not (enough and clear)
+                else ", but it does not carry over to data left out of its refit"
+            )
         )
     else:
         reason = "no absent effect is both significant and physical"
@@ -278,7 +300,10 @@ def _found(
         for entry in ranking
         if entry.effect != name
         and entry.admissible
-        and (entry.delta_bic <= CLOSE_BIC or (np.isnan(entry.delta_bic) and abs(entry.likeness) > CLOSE_LIKENESS))
+        and (
+            entry.delta_bic <= CLOSE_BIC
+            or (np.isnan(entry.delta_bic) and abs(entry.likeness) > CLOSE_LIKENESS)
+        )
     )
     finding = Finding(
         name,
@@ -331,7 +356,11 @@ def _ranking(
             chi2 = found.chi2 / found.dof
             delta = _bic(found, inflation) - lowest
             admissible = admissible and refit.violation is None
-        likeness = 0.0 if best is None else float(test.likeness[order[score.element.name], order[best.score.element.name]])
+        likeness = (
+            0.0
+            if best is None
+            else float(test.likeness[order[score.element.name], order[best.score.element.name]])
+        )
         return Candidate(
             score.element.name,
             score.element.words,
@@ -354,7 +383,7 @@ def _ranking(
 
 
 def _bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
-    """Say how large each effect that was not found could still be: |s| + 1.96 standard errors, inflated by the misfit."""
+    """Say how large each effect that was not found could still be, inflated by the misfit."""
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {
         score.element.name: (abs(score.strength) + 1.96 * inflation * score.error, _strength(score.element))

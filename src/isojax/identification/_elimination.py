@@ -1,7 +1,8 @@
 """Nuisances taken out of the normal equations, segment by segment and record by record.
 
-Every coefficient of interest sees only what is left of the data once the initial states of the segments and the stiffness
-scales of the records have explained what they can: variable projection, done on the small matrices of `information`.
+Every coefficient of interest sees only what is left of the data once the initial states of the segments and
+the stiffness scales of the records have explained what they can: variable projection, done on the small
+matrices of `information`.
 """
 
 from typing import NamedTuple
@@ -16,8 +17,8 @@ class Nuisances(NamedTuple):
     """Where the nuisances stand, and their priors.
 
     Attributes:
-        states: deviation of each segment's initial states from the measured ones, in the states' own scales (which
-            are also the standard deviations of their priors).
+        states: deviation of each segment's initial states from the measured ones, in the states' own scales
+            (which are also the standard deviations of their priors).
         stiffness: deviation of each record's linear stiffness [units of `STIFFNESS_SCALE_UNIT`].
         stiffness_spread: standard deviation of its prior [relative stiffness].
     """
@@ -35,8 +36,10 @@ class Reduced(NamedTuple):
         eliminated: degrees of freedom that the nuisances of each record took from the data.
         raw: squared size of each coefficient column before anything was eliminated; whitened.
         stiffness_map: step of the stiffness scales = map[:, -1] - map[:, :-1] @ step of the coefficients.
-        stiffness_variance: of each record's stiffness scale, given the coefficients [relative stiffness squared].
-        states_map: step of the states = map[..., -1] - map[..., :-1] @ [step of coefficients, of the stiffness scale].
+        stiffness_variance: of each record's stiffness scale, given the coefficients [relative stiffness
+            squared].
+        states_map: step of the states = map[..., -1] - map[..., :-1] @ [step of coefficients, of the
+            stiffness scale].
     """
 
     by_record: Float[np.ndarray, "record column column"]
@@ -65,8 +68,8 @@ def eliminate(
 ) -> Reduced:
     """Eliminate the initial states of each segment, then the stiffness scale of each record.
 
-    Where `heads` is given, the initial states follow from the beginnings of the records alone, as those of a free run
-    do; the rest of a record then has no say in its own start.
+    Where `heads` is given, the initial states follow from the beginnings of the records alone, as those of a
+    free run do; the rest of a record then has no say in its own start.
 
     Args:
         matrices: from `information`.

@@ -13,6 +13,7 @@ from ._information import readings
 from ._problem import Bench, Point, Problem, stiffness_deviation
 from ._segments import Segment
 
+
 class Errors(NamedTuple):
     """Errors of one role's records.
 
@@ -114,8 +115,8 @@ def restart_records(problem: Problem, model: Isolator, spread: float) -> Restart
 def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
     """Simulate each record from its start to its end with nothing fed back.
 
-    The initial state comes from the samples that the campaign gives for it (`settle`), else from the first second;
-    internal states start at rest, and no stiffness scale is applied.
+    The initial state comes from the samples that the campaign gives for it (`settle`), else from the first
+    second; internal states start at rest, and no stiffness scale is applied.
 
     Args:
         problem: the records.
@@ -130,7 +131,7 @@ def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
         heads=(),
         segments=tuple(
             Segment(place, 0, record.output.size, record.settle) for place, record in enumerate(records)
-        )
+        ),
     )
     prepared = Bench(whole).prepared(model, len(model.elements))
     states = np.zeros((begin.shape[0], prepared.record.size))

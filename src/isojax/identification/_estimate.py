@@ -90,7 +90,8 @@ def free_places(
         for name in names:
             if name not in known:
                 raise ValueError(
-                    f"Argument `{argument}` must name parameters of the model ({', '.join(known)}), but holds {name!r}."
+                    f"Argument `{argument}` must name parameters of the model ({', '.join(known)}), "
+                    f"but holds {name!r}."
                 )
 
     def chosen(entry: Parameter) -> bool:
@@ -134,8 +135,8 @@ def magnitudes(model: Isolator, places: tuple[int, ...], scales: Scales) -> tupl
 def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: float) -> float:
     """Give the standard deviation of the linear stiffness between repeats of a record.
 
-    Repeats at equal level and direction share every deterministic error of the model, so that their differences show
-    repeatability alone; without repeats, records of equal level serve, then all records.
+    Repeats at equal level and direction share every deterministic error of the model, so that their
+    differences show repeatability alone; without repeats, records of equal level serve, then all records.
 
     Args:
         records: the records.

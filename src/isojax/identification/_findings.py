@@ -26,7 +26,8 @@ class Candidate(NamedTuple):
         strength_error: standard error of the strength [its unit].
         unit: unit of the strength.
         chi2_per_dof: after the refit; NaN where it was not refitted.
-        delta_bic: Schwarz's criterion over that of the best candidate, per max(chi2/dof, 1); NaN where not refitted.
+        delta_bic: Schwarz's criterion over that of the best candidate, per max(chi2/dof, 1); NaN where not
+            refitted.
         likeness: correlation with the best candidate's trace, -1 to 1.
         admissible: whether its sign and its dissipation are physical.
     """
@@ -119,7 +120,8 @@ class Residual(NamedTuple):
     Attributes:
         values: measured less simulated of each fitting record, segments restarted [SI unit of the output].
         noise_floor: rms of the noise [SI unit of the output].
-        whiteness: share of lags within +-25 (0 left out) whose autocorrelation stays in the 99 % band, a record each.
+        whiteness: share of lags within +-25 (0 left out) whose autocorrelation stays in the 99 % band, a
+            record each.
         lags: the lags [samples].
         autocorrelation: of each record's residual at the lags.
         cross_correlation: of each record's residual with the drive at the lags.
@@ -145,7 +147,9 @@ class Loop(NamedTuple):
         extensions: each effect that was added, in the order of discovery.
         after: the final fit (the same as `before` where nothing was added).
         verdict: over all iterations.
-        last: the diagnosis of the final fit.
+        last: the last diagnosis: of the final fit where that found nothing, else of the fit before it.
+        bounds: for each effect that was not found, how large its strength could still be beside the final model,
+            with its unit.
         seconds: wall time.
     """
 
@@ -156,14 +160,10 @@ class Loop(NamedTuple):
     after: Fit
     verdict: VerdictWord
     last: Verdict
+    bounds: dict[str, tuple[float, str]]
     seconds: float
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """The effects found, in the order of discovery."""
         return tuple(step.verdict.finding for step in self.extensions if step.verdict.finding is not None)
-
-    @property
-    def bounds(self) -> dict[str, tuple[float, str]]:
-        """For each effect not found: how large its strength could still be, with its unit."""
-        return self.last.bounds

@@ -8,16 +8,15 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
-from .._parameters import list_parameters
 from .._results import RESULTS, is_successful
 from .._types import check_float64
 from ..models import Integrator, Isolator
 from ..records import Campaign, NoiseEstimate, estimate_noise
-from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise
+from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise, without_values
 from ._estimate import Estimate, estimate, free_places
 from ._problem import Bench
-from ._setup import build_problem
 from ._scales import scales as campaign_scales
+from ._setup import build_problem
 from ._steps import find_integrator
 
 DEFAULT_SOLVER = optx.LevenbergMarquardt(rtol=1e-9, atol=1e-9)
@@ -119,15 +118,15 @@ def fit(
 ) -> Fit:
     """Fit the coefficients of a model to the time histories of all fitting records together.
 
-    Least squares on the measured samples, weighted by the channel's noise, with exact forward-mode derivatives. Dwells and
-    windows start from states of their own, and the linear stiffness may differ from record to record by as much as
-    repeats show; both are eliminated before optimistix sees the residual.
+    Least squares on the measured samples, weighted by the channel's noise, with exact forward-mode
+    derivatives. Dwells and windows start from states of their own, and the linear stiffness may differ from
+    record to record by as much as repeats show; both are eliminated before optimistix sees the residual.
 
     Args:
         model: start, such as `classical_guess(campaign).model`.
         campaign: the measurements.
-        free: names of the coefficients to fit, and no others; all fitted kinds (and the mass, where the campaign
-            frees it) if omitted.
+        free: names of the coefficients to fit, and no others; all fitted kinds (and the mass, where the
+            campaign frees it) if omitted.
         fixed: names of coefficients to hold.
         solver: an optimistix least-squares solver.
         integrator: solver and steps; the coarsest steps whose error is a twentieth of the noise, if omitted.
@@ -138,8 +137,8 @@ def fit(
         The fit. Where the search failed, `result` says why and every error is NaN.
 
     Raises:
-        ValueError: if a name is no parameter of the model, the model is not driven as the campaign's isolator is, or
-            records differ in sampling rate.
+        ValueError: if a name is no parameter of the model, the model is not driven as the campaign's isolator
+            is, or records differ in sampling rate.
         RuntimeError: if JAX is not in 64-bit mode.
     """
     check_float64()

@@ -1,4 +1,4 @@
-"""The information that each segment holds: products of its residual and of the derivatives of its simulation."""
+"""The information that segments hold: products of residuals and of derivatives of their simulation."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -73,14 +73,15 @@ def has_stiffness_scale(model: Isolator) -> bool:
 
 
 def _sampler(model: Isolator, quantity: Quantity, sample_time: float) -> Callable[..., tuple[Array, State]]:
-    """Give the function that reads one sample and steps to the next, with the model's numbers as arguments."""
+    """Give the function that reads one sample and steps to the next, the model's numbers as arguments."""
     solver = RK4()
 
     def sample(
         values: tuple[Array, ...], scale: Array, state: State, u: tuple[Array, ...], du: tuple[Array, ...]
     ) -> tuple[Array, State]:
         current = scaled_model(model, values, scale)
-        # The table already holds the delayed drive; only the derivative with respect to the delay is still to come.
+        # The table already holds the delayed drive; only the derivative with respect to the delay is still to
+        # come.
         late = current.shift() - jax.lax.stop_gradient(current.shift())
         u = tuple(value - late * slope for value, slope in zip(u, du, strict=True))
         reading = current.reading(state, u[0], du[0], quantity)
@@ -167,9 +168,9 @@ def share_lanes(values: np.ndarray, part: int, parts: int) -> tuple[Array, ...]:
 def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "lanes column column"]:
     """Give the information matrix of each segment.
 
-    Columns, in this order: the directions; the stiffness scale of the record in units of `STIFFNESS_SCALE_UNIT`, if
-    the model has a linear spring; the initial states in their scales; the residual (measured - simulated). All in the
-    SI unit of the output, not yet weighted by the noise.
+    Columns, in this order: the directions; the stiffness scale of the record in units of
+    `STIFFNESS_SCALE_UNIT`, if the model has a linear spring; the initial states in their scales; the residual
+    (measured - simulated). All in the SI unit of the output, not yet weighted by the noise.
 
     Args:
         unknowns: where the simulation stands and its directions.

@@ -27,8 +27,8 @@ class Problem(NamedTuple):
         hold: what the drive does between samples.
         noise: rms of the noise [SI unit of the output].
         integrator: solver and steps.
-        heads: the beginning of each record, where records are left whole and only their beginnings may set the
-            initial states; empty where every segment settles its own.
+        heads: the beginning of each record, where records are left whole and only their beginnings may set
+            the initial states; empty where every segment settles its own.
     """
 
     records: tuple[Record, ...]
@@ -95,8 +95,8 @@ def element_names(model: Isolator) -> tuple[str, ...]:
 class Bench:
     """Simulates a model against a problem; keeps the batches and start states that do not change.
 
-    The batches depend on the delay and on the steps a sample only, the start states on the memories of the model
-    only; both are remade when those change and at no other time.
+    The batches depend on the delay and on the steps a sample only, the start states on the memories of the
+    model only; both are remade when those change and at no other time.
     """
 
     def __init__(self, problem: Problem, at_rest: bool = False):
@@ -163,7 +163,9 @@ class Bench:
             # Nuisances are deviations from the starts, which must therefore stay while they are carried on.
             known = [new if old is None else old for old, new in zip(known, fresh, strict=True)]
             self._memories.update(zip(names[:carried], known[:carried], strict=True))
-        rows = np.concatenate([np.stack([prepared.starts, prepared.spread]), *known], axis=1)
+        rows = np.concatenate(
+            [np.stack([prepared.starts, prepared.spread]), *(one for one in known if one is not None)], axis=1
+        )
         if self.at_rest:
             rows[:, 2:] = 0.0
         return rows[0], rows[1]
@@ -232,7 +234,9 @@ class Bench:
         return Point(model, nuisances, reduced, prepared.samples)
 
 
-def _matrices(unknowns: Unknowns, carried: int, prepared: Prepared) -> Float[np.ndarray, "lanes column column"]:
+def _matrices(
+    unknowns: Unknowns, carried: int, prepared: Prepared
+) -> Float[np.ndarray, "lanes column column"]:
     """Give the information matrices, NaN where a simulation left every bound."""
     if carried == len(unknowns.model.elements):
         matrices = information(unknowns, prepared)

@@ -1,4 +1,4 @@
-"""The score test: every absent effect rides along at zero strength, with what a refit would absorb projected out."""
+"""The score test: absent effects ride along at zero strength; what a refit would absorb is projected out."""
 
 from typing import NamedTuple
 
@@ -9,8 +9,8 @@ from scipy import stats
 from .._parameters import find_parameter
 from ..elements import CATALOGUE, AbstractElement, Scales
 from ..models import Isolator
-from ._estimate import Estimate
 from ._elimination import Nuisances, step_nuisances
+from ._estimate import Estimate
 from ._problem import element_names, one_hot
 
 SMALLEST_VISIBILITY = 0.005
@@ -65,7 +65,9 @@ class ScoreTest(NamedTuple):
     nuisances: tuple[Nuisances, ...]
 
 
-def absent_effects(model: Isolator, scales: Scales, excluded: tuple[str, ...] = ()) -> tuple[AbstractElement, ...]:
+def absent_effects(
+    model: Isolator, scales: Scales, excluded: tuple[str, ...] = ()
+) -> tuple[AbstractElement, ...]:
     """Give every catalogue effect that the model lacks, over the grids of their shape parameters.
 
     Args:
@@ -78,7 +80,10 @@ def absent_effects(model: Isolator, scales: Scales, excluded: tuple[str, ...] = 
     """
     present = {element.name for element in model.elements} | set(excluded)
     return tuple(
-        probe for name, kind in sorted(CATALOGUE.items()) if name not in present for probe in kind.grid(scales)
+        probe
+        for name, kind in sorted(CATALOGUE.items())
+        if name not in present
+        for probe in kind.grid(scales)
     )
 
 
@@ -87,8 +92,9 @@ def score_test(
 ) -> ScoreTest:
     """Test the absent effects, all at once.
 
-    With r the whitened residual, J the columns of fitted coefficients and nuisances, P = I - Q Q' and g = P g_j:
-    `z = g.r / |g|`, strength `g.r / |g|^2 +- 1 / |g|`, visibility `|g| / |g_j|`, likeness `cos(g_i, g_j)`.
+    With r the whitened residual, J the columns of fitted coefficients and nuisances, P = I - Q Q' and g = P
+    g_j: `z = g.r / |g|`, strength `g.r / |g|^2 +- 1 / |g|`, visibility `|g| / |g_j|`, likeness `cos(g_i,
+    g_j)`.
 
     Args:
         fitted: the estimate to test.
@@ -124,11 +130,16 @@ def score_test(
     z = score / safe
     # Each record's own share of the projected score: its scatter is the honest standard deviation.
     shares = by_record[:, count:-1, -1] - by_record[:, count:-1, :count] @ absorbed[:, -1]
-    shares -= np.einsum("pq,rp->rq", absorbed[:, :-1], by_record[:, :count, -1] - by_record[:, :count, :count] @ absorbed[:, -1])
+    shares -= np.einsum(
+        "pq,rp->rq",
+        absorbed[:, :-1],
+        by_record[:, :count, -1] - by_record[:, :count, :count] @ absorbed[:, -1],
+    )
     spread = np.sqrt(np.maximum(np.sum(shares**2, axis=0), size**2))
     robust = np.where(seen, score / np.maximum(spread, 1e-300), 0.0)
 
-    # Within a family a shape of admissible sign goes before any other: the others are evidence against those shapes.
+    # Within a family a shape of admissible sign goes before any other: the others are evidence against those
+    # shapes.
     physical = np.array([probe.signed for probe in probes], dtype=bool) | (score > 0.0)
     weight = np.where(physical, np.abs(z), -1.0 / np.maximum(np.abs(z), 1e-300))
     best: dict[str, int] = {}
@@ -171,7 +182,7 @@ def score_test(
 def _family_wise(
     correlation: Float[np.ndarray, "score score"], sizes: Float[np.ndarray, " family"], seed: int
 ) -> Float[np.ndarray, " family"]:
-    """Give the chance that the largest of all scores exceeds each size: by drawing, and by Bonferroni far out."""
+    """Give the chance that the largest score exceeds each size: by drawing, and by Bonferroni far out."""
     if sizes.size == 0:
         return sizes
     values, vectors = np.linalg.eigh(correlation)

@@ -1,5 +1,6 @@
 """Where each record is cut, so that every piece can start from its own measured state."""
 
+import itertools
 from typing import NamedTuple
 
 import jax
@@ -10,7 +11,7 @@ from ..models import Isolator
 from ..records import Record
 
 MEMORIES_A_WINDOW = 25.0
-"""A window as long as this many decay times loses less than a tenth of its information to its free initial state."""
+"""A window of so many decay times loses less than a tenth of its information to its free start."""
 
 
 class Segment(NamedTuple):
@@ -48,8 +49,8 @@ def slowest_decay(model: Isolator) -> float:
 def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment, ...]:
     """Cut records into segments: dwells of a stepped sine, else windows much longer than the system's memory.
 
-    A record is left whole where the model's motion does not decay, or where fewer than four windows would fit: a free
-    initial state would then cost more than it gives.
+    A record is left whole where the model's motion does not decay, or where fewer than four windows would
+    fit: a free initial state would then cost more than it gives.
 
     Args:
         records: the records.
@@ -68,7 +69,7 @@ def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment,
             window = count if decay == 0.0 else max(400, int(MEMORIES_A_WINDOW / decay * record.rate))
             pieces = max(1, count // window)
             edges = np.linspace(0, count, (pieces if pieces >= 4 else 1) + 1).astype(int)
-            bounds = list(zip(edges[:-1], edges[1:], strict=True))
+            bounds = list(itertools.pairwise(edges))
         segments += [
             Segment(place, int(start), int(stop), min(max(int(start), record.settle), int(stop)))
             for start, stop in bounds

@@ -7,7 +7,6 @@ from ._beginning import head_segments
 from ._problem import Problem
 from ._segments import cut_segments, slowest_decay
 
-
 SAME_RATE = 1e-3
 """Relative difference of sampling rates that the stiffness scales of the records can still take up."""
 
@@ -23,9 +22,9 @@ def build_problem(
 ) -> Problem:
     """Cut records into segments for a model.
 
-    Where the motion does not decay (a mass without a spring) records are left whole, and only their beginnings may set
-    their initial states, as in a free run: such a motion remembers its start for ever, and a start that the whole record
-    may choose would imitate a missing force.
+    Where the motion does not decay (a mass without a spring) records are left whole, and only their
+    beginnings may set their initial states, as in a free run: such a motion remembers its start for ever, and
+    a start that the whole record may choose would imitate a missing force.
 
     Args:
         records: the records.

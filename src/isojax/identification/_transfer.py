@@ -37,8 +37,8 @@ def transferred_share(
 ) -> float:
     """Give the share of the excess that an effect removes on data its refit did not see.
 
-    Both models, without and with the effect, are refitted without a part of the data (a level, or half) and held
-    against that part; no coefficient is touched there.
+    Both models, without and with the effect, are refitted without a part of the data (a level, or half) and
+    held against that part; no coefficient is touched there.
 
     Args:
         fit: the fit without the effect.
@@ -48,7 +48,8 @@ def transferred_share(
         progress: told a line a step.
 
     Returns:
-        1 - (excess with the effect)/(excess without it) on the unseen part; not positive where it does not carry over.
+        1 - (excess with the effect)/(excess without it) on the unseen part; not positive where it does not
+        carry over.
     """
     seen, unseen = _split(extended.bench.problem)
     excess = []
@@ -57,7 +58,14 @@ def transferred_share(
         nuisances = found.point.nuisances
         start = nuisances._replace(states=np.zeros((0, 0)))
         part = estimate(
-            Bench(seen), found.model, found.places, scales, nuisances=start, solver=solver, max_steps=15, progress=progress
+            Bench(seen),
+            found.model,
+            found.places,
+            scales,
+            nuisances=start,
+            solver=solver,
+            max_steps=15,
+            progress=progress,
         )
         if part.result == RESULTS.not_finite:
             return 0.0

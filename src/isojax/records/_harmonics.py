@@ -46,11 +46,10 @@ def harmonic_basis(
     Returns:
         (time, 1 + 2 harmonics).
     """
-    columns = [np.ones_like(time)]
-    for order in range(1, harmonics + 1):
-        phase = 2.0 * np.pi * order * frequency * time
-        columns += [np.cos(phase), -np.sin(phase)]
-    return np.stack(columns, axis=1)
+    turns = np.exp(2j * np.pi * frequency * time)[:, None] ** np.arange(1, harmonics + 1)
+    basis = np.ones((time.size, 1 + 2 * harmonics))
+    basis[:, 1::2], basis[:, 2::2] = turns.real, -turns.imag
+    return basis
 
 
 def settled_window(dwell: Dwell, rate: float, settled_cycles: float | None = None) -> tuple[int, int]:
@@ -75,7 +74,8 @@ def fit_harmonics(
 ) -> tuple[Complex[np.ndarray, " harmonic"], float]:
     """Gives the complex amplitudes 0..harmonics of a signal and the rms of the rest per degree of freedom."""
     basis = harmonic_basis(time, frequency, harmonics)
-    solution = np.linalg.lstsq(basis, signal, rcond=None)[0]
+    # Harmonics over whole cycles are all but orthogonal: their normal equations lose nothing.
+    solution = np.linalg.solve(basis.T @ basis, basis.T @ signal)
     rest = signal - basis @ solution
     freedom = max(signal.size - basis.shape[1], 1)
     amplitudes = np.concatenate([solution[:1] + 0j, solution[1::2] + 1j * solution[2::2]])

@@ -1,5 +1,6 @@
 """The noise of the output channel: the rms per sample that the residual of a perfect model would have."""
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -143,19 +144,31 @@ def dwell_scatter(record: Record, dwell: Dwell, bandwidth: float) -> tuple[float
     if window > 0.7 * (dwell.stop - dwell.start):
         return None
     signal = record.output[dwell.stop - window : dwell.stop]
-    time = (np.arange(window) - 0.5 * (window - 1)) / record.rate
     highest = 0.9 * min(0.5 * record.rate, bandwidth)
     orders = min(_MOST_HARMONICS, int(highest / dwell.frequency), max(1, window // 8))
-    basis = harmonic_basis(time, dwell.frequency, orders)
-    slope = (time / time[-1])[:, None]
-    design = np.concatenate([basis, slope * basis[:, :3]], axis=1)
+    design, inverse = _drifting_harmonics(window, record.rate, dwell.frequency, orders)
     # noise of a narrow band has fewer degrees of freedom than samples; the harmonics take theirs from them
     share = bandwidth / (0.5 * record.rate)
     freedom = window * share - design.shape[1]
     if freedom < design.shape[1]:
         return None
-    rest = signal - design @ np.linalg.solve(design.T @ design, design.T @ signal)
+    rest = signal - design @ (inverse @ (design.T @ signal))
     return float(rest @ rest) * share / freedom, float(freedom)
+
+
+@functools.lru_cache(maxsize=64)
+def _drifting_harmonics(
+    window: int, rate: float, frequency: float, orders: int
+) -> tuple[Float[np.ndarray, "time column"], Float[np.ndarray, "column column"]]:
+    """Gives harmonics whose fundamental drifts linearly, and the inverse of their products.
+
+    The records of a campaign dwell at the same frequencies: all but the first find both ready.
+    """
+    time = (np.arange(window) - 0.5 * (window - 1)) / rate
+    basis = harmonic_basis(time, frequency, orders)
+    slope = (time / time[-1])[:, None]
+    design = np.concatenate([basis, slope * basis[:, :3]], axis=1)
+    return design, np.linalg.inv(design.T @ design)
 
 
 def period_scatter(record: Record) -> float:

@@ -59,7 +59,6 @@ def plot_receptance(
             _backbone(guess, fit, label, colour, width, ax)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("receptance [mm/kN]" if what == "receptance" else "displacement amplitude [mm]")
-    ax.set_yscale("log" if guess.linear and what == "receptance" else "linear")
     ax.legend(fontsize=7, ncols=2 if len(guess.responses) > 4 else 1)
     entitle(ax, "measured receptance" if what == "receptance" else "measured amplitude and model backbone")
     return figure
@@ -122,7 +121,7 @@ def _backbone(guess: ClassicalGuess, fit: Fit, label: str, colour: str, width: f
     stiffness, _ = equivalent_curves(fit.model, amplitudes, centre_frequency(guess))
     physical = stiffness > 0.0
     frequency = np.sqrt(stiffness[physical] / float(fit.model.mass)) / (2.0 * np.pi)
-    ax.plot(frequency, 1e3 * amplitudes[physical], color=colour, linewidth=width, label=f"backbone {label}")
+    ax.plot(frequency, 1e3 * amplitudes[physical], color=colour, linewidth=width, label=f"backbone, {label}")
 
 
 def plot_equivalent(
@@ -152,7 +151,13 @@ def plot_equivalent(
     for (label, fit), colour, width in zip(fits, (BEFORE, AFTER), CURVES, strict=False):
         stiffness, damping = equivalent_curves(fit.model, amplitudes, frequency)
         x, y = (amplitudes, stiffness) if what == "stiffness" else (speeds, damping)
-        ax.plot(1e3 * x, 1e-3 * y, color=colour, linewidth=width, label=f"model {label}")
+        ax.plot(
+            1e3 * x,
+            1e-3 * y,
+            color=colour,
+            linewidth=width,
+            label=label if label == "model" else f"model {label}",
+        )
     law = None if guess.table is None else getattr(guess.table, what)
     if law is not None:
         for direction, rows in zip(law.directions, law.points, strict=True):

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..identification import Candidate, Fit
 from ._quantities import typeset_number, typeset_unit
-from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle
+from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle, pair
 
 _LIKE = "#8fb8de"
 _WRONG = "#f0d5d0"
@@ -104,9 +104,8 @@ def plot_errors(
         "nrmse": (100.0, "NRMSE of free runs [%]", "{:.2f}"),
         "nrmse_segments": (100.0, "NRMSE, segments restarted [%]", "{:.2f}"),
     }[measure]
-    for shift, name, fit, colour in ((-0.2, "before", before, BEFORE), (0.2, "after", after, AFTER)):
-        if fit is None:
-            continue
+    shifts = (0.0,) if after is None else (-0.2, 0.2)
+    for (name, fit, colour), shift in zip(pair(before, after), shifts, strict=True):
         values = np.array([scale * getattr(fit.errors[role], measure) for role in roles])
         bars = ax.bar(np.arange(len(roles)) + shift, values, 0.36, color=colour, label=name)
         ax.bar_label(bars, [form.format(value) for value in values], fontsize=8, padding=1)
@@ -114,6 +113,7 @@ def plot_errors(
         ax.axhline(1.0, color="black", linewidth=0.9, linestyle="--", label="noise")
     ax.set_xticks(range(len(roles)), [ROLES[role] for role in roles])
     ax.margins(y=0.22)
+    ax.set_xlim(-0.6, len(roles) - 0.4)
     ax.grid(False, axis="x")
     ax.set_ylabel(label)
     ax.legend(fontsize=7.5, loc="upper right", ncols=3)
@@ -133,12 +133,9 @@ def plot_stiffness_scatter(before: Fit, after: Fit | None = None, *, ax: Axes | 
     """
     figure, ax = axes_for(ax)
     names = [record.name for record in before.campaign.records]
-    for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
-        if fit is not None:
-            deviation = 100.0 * fit.restarts.stiffness
-            ax.plot(
-                range(len(names)), deviation, "o-", color=colour, markersize=4, linewidth=0.8, label=label
-            )
+    for label, fit, colour in pair(before, after):
+        deviation = 100.0 * fit.restarts.stiffness
+        ax.plot(range(len(names)), deviation, "o-", color=colour, markersize=4, linewidth=0.8, label=label)
     ax.axhline(0.0, color="black", linewidth=0.8)
     ax.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
     ax.set_xlabel("record, in the order of the test")

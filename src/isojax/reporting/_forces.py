@@ -14,7 +14,7 @@ from ..identification import Fit
 from ..models import Isolator
 from ..records import Record, measured_state
 from ._cycles import trace_cycles
-from ._style import AFTER, BAND, BEFORE, CURVES, MEASURED, NEUTRAL, axes_for, entitle
+from ._style import AFTER, BAND, CURVES, MEASURED, NEUTRAL, axes_for, entitle, pair
 
 _MOST_POINTS = 4000
 
@@ -80,10 +80,8 @@ def plot_restoring_force(
         label="measured F − m a",
     )
     grid = np.linspace(-1.25 * reach, 1.25 * reach, 801)
-    pairs = (("model before", before, BEFORE), ("model after", after, AFTER))
-    for (label, fit, colour), width in zip(pairs, CURVES, strict=True):
-        if fit is not None:
-            ax.plot(1e3 * grid, _slice(fit.model, grid, what), color=colour, linewidth=width, label=label)
+    for (label, fit, colour), width in zip(pair(before, after), CURVES, strict=False):
+        ax.plot(1e3 * grid, _slice(fit.model, grid, what), color=colour, linewidth=width, label=label)
     ax.axvspan(-1e3 * reach, 1e3 * reach, color=BAND, alpha=0.6, zorder=0, label="visited")
     ax.set_xlim(1e3 * grid[0], 1e3 * grid[-1])
     ax.set_xlabel("displacement [mm]" if what == "stiffness" else "velocity [mm/s]")

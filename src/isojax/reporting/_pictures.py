@@ -16,6 +16,7 @@ from ._cycles import trace_cycles
 from ._evidence import plot_errors, plot_ranking, plot_stiffness_scatter
 from ._forces import effect_on_its_own, measured_forces, plot_effect, plot_restoring_force
 from ._residuals import plot_correlation, plot_cycle_residual, plot_residual, plot_where
+from ._style import pair
 from ._time_history import plot_time_history, worst_window
 
 _DPI = 144
@@ -181,7 +182,12 @@ def record_pictures(loop: Loop) -> tuple[Picture, ...]:
         *_draw("residual", "Whole record, one scale.", plot_residual, before, after, record=place),
         *_draw("autocorrelation", "Fitted records; white noise stays inside.", plot_correlation, left, right),
         *_draw(
-            "cross-correlation", "Inside the band: nothing of the drive is left in it.", plot_correlation, left, right, what="drive"
+            "cross-correlation",
+            "Inside the band: nothing of the drive is left in it.",
+            plot_correlation,
+            left,
+            right,
+            what="drive",
         ),
     )
 
@@ -197,7 +203,7 @@ def force_pictures(loop: Loop) -> tuple[Picture, ...]:
     """
     before, after = _models(loop)
     guess = loop.guess
-    fits = [(label, fit) for label, fit in (("before", before), ("after", after)) if fit is not None]
+    fits = [] if before is None else [(label, fit) for label, fit, _ in pair(before, after)]
     pictures: tuple[Picture, ...] = ()
     if guess.responses or guess.linear:
         caption = "Displacement over the measured force, by level and sweep direction."
@@ -227,7 +233,7 @@ def health_pictures(loop: Loop) -> tuple[Picture, ...]:
         The pictures.
     """
     before, after = _models(loop)
-    if before is None or not np.any(before.restarts.stiffness):
+    if before is None or len(loop.campaign.records) < 2 or not np.any(before.restarts.stiffness):
         return ()
     caption = "Scatter is data health; a trend in the order of the test is drift."
     return _draw("stiffness of each record", caption, plot_stiffness_scatter, before, after, wide=True)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ..identification import Fit, Residual, Run
 from ._quantities import OUTPUT_UNITS, typeset_unit
-from ._style import AFTER, BAND, BEFORE, ROLES, axes_for, entitle
+from ._style import BAND, ROLES, axes_for, entitle, pair
 from ._time_history import extremes, worst_window
 
 _SMOOTH = 60
@@ -44,9 +44,7 @@ def plot_residual(
     low, high = (chosen.time[0], chosen.time[-1]) if window is None else window
     shown = (chosen.time >= low) & (chosen.time <= high)
     time = chosen.time[shown]
-    for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
-        if fit is None:
-            continue
+    for label, fit, colour in pair(before, after):
         values = fit.restarts.runs[place].residual[shown]
         if values.size > 3000:
             start, lowest, highest = extremes(time, values)
@@ -87,9 +85,7 @@ def plot_correlation(
         The figure.
     """
     figure, ax = axes_for(ax)
-    for label, residual, colour in (("before", before, BEFORE), ("after", after, AFTER)):
-        if residual is None:
-            continue
+    for label, residual, colour in pair(before, after):
         rows = residual.autocorrelation if what == "residual" else residual.cross_correlation
         shown = residual.lags > 0 if what == "residual" else np.full(residual.lags.size, True)
         inside = float(np.mean(np.abs(rows[:, shown]) <= residual.band[:, None]))
@@ -119,9 +115,9 @@ def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None)
     """
     figure, ax = axes_for(ax)
     dwelling = all(run.record.dwells for run in before.restarts.runs)
-    for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
+    for label, fit, colour in pair(before, after):
         for role, marker in (("fit", "o"), ("holdout", "D")):
-            runs = () if fit is None else tuple(run for run in fit.restarts.runs if run.record.role == role)
+            runs = tuple(run for run in fit.restarts.runs if run.record.role == role)
             points = [point for run in runs for point in _sizes(run, dwelling)]
             if points:
                 x, rms = np.array(points).T
@@ -164,11 +160,10 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
     part = np.minimum((phase * _PHASES).astype(int), _PHASES - 1)
     count = np.maximum(np.bincount(part, minlength=_PHASES), 1)
     degrees = (np.arange(_PHASES) + 0.5) * 360.0 / _PHASES
-    for label, fit, colour in (("before", before, BEFORE), ("after", after, AFTER)):
-        if fit is not None:
-            values = fit.restarts.runs[place].residual[dwell.start : dwell.stop]
-            mean = np.bincount(part, values, minlength=_PHASES) / count
-            ax.plot(degrees, mean, "o-", color=colour, markersize=3, linewidth=1.0, label=label)
+    for label, fit, colour in pair(before, after):
+        values = fit.restarts.runs[place].residual[dwell.start : dwell.stop]
+        mean = np.bincount(part, values, minlength=_PHASES) / count
+        ax.plot(degrees, mean, "o-", color=colour, markersize=3, linewidth=1.0, label=label)
     band = 2.0 * before.noise.sigma / np.sqrt(count)
     ax.fill_between(degrees, -band, band, color=BAND, zorder=0, label="noise of the mean, ±2σ")
     quantity = before.campaign.output.quantity

@@ -1,6 +1,7 @@
 """How pictures look: colours that mean the same everywhere, and axes to draw on."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,6 +19,21 @@ LEVELS = ("#0b3c6f", "#2a9d8f", "#e08e0b", "#a23b72", "#5f0f40", "#6b705c")
 
 ROLES: Mapping[str, str] = {"fit": "fitted", "holdout": "held out"}
 """What the roles of records are called."""
+
+
+def pair(before: Any, after: Any) -> tuple[tuple[str, Any, str], ...]:
+    """Give what is drawn for the models before and after, or for the only model.
+
+    Args:
+        before: of the declared model.
+        after: of the extended model, or None.
+
+    Returns:
+        Label, what was given, colour.
+    """
+    if after is None:
+        return (("model", before, AFTER),)
+    return (("before", before, BEFORE), ("after", after, AFTER))
 
 
 def axes_for(ax: Axes | None, width: float = 7.0, height: float = 3.2) -> tuple[Figure, Axes]:

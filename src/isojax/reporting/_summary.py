@@ -38,7 +38,7 @@ def render_text(content: RenderableType, width: int = 110) -> str:
         The text, without colours.
     """
     page = StringIO()
-    Console(file=page, width=width, color_system=None, highlight=False).print(content)
+    Console(file=page, width=width, color_system=None, highlight=False, force_jupyter=False).print(content)
     return page.getvalue().rstrip("\n")
 
 
@@ -61,7 +61,7 @@ def error_table(before: Fit, after: Fit) -> Table:
     """
     unit = typeset_unit(OUTPUT_UNITS[before.campaign.output.quantity])
     table = _table("Error", "records", "", f"free-run RMSE [{unit}]", "NRMSE", "NRMSE, restarted", "χ²/dof")
-    rows = (("before", before),) if before is after else (("before", before), ("after", after))
+    rows = (("", before),) if before is after else (("before", before), ("after", after))
     for role, words in ROLES.items():
         for label, fit in rows:
             errors = fit.errors[role]

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ..identification import Fit
 from ..records import Record
 from ._quantities import OUTPUT_UNITS, typeset_unit
-from ._style import AFTER, BEFORE, MEASURED, ROLES, axes_for, entitle
+from ._style import MEASURED, ROLES, axes_for, entitle, pair
 
 _CYCLES = 6.0
 """Cycles of the drive in a zoomed window."""
@@ -96,11 +96,9 @@ def plot_time_history(
     chosen = before.free_runs[place].record
     low, high = (chosen.time[0], chosen.time[-1]) if window is None else window
     shown = (chosen.time >= low) & (chosen.time <= high)
-    curves = [("measured", chosen.output, MEASURED, "-", 1.0)]
-    curves.append(("model before", before.free_runs[place].simulated, BEFORE, "--", 1.3))
-    if after is not None:
-        curves.append(("model after", after.free_runs[place].simulated, AFTER, "-", 1.0))
-    for label, signal, colour, style, width in curves:
+    curves = [("measured", chosen.output, MEASURED)]
+    curves += [(label, fit.free_runs[place].simulated, colour) for label, fit, colour in pair(before, after)]
+    for label, signal, colour in curves:
         time, values = chosen.time[shown], signal[shown]
         if values.size > _DENSE:
             start, lowest, highest = extremes(time, values)
@@ -108,7 +106,9 @@ def plot_time_history(
         elif label == "measured":
             ax.plot(time, values, ".", color=colour, markersize=3.0, label=label)
         else:
-            ax.plot(time, values, style, color=colour, linewidth=width, label=label)
+            ax.plot(
+                time, values, "--" if label == "before" else "-", color=colour, linewidth=1.1, label=label
+            )
     quantity = before.campaign.output.quantity
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"{quantity} [{typeset_unit(OUTPUT_UNITS[quantity])}]")
