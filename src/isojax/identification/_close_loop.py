@@ -61,7 +61,7 @@ def close_loop(
     first = before.estimate.excess
     extensions: list[Extension] = []
     significance, stopped_good = 0.01, False
-    while not stopped_good:
+    while True:
         verdict = diagnose(
             current, first_excess=first, significance=significance, solver=solver, progress=progress
         )
@@ -73,6 +73,8 @@ def close_loop(
         significance *= 0.5
         found = current.estimate
         stopped_good = is_good(found.chi2 / found.dof, found.excess, first)
+        if stopped_good:
+            break
     if stopped_good:
         progress("how large the effects that were not found could still be")
     bounds = remaining_bounds(current) if stopped_good else verdict.bounds

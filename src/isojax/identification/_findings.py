@@ -148,8 +148,8 @@ class Loop(NamedTuple):
         after: the final fit (the same as `before` where nothing was added).
         verdict: over all iterations.
         last: the last diagnosis: of the final fit where that found nothing, else of the fit before it.
-        bounds: for each effect that was not found, how large its strength could still be beside the final model,
-            with its unit.
+        bounds: for each effect that was not found, how large its strength could still be beside the
+            final model, with its unit.
         seconds: wall time.
     """
 
