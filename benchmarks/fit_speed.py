@@ -32,6 +32,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -207,7 +208,7 @@ class Peer:
     def run(self, method: str) -> tuple[float, dict]:
         """Fit, and say how long it took."""
         self.at, self.passes = np.full(6, np.nan), 0
-        jacobian = self.give_jacobian if self.tuned else "2-point"
+        jacobian: Any = self.give_jacobian if self.tuned else "2-point"
         begin = time.perf_counter()
         found = least_squares(
             self.give_residual, self.start / self.sizes, jacobian, method=method, x_scale="jac"

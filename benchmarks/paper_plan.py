@@ -31,6 +31,7 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Literal
 
 import jax
 import numpy as np
@@ -46,7 +47,7 @@ FACTORS = np.array([1.0, 8.0 / (3.0 * np.pi), 0.75])
 class Case:
     """One direction of the paper."""
 
-    direction: str
+    direction: Literal["y", "z"]
     truth: tuple[float, ...]
     levels: tuple[float, ...]
     lines: np.ndarray
@@ -80,7 +81,7 @@ def write_test(direction: str, repeats: int) -> Path:
     folder = folder_of(direction, repeats)
     if not (folder / "campaign.toml").exists():
         case = CASES[direction]
-        plan = rig.paper_plan(direction, case.levels, repeats)
+        plan = rig.paper_plan(case.direction, case.levels, repeats)
         plant = {"y": rig.y_plant, "z": rig.z_plant}[direction]()
         rig.write_campaign(folder, plant, plan, 7, f"the paper's test, {direction}", rig.Bench(noise=0.01))
     return folder / "campaign.toml"

@@ -262,4 +262,4 @@ def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
     found = column_information(moved, len(model.elements), prepared)
     for lane in range(2):
         reference = exact[lane][np.ix_(keep, keep)]
-        assert _deviation(found[lane], reference) < 1e-4
+        assert _deviation(found[lane], reference) < 3e-4

@@ -37,6 +37,9 @@ SMALLEST_SHARE = 0.2
 SURVIVORS = 4
 """Families that are refitted."""
 
+WORTH_REFIT = 0.04
+"""Linear gain, over that of the leading family, below which no shape parameter could make up for the difference."""
+
 ROUGH = 1.0
 """Decrease of chi2 below which the refit of a candidate is over: a tenth of the evidence that ranks it."""
 
@@ -187,6 +190,8 @@ def diagnose(
             break
         if not score.admissible or score.p_value > significance:
             continue
+        if refits and score.z**2 < WORTH_REFIT * refits[0].score.z ** 2:
+            break
         # The score says what one linear step could gain at most when the model is near; far away it only
         # ranks.
         if chi2_per_dof <= GOOD and score.z**2 / fitted.dof < SMALLEST_GAIN / 5.0:
