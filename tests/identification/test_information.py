@@ -236,9 +236,10 @@ PROBES = (
     [
         Isolator(800.0, (*SPRING,)),
         Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))),
+        Isolator(800.0, (*SPRING, CoulombFriction(8.0, 2e-2))),
         Isolator(800.0, (LinearDamping(1e4), CubicStiffness(2e13)), "base_acceleration"),
     ],
-    ids=["spring", "memory", "base excitation"],
+    ids=["spring", "memory", "two steps a sample", "base excitation"],
 )
 def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
     probes = tuple(probe for probe in PROBES if model.element(probe.name) is None)

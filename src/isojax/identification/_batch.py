@@ -2,7 +2,9 @@
 
 import dataclasses
 import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import diffrax
 import equinox as eqx
@@ -83,6 +85,32 @@ def workers() -> int:
     return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
 
 
+_Table = tuple[Float[np.ndarray, "time stage"], Float[np.ndarray, "time stage"]]
+_TABLES: WeakKeyDictionary[Record, dict[tuple[Hold, int, float], _Table]] = WeakKeyDictionary()
+_KEPT_TABLES = 1
+
+
+def drive_table(record: Record, hold: Hold, substeps: int, shift: float) -> _Table:
+    """Give a record's drive and its derivative at the stages of the steps; the last few tables are kept.
+
+    Args:
+        record: the record.
+        hold: what the drive does between samples.
+        substeps: integration steps a sample.
+        shift: time by which the drive acts later than it was recorded [s].
+
+    Returns:
+        As `tabulate`.
+    """
+    known = _TABLES.setdefault(record, {})
+    key = (hold, substeps, shift)
+    if key not in known:
+        while len(known) >= _KEPT_TABLES:
+            del known[next(iter(known))]
+        known[key] = tabulate(record.input, record.rate, hold, substeps, shift)
+    return known[key]
+
+
 def prepare(
     records: tuple[Record, ...],
     segments: tuple[Segment, ...],
@@ -111,25 +139,27 @@ def prepare(
     threads = min(workers(), len(segments))
     lanes = -(-len(segments) // threads) * threads
     stages = 2 * substeps + 1
-    drive = np.zeros((length, stages, lanes))
-    rates = np.zeros((length, stages, lanes))
-    measured, weight = np.zeros((length, lanes)), np.zeros((length, lanes))
+    # Filled lane by lane, then turned: writing across the lanes would touch a cache line a sample.
+    drive, rates = np.zeros((lanes, length, stages)), np.zeros((lanes, length, stages))
+    measured, weight = np.zeros((lanes, length)), np.zeros((lanes, length))
     starts, spread = np.zeros((2, lanes)), np.ones((2, lanes))
     owner = np.zeros(lanes, dtype=int)
-    place = -1
-    table = slopes = np.zeros((0, stages))
-    motion: tuple[np.ndarray, ...] = ()
+
+    def known(place: int) -> tuple[_Table, tuple[np.ndarray, ...]]:
+        record = records[place]
+        return drive_table(record, hold, substeps, shift), coordinate_motion(record, quantity, based)
+
+    with ThreadPoolExecutor(workers()) as pool:
+        used = sorted({segment.record for segment in segments})
+        content = dict(zip(used, pool.map(known, used), strict=True))
     for lane, segment in enumerate(segments):
         record = records[segment.record]
-        if segment.record != place:
-            place = segment.record
-            table, slopes = tabulate(record.input, record.rate, hold, substeps, shift)
-            motion = coordinate_motion(record, quantity, based)
+        (table, slopes), motion = content[segment.record]
         window = slice(segment.start, segment.stop)
         size = segment.stop - segment.start
-        drive[:size, :, lane], rates[:size, :, lane] = table[window], slopes[window]
-        measured[:size, lane] = record.output[window]
-        weight[segment.counted - segment.start : size, lane] = 1.0
+        drive[lane, :size], rates[lane, :size] = table[window], slopes[window]
+        measured[lane, :size] = record.output[window]
+        weight[lane, segment.counted - segment.start : size] = 1.0
         owner[lane] = segment.record
         for state in range(2):
             starts[state, lane] = motion[state][segment.start]
@@ -137,11 +167,14 @@ def prepare(
     share = lanes // threads
     batches = tuple(
         Batch(
-            *(jnp.asarray(values[..., first : first + share]) for values in (drive, rates, measured, weight))
+            *(
+                jnp.moveaxis(jnp.asarray(values[first : first + share]), 0, -1)
+                for values in (drive, rates, measured, weight)
+            )
         )
         for first in range(0, lanes, share)
     )
-    count = np.bincount(owner, weights=weight.sum(axis=0), minlength=len(records))
+    count = np.bincount(owner, weights=weight.sum(axis=1), minlength=len(records))
     return Prepared(batches, segments, owner, starts, spread, quantity, 1.0 / records[0].rate, count)
 
 

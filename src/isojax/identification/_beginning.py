@@ -6,7 +6,7 @@ from jaxtyping import Float
 from .._parameters import list_parameters
 from ..models import Isolator
 from ..records import Record
-from ._elimination import step_nuisances
+from ._elimination import Nuisances, step_nuisances
 from ._problem import Bench, Point, Problem
 from ._segments import Segment
 
@@ -14,26 +14,33 @@ ROUNDS = 3
 """Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
 
 
-def best_nuisances(bench: Bench, model: Isolator, spread: float) -> Point:
+SETTLED = 1e-2
+"""Change of chi2, per max(chi2/dof, 1), below which the nuisances stand."""
+
+
+def best_nuisances(bench: Bench, model: Isolator, spread: float, known: Nuisances | None = None) -> Point:
     """Find the nuisances at given coefficients.
 
     Args:
         bench: the records.
         model: the isolator.
         spread: prior standard deviation of each record's linear stiffness.
+        known: where to begin; at the measured states if omitted.
 
     Returns:
         The point; no coefficient has a column.
     """
     nothing = np.zeros((len(list_parameters(model)), 0))
     carried = len(model.elements)
-    point = bench.evaluate(model, nothing, bench.settle(None, model, carried, spread))
+    point = bench.evaluate(model, nothing, bench.settle(known, model, carried, spread))
     owner = bench.prepared(model, carried).record
     for _ in range(ROUNDS):
         if not point.is_finite:
             break
         moved = step_nuisances(point.reduced, owner, point.nuisances, np.zeros(0))
-        point = bench.evaluate(model, nothing, moved)
+        before, point = point, bench.evaluate(model, nothing, moved)
+        if abs(before.chi2 - point.chi2) < SETTLED * max(1.0, point.chi2 / max(1.0, point.free_samples)):
+            break
     return point
 
 

@@ -21,7 +21,7 @@ from ._batch import Batch, Prepared, workers
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, scaled_model, share_lanes
 
 
-def _nodes(table: Float[Array, "time stage lanes"]) -> Float[Array, "node stage lanes"]:
+def _nodes(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lanes"]:
     """Split each sample into its integration steps, three stages each."""
     time, stages, lanes = table.shape
     steps = (stages - 1) // 2

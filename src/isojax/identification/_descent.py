@@ -16,7 +16,7 @@ from ..models import Isolator
 from ._elimination import Nuisances, step_nuisances
 from ._problem import Bench, Point, one_hot
 
-FIRST_DAMPING = 1e-3
+FIRST_DAMPING = 1e-5
 """Marquardt's damping at the first step, over the diagonal of the normal equations: starts are good."""
 
 MOST_REFUSALS = 8

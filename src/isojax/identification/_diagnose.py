@@ -38,7 +38,7 @@ SURVIVORS = 4
 """Families that are refitted."""
 
 WORTH_REFIT = 0.04
-"""Linear gain, over that of the leading family, below which no shape parameter could make up for the difference."""
+"""Linear gain, over that of the leading family, below which no shape parameter makes up the difference."""
 
 ROUGH = 1.0
 """Decrease of chi2 below which the refit of a candidate is over: a tenth of the evidence that ranks it."""

@@ -90,19 +90,20 @@ def _simulate_lanes(
     return [simulated[: part.stop - part.start, lane] for lane, part in enumerate(prepared.segments)]
 
 
-def restart_records(problem: Problem, model: Isolator, spread: float) -> Restarts:
+def restart_records(bench: Bench, model: Isolator, spread: float, known: Nuisances | None = None) -> Restarts:
     """Restart every segment from its best initial state; no coefficient is touched.
 
     Args:
-        problem: the records.
+        bench: the records.
         model: the isolator.
         spread: prior standard deviation of each record's linear stiffness.
+        known: nuisances to begin with; the measured states if omitted.
 
     Returns:
         The records against their restarted simulations.
     """
-    bench = Bench(problem)
-    point = best_nuisances(bench, model, spread)
+    problem = bench.problem
+    point = best_nuisances(bench, model, spread, known)
     simulated = [np.full(record.output.size, np.nan) for record in problem.records]
     counted = [np.zeros(record.output.size) for record in problem.records]
     for part, values in zip(problem.segments, _simulate_lanes(bench, model, point.nuisances), strict=True):

@@ -219,7 +219,10 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
     spread = found.point.nuisances.stiffness_spread
     with np.errstate(over="ignore", invalid="ignore"):
         free_runs = run_freely(everything, found.model)
-        restarts = restart_records(everything, found.model, spread)
+        if everything.records == fitted.records and everything.segments == fitted.segments:
+            restarts = restart_records(found.bench, found.model, spread, found.point.nuisances)
+        else:
+            restarts = restart_records(Bench(everything), found.model, spread)
     if not is_successful(found.result):
         free_runs = tuple(without_values(run) for run in free_runs)
         restarts = restarts._replace(runs=tuple(without_values(run) for run in restarts.runs))

@@ -75,8 +75,11 @@ def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> 
         Displacement, velocity, acceleration and drive. Where an absolute acceleration was measured under base
         excitation, the motion of the base is taken off.
     """
-    moved = record.output - record.input if is_absolute(campaign) else record.output
-    own = dataclasses.replace(record, output=moved - origin)
+    own = record
+    if is_absolute(campaign) or origin != 0.0:
+        own = dataclasses.replace(
+            record, output=record.output - origin - (record.input if is_absolute(campaign) else 0.0)
+        )
     band, margin = excited_band(own), 0
     if campaign.output.quantity != "displacement":
         lowest = min(_NEARER * max(band.lowest, _ringing(own)), 0.5 * band.highest)

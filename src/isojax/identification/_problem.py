@@ -111,6 +111,7 @@ class Bench:
         self._heads = Bench(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
         self._prepared: dict[tuple[int, float], Prepared] = {}
         self._memories: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
+        self._last: tuple[tuple[np.ndarray, ...], Float[np.ndarray, "lanes column column"]] | None = None
 
     def prepared(self, model: Isolator, carried: int) -> Prepared:
         """Give the batches for a model.
@@ -216,7 +217,7 @@ class Bench:
         states[:own] += scales[:own] * nuisances.states.T
         factor = 1.0 + stiffness_deviation(nuisances)[prepared.record]
         unknowns = Unknowns(model, directions, factor, states, scales)
-        matrices = _matrices(unknowns, carried, prepared)
+        matrices = self._matrices(unknowns, carried, prepared)
         heads = None
         if self._heads is not None:
             heads = _matrices(unknowns, carried, self._heads.prepared(model, carried))
@@ -232,6 +233,21 @@ class Bench:
             heads,
         )
         return Point(model, nuisances, reduced, prepared.samples)
+
+    def _matrices(
+        self, unknowns: Unknowns, carried: int, prepared: Prepared
+    ) -> Float[np.ndarray, "lanes column column"]:
+        """Give the information matrices, worked out anew only where something moved."""
+        values = np.array([float(entry.value) for entry in list_parameters(unknowns.model)])
+        at = (values, unknowns.directions, unknowns.stiffness_scale, unknowns.states, np.array([carried]))
+        if self._last is not None and all(
+            old.shape == new.shape and np.allclose(old, new, rtol=1e-13, atol=0.0)
+            for old, new in zip(self._last[0], at, strict=True)
+        ):
+            return self._last[1]
+        matrices = _matrices(unknowns, carried, prepared)
+        self._last = (at, matrices)
+        return matrices
 
 
 def _matrices(

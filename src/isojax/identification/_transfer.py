@@ -69,7 +69,7 @@ def transferred_share(
         )
         if part.result == RESULTS.not_finite:
             return 0.0
-        point = restart_records(unseen, part.model, nuisances.stiffness_spread).point
+        point = restart_records(Bench(unseen), part.model, nuisances.stiffness_spread).point
         excess.append(point.chi2 - point.free_samples)
     if not np.isfinite(excess[1]):
         return 0.0

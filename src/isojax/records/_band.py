@@ -1,10 +1,13 @@
 """The band that a record excites, and the floor of its output's spectrum."""
 
 from dataclasses import dataclass
+from typing import cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.signal
 from jaxtyping import Float
+from scipy.fft import next_fast_len
 
 from ._record import Record
 
@@ -22,6 +25,10 @@ class Band:
     highest: float
 
 
+_KNOWN: WeakKeyDictionary[Record, Band] = WeakKeyDictionary()
+"""Bands already worked out: a fit asks for each several times."""
+
+
 def power_spectrum(
     signal: Float[np.ndarray, " time"], rate: float, averages: int = 8
 ) -> tuple[Float[np.ndarray, " frequency"], Float[np.ndarray, " frequency"]]:
@@ -30,7 +37,8 @@ def power_spectrum(
 
     The window is a four-term Blackman-Harris: its side lobes, below -92 dB, do not lift the floor.
     """
-    segment = min(signal.size, max(64, 2 * signal.size // (averages + 1)))
+    wanted = max(64, 2 * signal.size // (averages + 1))
+    segment = min(signal.size, cast(int, next_fast_len(wanted, real=True)))
     frequency, density = scipy.signal.welch(
         signal - np.mean(signal), rate, window="blackmanharris", nperseg=segment, detrend="linear"
     )
@@ -68,6 +76,12 @@ def excited_band(record: Record) -> Band:
     Returns:
         The band.
     """
+    if record not in _KNOWN:
+        _KNOWN[record] = _find_band(record)
+    return _KNOWN[record]
+
+
+def _find_band(record: Record) -> Band:
     nyquist = 0.5 * record.rate
     slowest = 2.0 * record.rate / record.time.size
     frequency, output = power_spectrum(record.output, record.rate)

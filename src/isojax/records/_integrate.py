@@ -2,6 +2,8 @@
 ends.
 """
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 import scipy.fft
 from jaxtyping import Float
@@ -12,6 +14,10 @@ from ._campaign import OutputQuantity
 from ._record import Record
 
 _ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
+
+_State = tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"], Float[np.ndarray, " time"]]
+_KNOWN: WeakKeyDictionary[Record, dict[OutputQuantity, _State]] = WeakKeyDictionary()
+"""States in the default band that were already worked out: a fit asks for each several times."""
 
 
 def integrate_acceleration(
@@ -69,9 +75,14 @@ def measured_state(
     Raises:
         ValueError: If a frequency is not between 0 and half the rate.
     """
-    band = excited_band(record)
-    lowest = band.lowest if lowest_frequency is None else lowest_frequency
-    highest = band.highest if highest_frequency is None else highest_frequency
+    if lowest_frequency is None and highest_frequency is None:
+        known = _KNOWN.setdefault(record, {})
+        if output_quantity not in known:
+            band = excited_band(record)
+            known[output_quantity] = measured_state(record, output_quantity, band.lowest, band.highest)
+        return known[output_quantity]
+    lowest = excited_band(record).lowest if lowest_frequency is None else lowest_frequency
+    highest = excited_band(record).highest if highest_frequency is None else highest_frequency
     _check_lowest(record.output, record.rate, lowest)
     if not lowest < highest <= 0.5 * record.rate:
         raise ValueError(
