@@ -27,7 +27,7 @@ class CoulombFriction(AbstractElement):
     name: ClassVar[str] = "coulomb_friction"
     words: ClassVar[str] = "dry (Coulomb) friction"
     strength: ClassVar[str] = "force_level"
-    substeps: ClassVar[int] = 2
+    substeps: ClassVar[int] = 4
 
     force_level: Scalar = parameter(symbol="Fc", unit="N", lower=0.0)
     width: Scalar = parameter(symbol="vs", unit="m/s", lower=0.0, fitted=False)

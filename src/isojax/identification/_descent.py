@@ -10,7 +10,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from .._parameters import list_parameters, replace_parameters, to_free, to_physical
+from .._parameters import ParameterSpec, list_parameters, replace_parameters, to_free, to_physical
 from .._results import RESULTS
 from ..models import Isolator
 from ._elimination import Nuisances, step_nuisances
@@ -75,6 +75,19 @@ def _compress(matrix: Float[np.ndarray, "column column"]) -> tuple[np.ndarray, n
 
 
 @eqx.filter_jit
+def _to_physical(
+    free: Float[Array, " column"], scales: Float[Array, " column"], specs: tuple[ParameterSpec, ...]
+) -> tuple[Float[Array, " column"], Float[Array, " column"]]:
+    """Give the physical coefficients of unbounded variables, and their slopes."""
+
+    def each(free: Float[Array, " column"]) -> Float[Array, " column"]:
+        pairs = zip(free, specs, scales, strict=True)
+        return jnp.stack([to_physical(value, spec, scale) for value, spec, scale in pairs])
+
+    return jax.jvp(each, (free,), (jnp.ones_like(free),))
+
+
+@eqx.filter_jit
 def _init(solver: Any, free: Array, local: _Local) -> Any:
     struct = jax.eval_shape(lambda: local.residual)
     return solver.init(_residual, free, local, {}, struct, None, frozenset())
@@ -121,19 +134,14 @@ def descend(
     """
     listed = list_parameters(model)
     values = [entry.value for entry in listed]
-    specs = [listed[place].spec for place in places]
+    specs = tuple(listed[place].spec for place in places)
 
-    def physical(free: Array) -> Isolator:
+    def physical(free: Array) -> tuple[Isolator, list[float]]:
+        found, slopes = _to_physical(free, jnp.asarray(scales), specs)
         numbers = list(values)
-        for column, place in enumerate(places):
-            numbers[place] = to_physical(free[column], specs[column], scales[column])
-        return replace_parameters(model, numbers)
-
-    def slopes(free: Array) -> list[float]:
-        return [
-            float(jax.jvp(lambda u, c=c: to_physical(u, specs[c], scales[c]), (free[c],), (jnp.ones(()),))[1])
-            for c in range(len(places))
-        ]
+        for place, number in zip(places, np.asarray(found), strict=True):
+            numbers[place] = number
+        return replace_parameters(model, numbers), [float(slope) for slope in np.asarray(slopes)]
 
     free = jnp.stack([to_free(values[place], specs[c], scales[c]) for c, place in enumerate(places)])
     # Marquardt's scaling: the solver's variables are those in which the first normal equations have an equal
@@ -145,8 +153,8 @@ def descend(
     result: Any = RESULTS.not_converged
     evaluations, refused, decrement = 0, 0, float("inf")
     while evaluations < max_steps:
-        current = physical(trial)
-        point = bench.evaluate(current, one_hot(current, places, slopes(trial)), trial_nuisances)
+        current, slopes = physical(trial)
+        point = bench.evaluate(current, one_hot(current, places, slopes), trial_nuisances)
         evaluations += 1
         residual, jacobian = _compress(point.reduced.matrix)
         if state is None:
@@ -184,7 +192,7 @@ def descend(
         owner = bench.prepared(best.model, len(best.model.elements)).record
         trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
     assert best is not None
-    return Descent(_in_physical_units(best, slopes(best_free)), result, evaluations)
+    return Descent(_in_physical_units(best, physical(best_free)[1]), result, evaluations)
 
 
 def _in_physical_units(point: Point, slopes: list[float]) -> Point:

@@ -209,6 +209,22 @@ def diagnose(
     return _judge(fit, test, refits, first, scales, significance, solver, progress)
 
 
+def _polished(found: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]) -> Estimate:
+    """Take a rough refit to the end of its search."""
+    progress("the finding, fitted to the end")
+    again = estimate(
+        found.bench,
+        found.model,
+        found.places,
+        scales,
+        nuisances=found.point.nuisances,
+        solver=solver,
+        max_steps=25,
+        progress=progress,
+    )
+    return again if again.result == RESULTS.successful and again.chi2 <= found.chi2 else found
+
+
 def _is_determined(found: Estimate, score: Score) -> bool:
     """Say whether a refitted strength is at least two standard errors from zero."""
     place = _strength_place(found, score)
@@ -270,6 +286,7 @@ def _judge(
         clear = _bic(fitted, inflation) - _bic(best.estimate, inflation) > CLOSE_BIC
         share = transferred_share(fit, best.estimate, scales, solver, progress) if enough and clear else 0.0
         if enough and clear and share > 0.0:
+            usable[0] = best._replace(estimate=_polished(best.estimate, scales, solver, progress))
             return _found(fit, test, usable, ranking, first_excess, share, inflation)
         reason = (
             f"adding {best.score.element.name} gains {gain / fitted.dof:.2g} of chi2/dof for {extra} more "

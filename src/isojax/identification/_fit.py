@@ -34,7 +34,8 @@ class Statistics(NamedTuple):
         bic: Schwarz's criterion, chi2 + coefficients ln(samples).
         steps: simulations with derivatives that the search took.
         stiffness_scatter: standard deviation of the linear stiffness between records [relative].
-        integration_error: rms change of the readings when the integration step is halved, over the noise.
+        integration_error: rms change of the readings when the integration steps are halved, over the noise; NaN
+            where the steps were given.
     """
 
     samples: int
@@ -191,7 +192,7 @@ def bench_for(model: Isolator, campaign: Campaign, noise: float, integrator: Int
         integrator=Integrator() if integrator is None else integrator,
     )
     if integrator is None:
-        problem = problem._replace(integrator=find_integrator(problem, model))
+        problem = find_integrator(problem, model)
     return Bench(problem)
 
 
@@ -240,7 +241,7 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         found.chi2 + count * float(np.log(samples)),
         found.steps,
         spread,
-        float("nan"),
+        fitted.step_error,
     )
     return Fit(
         found.model,

@@ -38,6 +38,7 @@ class Problem(NamedTuple):
     noise: float
     integrator: Integrator
     heads: tuple[Segment, ...] = ()
+    step_error: float = float("nan")
 
 
 class Point(NamedTuple):

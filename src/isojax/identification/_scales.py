@@ -1,10 +1,13 @@
 """Typical magnitudes of a campaign."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from jaxtyping import Float
 
 from ..elements import Scales
 from ..records import Campaign, Record
+from ._batch import workers
 from ._motion import Motion, measured_motion
 
 _PERIODS_A_WINDOW = 4.0
@@ -67,7 +70,8 @@ def scales(campaign: Campaign) -> Scales:
     records = campaign.fit_records
     if not records:
         raise ValueError(f'{campaign.file} must have at least one record with role "fit", but has none.')
-    motions = [measured_motion(campaign, record) for record in records]
+    with ThreadPoolExecutor(workers()) as pool:
+        motions = list(pool.map(lambda record: measured_motion(campaign, record), records))
     reading = _amplitude([record.output for record in records])
     if reading == 0:
         raise ValueError(f"The output of {campaign.file} must move, but is constant in every record to fit.")

@@ -41,7 +41,7 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     return float(np.sqrt(np.sum(difference**2) / np.sum(weight)) / problem.noise)
 
 
-def find_integrator(problem: Problem, model: Isolator) -> Integrator:
+def find_integrator(problem: Problem, model: Isolator) -> Problem:
     """Find the coarsest steps whose error is a small share of the noise.
 
     Args:
@@ -49,9 +49,11 @@ def find_integrator(problem: Problem, model: Isolator) -> Integrator:
         model: the isolator; a start will do.
 
     Returns:
-        The integrator; the finest that was tried where none suffices.
+        The problem with its integrator, the finest that was tried where none suffices, and the error of its steps.
     """
     substeps = model.substeps
-    while substeps < FINEST and step_error(problem, model, substeps) > SHARE_OF_NOISE:
+    error = step_error(problem, model, substeps)
+    while substeps < FINEST and error > SHARE_OF_NOISE:
         substeps *= 2
-    return Integrator(problem.integrator.solver, substeps)
+        error = step_error(problem, model, substeps)
+    return problem._replace(integrator=Integrator(problem.integrator.solver, substeps), step_error=error)
