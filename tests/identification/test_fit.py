@@ -352,7 +352,7 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
     problem = _stiff_problem(simulated, model)
     coarse, fine = step_error(problem, model, 1), step_error(problem, model, 2)
     assert coarse / fine == pytest.approx(16.0, rel=0.35)
-    chosen = find_integrator(problem, model)
+    chosen = find_integrator(problem, model).integrator
     assert chosen.substeps > 1
     assert (
         step_error(problem, model, chosen.substeps) <= 0.05 < step_error(problem, model, chosen.substeps // 2)
@@ -362,4 +362,4 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
 def test_an_element_with_a_sharp_law_keeps_its_own_steps(simulated):
     model = START.with_elements(CoulombFriction(1.0, 1.0))
     problem = _stiff_problem(simulated, model)._replace(noise=1e3)
-    assert find_integrator(problem, model).substeps == CoulombFriction.substeps
+    assert find_integrator(problem, model).integrator.substeps == CoulombFriction.substeps

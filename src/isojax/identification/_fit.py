@@ -34,8 +34,8 @@ class Statistics(NamedTuple):
         bic: Schwarz's criterion, chi2 + coefficients ln(samples).
         steps: simulations with derivatives that the search took.
         stiffness_scatter: standard deviation of the linear stiffness between records [relative].
-        integration_error: rms change of the readings when the integration steps are halved, over the noise; NaN
-            where the steps were given.
+        integration_error: rms change of the readings when the integration steps are halved, over the noise;
+            NaN where the steps were given.
     """
 
     samples: int

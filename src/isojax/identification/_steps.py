@@ -49,7 +49,7 @@ def find_integrator(problem: Problem, model: Isolator) -> Problem:
         model: the isolator; a start will do.
 
     Returns:
-        The problem with its integrator, the finest that was tried where none suffices, and the error of its steps.
+        The problem with its integrator (the finest that was tried where none suffices) and its step error.
     """
     substeps = model.substeps
     error = step_error(problem, model, substeps)
