@@ -1,0 +1,161 @@
+"""Candidates refitted: the model with one absent effect, everything free."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._parameters import list_parameters, own_parameters, replace_parameters
+from .._results import RESULTS
+from ..elements import AbstractElement, Scales
+from ..models import Isolator
+from ._elimination import Nuisances
+from ._estimate import Estimate, estimate
+from ._score import Score, ScoreTest
+
+ROUGH = 1.0
+"""Decrease of chi2 below which the refit of a candidate is over: a tenth of the evidence that ranks it."""
+
+
+class Refit(NamedTuple):
+    """A candidate refitted with everything free.
+
+    Attributes:
+        score: its score before.
+        estimate: the refit.
+        violation: what is unphysical about it, or None.
+    """
+
+    score: Score
+    estimate: Estimate
+    violation: str | None
+
+
+def refit_candidate(
+    test: ScoreTest, index: int, scales: Scales, solver: Any, max_steps: int, progress: Callable[[str], None]
+) -> Estimate:
+    """Fit the model with one absent effect, everything free, from the linear step that the score gives.
+
+    Args:
+        test: the score test.
+        index: the candidate.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations at most.
+        progress: told a line a step.
+
+    Returns:
+        The refit.
+    """
+    fitted, score = test.fitted, test.scores[index]
+    element = score.element
+    best: tuple[float, Isolator, Nuisances] | None = None
+    added = element.internal_states
+    for share in (1.0, 0.3, 0.03):
+        model = _extended(fitted, element, share * score.strength, share * test.steps[index])
+        old, new = fitted.point.nuisances, test.nuisances[index]
+        states = old.states + share * (new.states - old.states)
+        states = np.concatenate([states, np.zeros((states.shape[0], added))], axis=1)
+        stiffness = old.stiffness + share * (new.stiffness - old.stiffness)
+        nuisances = Nuisances(states, stiffness, old.stiffness_spread)
+        nothing = np.zeros((len(list_parameters(model)), 0))
+        point = fitted.bench.evaluate(model, nothing, nuisances)
+        if point.is_finite and (best is None or point.chi2 < best[0]):
+            best = (point.chi2, model, nuisances)
+        if best is not None and best[0] < fitted.chi2:
+            break
+    if best is None:
+        return fitted._replace(result=RESULTS.not_finite)
+    _, model, nuisances = best
+    names = {f"{name}" for name in fitted.names}
+    listed = list_parameters(model)
+    first_new = len(listed) - len(own_parameters(element))
+    places = tuple(
+        place
+        for place, entry in enumerate(listed)
+        if entry.name in names or (place >= first_new and entry.spec.fitted)
+    )
+    return estimate(
+        fitted.bench,
+        model,
+        places,
+        scales,
+        nuisances=nuisances,
+        solver=solver,
+        max_steps=max_steps,
+        progress=progress,
+        tolerance=ROUGH,
+    )
+
+
+def _extended(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
+    """Give the model with the effect at a strength, the fitted coefficients moved by a step."""
+    model = fitted.model.with_elements(element)
+    listed = list_parameters(model)
+    numbers = [entry.value for entry in listed]
+    for place, change in zip(fitted.places, step, strict=True):
+        moved = float(numbers[place]) + float(change)
+        spec = listed[place].spec
+        if spec.lower < moved < spec.upper:
+            numbers[place] = numbers[place] * 0.0 + moved
+    fields = [name for name, _ in own_parameters(element)]
+    place = len(listed) - len(fields) + fields.index(element.strength)
+    numbers[place] = numbers[place] * 0.0 + strength
+    return replace_parameters(model, numbers)
+
+
+def polish(found: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]) -> Estimate:
+    """Take a rough refit to the end of its search.
+
+    Args:
+        found: the refit.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        progress: told a line a step.
+
+    Returns:
+        The estimate, no worse than the refit.
+    """
+    progress("the finding, fitted to the end")
+    again = estimate(
+        found.bench,
+        found.model,
+        found.places,
+        scales,
+        nuisances=found.point.nuisances,
+        solver=solver,
+        max_steps=25,
+        progress=progress,
+    )
+    return again if again.result == RESULTS.successful and again.chi2 <= found.chi2 else found
+
+
+def is_determined(found: Estimate, score: Score) -> bool:
+    """Say whether a refitted strength is at least two standard errors from zero.
+
+    Args:
+        found: the refit.
+        score: the score of its effect.
+
+    Returns:
+        True if it is.
+    """
+    place = strength_place(found, score)
+    error = float(found.uncertainty.standard_error[place])
+    strength = float(list_parameters(found.model)[found.places[place]].value)
+    return abs(strength) > 2.0 * error
+
+
+def strength_place(found: Estimate, score: Score) -> int:
+    """Give the place of a candidate's strength among the free coefficients of its refit.
+
+    Args:
+        found: the refit.
+        score: the score of its effect.
+
+    Returns:
+        Its column.
+    """
+    listed = [entry.name for entry in list_parameters(found.model)]
+    fields = [name for name, _ in own_parameters(score.element)]
+    return found.places.index(len(listed) - len(fields) + fields.index(score.element.strength))
