@@ -63,10 +63,14 @@ def test_the_width_loses_the_documented_share_of_the_dissipation():
 
 def test_the_guessed_width_is_a_fiftieth_of_the_slowest_motion():
     assert float(CoulombFriction.guess(scales()).width) == 0.02 * 0.02
+    # Where the velocity changes by more than that in half a step, the step decides.
+    step = 1e-3 / CoulombFriction.substeps
+    fast = scales(slowest_velocity=1e-3)
+    np.testing.assert_allclose(float(CoulombFriction.guess(fast).width), 0.5 * 2.2 * step, rtol=1e-12)
 
 
 def test_the_guessed_width_stays_integrable_where_a_record_comes_to_rest():
-    quiet = scales(slowest_velocity=0.0)
+    quiet = scales(slowest_velocity=0.0, acceleration=0.0)
     width = float(CoulombFriction.guess(quiet).width)
     np.testing.assert_allclose(width, 0.5 * 150.0 * 1e-3 / CoulombFriction.substeps / 800.0, rtol=1e-12)
     # Friction equal to the whole drive: the mass must creep within the width, not chatter from step to step.

@@ -1,4 +1,5 @@
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -91,7 +92,9 @@ def test_failed_fit_is_written_with_nulls_and_said_in_the_report(plain, tmp_path
     unknown = plain.after.errors["fit"]._replace(
         rmse=np.nan, nrmse=np.nan, nrmse_segments=np.nan, chi2_per_dof=np.nan
     )
-    failed = plain.after._replace(result=RESULTS.not_converged, errors={"fit": unknown, "holdout": None})
+    runs, restarts = plain.after.free_runs, plain.after.restarts
+    held = SimpleNamespace(errors={"fit": unknown, "holdout": None}, free_runs=runs, restarts=restarts)
+    failed = plain.after._replace(result=RESULTS.not_converged, against=held)
     loop = plain._replace(before=failed, after=failed, verdict="unexplained")
     ClosedLoop(loop).report(tmp_path / "deep" / "out")
     result = json.loads((tmp_path / "deep" / "out" / "result.json").read_text(encoding="utf-8"))

@@ -34,14 +34,16 @@ class CoulombFriction(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "CoulombFriction":
-        """See `AbstractElement.guess`: the width is a fiftieth of the slowest motion.
+        """See `AbstractElement.guess`: a fiftieth of the slowest motion, but no less than steps resolve.
 
-        That loses 2e-4 of the dissipation where it matters most. It is never less than `F h / (2 m)`, with
-        the drive F and the integration step h: a mass held by a friction as large as the drive then moves
-        with the rate `F / (m vs) = 2 / h`, inside the limit 2.78 / h of the Runge-Kutta step.
+        A fiftieth loses 2e-4 of the dissipation where it matters most. Half of the change of velocity in one
+        integration step h must fit in, else the law is sampled, not integrated. Nor is the width less than
+        `F h / (2 m)`, with the drive F: a mass held by a friction as large as the drive then moves with the
+        rate `F / (m vs) = 2 / h`, inside the limit 2.78 / h of the Runge-Kutta step.
         """
         step = scales.sample_time / cls.substeps
-        return cls(0.0, max(0.02 * scales.slowest_velocity, 0.5 * scales.force * step / scales.mass))
+        resolved = 0.5 * step * max(scales.acceleration, scales.force / scales.mass)
+        return cls(0.0, max(0.02 * scales.slowest_velocity, resolved))
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:

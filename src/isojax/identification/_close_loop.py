@@ -78,6 +78,9 @@ def close_loop(
     if stopped_good:
         progress("how large the effects that were not found could still be")
     bounds = remaining_bounds(current) if stopped_good else verdict.bounds
+    # Asked for here, so that the time of the loop counts it.
+    for when, held in (("before", before), ("after", current)):
+        progress(f"free-run error {when}: {held.nrmse:.4g} of the measured rms")
     return Loop(
         campaign,
         guess,

@@ -8,11 +8,12 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
-from .._results import RESULTS, is_successful
+from .._results import RESULTS
 from .._types import check_float64
 from ..models import Integrator, Isolator
 from ..records import Campaign, NoiseEstimate, estimate_noise
-from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise, without_values
+from ._against import Against
+from ._errors import Errors, Restarts, Run
 from ._estimate import Estimate, estimate, free_places
 from ._problem import Bench
 from ._scales import scales as campaign_scales
@@ -58,13 +59,11 @@ class Fit(NamedTuple):
         campaign: the measurements.
         free: names of the fitted coefficients.
         covariance: of the fitted coefficients [product of their units], scaled by max(1, chi2/dof).
-        errors: errors by role, "fit" and "holdout" (None without such records).
         stats: counts and criteria.
         noise: the noise that errors are held against.
         result: how the search ended.
         estimate: the equations at the solution.
-        free_runs: every record simulated from its start to its end.
-        restarts: every record with each segment restarted.
+        against: the model held against every record, fitted and held out, when first asked for.
     """
 
     model: Isolator
@@ -72,13 +71,26 @@ class Fit(NamedTuple):
     campaign: Campaign
     free: tuple[str, ...]
     covariance: Float[np.ndarray, "parameter parameter"]
-    errors: dict[str, Errors | None]
     stats: Statistics
     noise: NoiseEstimate
     result: RESULTS
     estimate: Estimate
-    free_runs: tuple[Run, ...]
-    restarts: Restarts
+    against: Against
+
+    @property
+    def errors(self) -> dict[str, Errors | None]:
+        """Errors by role, "fit" and "holdout" (None without such records)."""
+        return self.against.errors
+
+    @property
+    def free_runs(self) -> tuple[Run, ...]:
+        """Every record simulated from its start to its end with nothing fed back."""
+        return self.against.free_runs
+
+    @property
+    def restarts(self) -> Restarts:
+        """Every record with each segment restarted from its own best initial state."""
+        return self.against.restarts
 
     @property
     def nrmse(self) -> float:
@@ -197,7 +209,7 @@ def bench_for(model: Isolator, campaign: Campaign, noise: float, integrator: Int
 
 
 def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseEstimate) -> Fit:
-    """Hold an estimate against every record of the campaign, fitted and held out.
+    """Make an estimate into a fit.
 
     Args:
         found: the estimate.
@@ -206,31 +218,8 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         noise: the noise.
 
     Returns:
-        The fit.
+        The fit; it is held against the records when that is first asked for.
     """
-    fitted = found.bench.problem
-    everything = build_problem(
-        campaign.records,
-        found.model,
-        quantity=fitted.quantity,
-        hold=fitted.hold,
-        noise=fitted.noise,
-        integrator=fitted.integrator,
-    )
-    spread = found.point.nuisances.stiffness_spread
-    with np.errstate(over="ignore", invalid="ignore"):
-        free_runs = run_freely(everything, found.model)
-        if everything.records == fitted.records and everything.segments == fitted.segments:
-            restarts = restart_records(found.bench, found.model, spread, found.point.nuisances)
-        else:
-            restarts = restart_records(Bench(everything), found.model, spread)
-    if not is_successful(found.result):
-        free_runs = tuple(without_values(run) for run in free_runs)
-        restarts = restarts._replace(runs=tuple(without_values(run) for run in restarts.runs))
-    errors = {
-        "fit": summarise(free_runs, restarts, "fit", len(found.places)),
-        "holdout": summarise(free_runs, restarts, "holdout", 0),
-    }
     samples, count = int(found.point.samples.sum()), len(found.places)
     stats = Statistics(
         samples,
@@ -240,8 +229,8 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         found.chi2 + 2.0 * count,
         found.chi2 + count * float(np.log(samples)),
         found.steps,
-        spread,
-        fitted.step_error,
+        found.point.nuisances.stiffness_spread,
+        found.bench.problem.step_error,
     )
     return Fit(
         found.model,
@@ -249,11 +238,9 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         campaign,
         found.names,
         found.uncertainty.covariance,
-        errors,
         stats,
         noise,
         found.result,
         found,
-        free_runs,
-        restarts,
+        Against(found, campaign),
     )
