@@ -12,7 +12,7 @@ from ._admissible import find_violation
 from ._estimate import Estimate
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
-from ._refit import Refit, is_determined, polish, refit_candidate, strength_place
+from ._refit import Refit, follows_freely, is_determined, polish, refit_candidate, strength_place
 from ._scales import scales as campaign_scales
 from ._score import Score, ScoreTest, absent_effects, score_test
 from ._separate import separating_experiment
@@ -112,6 +112,8 @@ def diagnose(
             violation = "its refit did not converge"
         elif not is_determined(found, score):
             violation = "its strength is not determined"
+        elif not follows_freely(fitted, found):
+            violation = "its free run is worse than without it"
         else:
             violation = find_violation(found.model, fit.campaign.fit_records, fitted.bench.problem.quantity)
         refits.append(Refit(score, found, violation))

@@ -10,6 +10,7 @@ from .._results import RESULTS
 from ..elements import AbstractElement, Scales
 from ..models import Isolator
 from ._elimination import Nuisances
+from ._errors import run_freely
 from ._estimate import Estimate, estimate
 from ._score import Score, ScoreTest
 
@@ -159,3 +160,25 @@ def strength_place(found: Estimate, score: Score) -> int:
     listed = [entry.name for entry in list_parameters(found.model)]
     fields = [name for name, _ in own_parameters(score.element)]
     return found.places.index(len(listed) - len(fields) + fields.index(score.element.strength))
+
+
+def follows_freely(fitted: Estimate, found: Estimate) -> bool:
+    """Say whether a refit still follows whole records when nothing is fed back.
+
+    Asked only where records are left whole: a memory that never fades can there fit a record from a hidden
+    state of its own choice, and lose it from rest.
+
+    Args:
+        fitted: the estimate without the effect.
+        found: the refit with it.
+
+    Returns:
+        True if the free-run error is no larger, or records are cut into segments anyway.
+    """
+    if not found.bench.problem.heads:
+        return True
+    squares = [
+        sum(float(np.sum(run.residual**2)) for run in run_freely(entry.bench.problem, entry.model))
+        for entry in (fitted, found)
+    ]
+    return bool(squares[1] <= squares[0])
