@@ -121,7 +121,7 @@ def diagnose(
 
 
 def remaining_bounds(fit: Fit) -> dict[str, tuple[float, str]]:
-    """Say how large each absent effect could still be beside a fitted model.
+    """Say how large each absent effect could still be beside a fitted model, at its typical shape.
 
     Args:
         fit: the fit.
@@ -130,7 +130,9 @@ def remaining_bounds(fit: Fit) -> dict[str, tuple[float, str]]:
         Upper bound of each strength and its unit, by catalogue name.
     """
     scales = campaign_scales(fit.campaign)
-    test = score_test(fit.estimate, scales, absent_effects(fit.model, scales))
+    # One shape an effect will do for a bound; the grids are for finding.
+    typical = {probe.name: type(probe).guess(scales) for probe in absent_effects(fit.model, scales)}
+    test = score_test(fit.estimate, scales, tuple(typical.values()))
     return _bounds(test, fit.estimate, None)
 
 
