@@ -50,6 +50,8 @@ def fit_circle(
     Source: D. J. Ewins, Modal Testing, 2nd ed., sec. 4.3 (circle-fit method); named before eq. (9) of the
     paper.
     """
+    if frequency.size < 4:
+        return _NO_CIRCLE
     omega = 2 * np.pi * frequency
     mobility = 1j * omega * receptance
     chosen = np.abs(mobility) >= share * np.max(np.abs(mobility))

@@ -151,7 +151,7 @@ def fit(
 
     Raises:
         ValueError: if a name is no parameter of the model, the model is not driven as the campaign's isolator
-            is, or records differ in sampling rate.
+            is, records differ in sampling rate, or their noise is neither declared nor to be estimated.
         RuntimeError: if JAX is not in 64-bit mode.
     """
     check_float64()
@@ -159,6 +159,11 @@ def fit(
     _check_excitation(model, campaign)
     # Held-out records must not even weigh the others.
     noise = estimate_noise(dataclasses.replace(campaign, records=campaign.fit_records))
+    if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
+        raise ValueError(
+            f"{campaign.file}: the noise of the output must be above 0, but the records, so short or so "
+            f"clean, show {noise.sigma:g}; declare it: [output] noise = its rms"
+        )
     bench = bench_for(model, campaign, noise.sigma, integrator)
     found = estimate(
         bench,
