@@ -57,6 +57,23 @@ from .records import estimate_noise as estimate_noise
 from .records import read_campaign as read_campaign
 from .reporting import ClosedLoop as ClosedLoop
 from .reporting import close_loop as close_loop
+from .reporting import error_table as error_table
+from .reporting import parameter_table as parameter_table
+from .reporting import plot_correlation as plot_correlation
+from .reporting import plot_cycle_residual as plot_cycle_residual
+from .reporting import plot_effect as plot_effect
+from .reporting import plot_equivalent as plot_equivalent
+from .reporting import plot_errors as plot_errors
+from .reporting import plot_ranking as plot_ranking
+from .reporting import plot_receptance as plot_receptance
+from .reporting import plot_record as plot_record
+from .reporting import plot_residual as plot_residual
+from .reporting import plot_restoring_force as plot_restoring_force
+from .reporting import plot_stiffness_scatter as plot_stiffness_scatter
+from .reporting import plot_time_history as plot_time_history
+from .reporting import plot_where as plot_where
+from .reporting import ranking_table as ranking_table
+from .reporting import render_text as render_text
 from .reporting import write_report as write_report
 
 __version__ = _version("isojax")

@@ -1,7 +1,11 @@
+import dataclasses
+import inspect
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+import isojax
 from isojax import reporting
 from isojax.identification import residual
 
@@ -11,6 +15,7 @@ def pairs(loop):
 
 
 PLOTS = {
+    "record": lambda loop, ax: reporting.plot_record(loop.campaign.records[0], loop.campaign, ax=ax),
     "time_history": lambda loop, ax: reporting.plot_time_history(loop.before, loop.after, ax=ax),
     "residual": lambda loop, ax: reporting.plot_residual(loop.before, loop.after, ax=ax),
     "cycle_residual": lambda loop, ax: reporting.plot_cycle_residual(loop.before, loop.after, ax=ax),
@@ -80,4 +85,51 @@ def test_friction_alone_is_a_rectangle_of_its_level(found):
 
 
 def test_without_dwells_there_is_no_cycle_to_average(plain):
-    assert reporting.plot_cycle_residual(plain.before) is None
+    with pytest.raises(ValueError, match="must be a fit of records with dwells"):
+        reporting.plot_cycle_residual(plain.before)
+
+
+def test_noise_alone_is_the_share_of_its_rms_in_what_was_measured(found):
+    figure = reporting.plot_errors(found.before, found.after, measure="nrmse")
+    (lines,) = [one for one in figure.axes[0].collections if one.get_label() == "noise alone"]
+    for segment, role in zip(lines.get_segments(), ("fit", "holdout"), strict=True):
+        outputs = [record.output for record in found.campaign.records if record.role == role]
+        signal = np.concatenate([one - np.mean(one) for one in outputs])
+        share = 100.0 * found.before.noise.sigma / np.sqrt(np.mean(signal**2))
+        np.testing.assert_allclose(segment[:, 1], share, rtol=1e-6)
+
+
+@pytest.mark.parametrize("what", ["input", "output"])
+def test_a_record_is_drawn_sample_by_sample_with_its_quantity_and_unit(found, what):
+    record = found.campaign.records[1]
+    figure = isojax.plot_record(record, found.campaign, what=what, window=(0.5, 1.5))
+    ax = figure.axes[0]
+    np.testing.assert_array_equal(ax.lines[0].get_xdata(), np.arange(250, 751) / 500.0)
+    np.testing.assert_array_equal(ax.lines[0].get_ydata(), getattr(record, what)[250:751])
+    assert ax.get_ylabel() == {"input": "force [N]", "output": "acceleration [m/s²]"}[what]
+    assert record.name in ax.get_title(loc="left")
+
+
+def test_a_record_shows_which_samples_a_dwell_and_the_settling_take(found):
+    record = dataclasses.replace(found.campaign.records[0], settle=200)
+    ax = isojax.plot_record(record, found.campaign).axes[0]
+    spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in ax.patches]
+    shaded = [(dwell.start / 500.0, dwell.stop / 500.0) for dwell in record.dwells[1::2]]
+    np.testing.assert_allclose(spans, [*shaded, (0.0, 0.4)])
+    assert ax.get_legend_handles_labels()[1] == ["every second dwell", "settle"]
+
+
+def test_a_window_past_the_end_of_a_record_is_refused(found):
+    record = found.campaign.records[0]
+    with pytest.raises(ValueError, match="must hold samples of"):
+        isojax.plot_record(record, found.campaign, window=(1e3, 2e3))
+
+
+def test_every_picture_can_be_had_from_the_package():
+    drawn = {name for name in vars(reporting) if name.startswith("plot_")}
+    assert len(drawn) == 13
+    for name in sorted(drawn):
+        plot = getattr(isojax, name)
+        signature = inspect.signature(plot)
+        assert signature.parameters["ax"].default is None, name
+        assert signature.return_annotation is Figure, name

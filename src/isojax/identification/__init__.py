@@ -21,6 +21,7 @@ from ._findings import Verdict as Verdict
 from ._fit import Fit as Fit
 from ._fit import Statistics as Statistics
 from ._fit import fit as fit
+from ._fit import silent as silent
 from ._half_power import HalfPower as HalfPower
 from ._half_power import find_half_power as find_half_power
 from ._harmonic_balance import equivalent_coefficients as equivalent_coefficients

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
-from ..identification import ClassicalGuess, Finding, Fit, Loop
+from ..identification import ClassicalGuess, Finding, Fit, Loop, silent
 from ..identification import close_loop as find_loop
 from ..records import Campaign
 from ._summary import loop_summary, render_text
@@ -72,12 +72,8 @@ class ClosedLoop:
         return render_text(loop_summary(self.loop))
 
 
-def _silent(line: str) -> None:
-    """Take a line of progress and say nothing."""
-
-
 def close_loop(
-    campaign: Campaign, *, max_iterations: int = 3, progress: Callable[[str], None] = _silent
+    campaign: Campaign, *, max_iterations: int = 3, progress: Callable[[str], None] = silent
 ) -> ClosedLoop:
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 

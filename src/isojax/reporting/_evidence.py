@@ -109,8 +109,11 @@ def plot_errors(
         values = np.array([scale * getattr(fit.errors[role], measure) for role in roles])
         bars = ax.bar(np.arange(len(roles)) + shift, values, 0.36, color=colour, label=name)
         ax.bar_label(bars, [form.format(value) for value in values], fontsize=8, padding=1)
-    if measure == "chi2_per_dof":
-        ax.axhline(1.0, color="black", linewidth=0.9, linestyle="--", label="noise")
+    noise = [1.0 if measure == "chi2_per_dof" else scale * _noise_share(before, role) for role in roles]
+    places = np.arange(len(roles))
+    ax.hlines(
+        noise, places - 0.45, places + 0.45, "black", linewidth=1.0, linestyle="--", label="noise alone"
+    )
     ax.set_xticks(range(len(roles)), [ROLES[role] for role in roles])
     ax.margins(y=0.22)
     ax.set_xlim(-0.6, len(roles) - 0.4)
@@ -118,6 +121,12 @@ def plot_errors(
     ax.set_ylabel(label)
     ax.legend(fontsize=7.5, loc="upper right", ncols=3)
     return figure
+
+
+def _noise_share(fit: Fit, role: str) -> float:
+    """Give the NRMSE that the channel's noise alone leaves on the records of a role."""
+    errors = fit.errors[role]
+    return float("nan") if errors is None else fit.noise.sigma * errors.nrmse / errors.rmse
 
 
 def plot_stiffness_scatter(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure:

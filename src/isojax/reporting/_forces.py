@@ -157,7 +157,8 @@ def plot_effect(
         )
     ax.set_xlabel("displacement [mm]")
     ax.set_ylabel("force [N]")
-    ax.legend(fontsize=7.5)
+    ax.margins(y=0.2)
+    ax.legend(fontsize=7.5, loc="upper right", ncols=2)
     words = next(element.words for element in fit.model.elements if element.name == effect)
     entitle(ax, f"{words} by itself, a cycle at {frequency:.3g} Hz")
     return figure

@@ -7,7 +7,7 @@ from typing import Any
 import jinja2
 
 from .._parameters import list_parameters
-from ..identification import Candidate, Loop
+from ..identification import Candidate, Fit, Loop
 from ..records import data_health
 from ._pictures import error_pictures, evidence_pictures, force_pictures, health_pictures, record_pictures
 from ._quantities import (
@@ -21,8 +21,7 @@ from ._quantities import (
 )
 from ._quantities import typeset_with_error as with_error
 from ._sentences import caveats, effect_words, finding_words, headline, health_words
-from ._style import ROLES
-from ._summary import parameter_words
+from ._summary import error_rows, parameter_words
 
 _VERDICTS = {
     "none": "nothing missing",
@@ -70,9 +69,12 @@ def _content(loop: Loop) -> dict[str, Any]:
         ],
         "last_ranking": [_candidate(candidate, quantity) for candidate in loop.last.ranking[:_MOST]],
         "unit": typeset_unit(OUTPUT_UNITS[quantity]),
-        "errors": _errors(loop),
+        "errors": error_rows(before, after),
+        "declared": _elements(before),
+        "added": " and ".join(effect_words(one.effect) for one in loop.findings),
         "parameters": [
             (
+                "isolated mass" if entry.name == "mass" else effect_words(entry.name.partition(".")[0]),
                 entry.name,
                 entry.spec.symbol,
                 parameter_words(before, entry.name),
@@ -104,6 +106,11 @@ def _content(loop: Loop) -> dict[str, Any]:
     }
 
 
+def _elements(fit: Fit) -> str:
+    """Give the effects of a model in words."""
+    return ", ".join(effect_words(element.name) for element in fit.model.elements)
+
+
 def _facts(loop: Loop) -> list[tuple[str, str]]:
     campaign = loop.campaign
     length = sum(record.time.size for record in campaign.records) / campaign.rate
@@ -122,27 +129,6 @@ def _facts(loop: Loop) -> list[tuple[str, str]]:
     return facts
 
 
-def _errors(loop: Loop) -> list[dict[str, str]]:
-    rows = (
-        (("", loop.before),)
-        if loop.before is loop.after
-        else (("before", loop.before), ("after", loop.after))
-    )
-    return [
-        {
-            "role": words,
-            "label": label,
-            "rmse": typeset_number(errors.rmse, 3),
-            "nrmse": typeset_share(errors.nrmse),
-            "nrmse_segments": typeset_share(errors.nrmse_segments),
-            "chi2_per_dof": typeset_goodness(errors.chi2_per_dof),
-        }
-        for role, words in ROLES.items()
-        for label, fit in rows
-        if (errors := fit.errors[role]) is not None
-    ]
-
-
 def _candidate(one: Candidate, quantity: str) -> dict[str, Any]:
     return {
         "effect": one.effect,
@@ -153,6 +139,6 @@ def _candidate(one: Candidate, quantity: str) -> dict[str, Any]:
         "visibility": typeset_share(one.visibility),
         "chi2_per_dof": typeset_goodness(one.chi2_per_dof),
         "delta_bic": typeset_number(one.delta_bic, 3),
-        "likeness": f"{one.likeness:.2f}",
+        "likeness": f"{round(one.likeness, 2) + 0.0:.2f}",  # no negative zero
         "admissible": one.admissible,
     }

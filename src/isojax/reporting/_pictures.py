@@ -56,16 +56,15 @@ def encode(figure: Figure) -> str:
 def _draw(
     name: str,
     caption: str,
-    plot: Callable[..., Figure | None],
+    plot: Callable[..., Figure],
     *args: Any,
     wide: bool = False,
     **options: Any,
 ) -> tuple[Picture, ...]:
-    """Draw one picture; none where there is nothing to draw."""
+    """Draw one picture, as a row of its own to join to others."""
     size = (_WHOLE if wide else _HALF, _HEIGHT)
     ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
-    figure = plot(*args, ax=ax, **options)
-    return () if figure is None else (Picture(name, caption, encode(figure), wide),)
+    return (Picture(name, caption, encode(plot(*args, ax=ax, **options)), wide),)
 
 
 def error_pictures(loop: Loop) -> tuple[Picture, ...]:
@@ -115,7 +114,7 @@ def evidence_pictures(loop: Loop) -> tuple[Picture, ...]:
             )
             pictures.append(Picture(name, caption, encode(figure), True))
     before, after = _models(loop)
-    if before is not None:
+    if before is not None and any(run.record.dwells for run in before.restarts.runs):
         caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force stays."
         pictures += _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
     return tuple(pictures) + _effect_pictures(loop)

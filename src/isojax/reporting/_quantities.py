@@ -6,6 +6,14 @@ import re
 OUTPUT_UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}
 """SI unit of each output quantity."""
 
+INPUT_WORDS = {
+    "force": ("force", "N"),
+    "base_acceleration": ("base acceleration", "m/s^2"),
+    "reaction_mass_acceleration": ("force of the reaction mass", "N"),
+    "command": ("gain × command", "N"),
+}
+"""What the input of each quantity is once it is read, and its SI unit."""
+
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _UNKNOWN = "–"
 

@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..identification import Fit, Residual, Run
+from ._over_time import draw_signal, finish_time_axes, is_dense, shown_samples
 from ._quantities import OUTPUT_UNITS, typeset_unit
 from ._style import BAND, ROLES, axes_for, entitle, pair
-from ._time_history import extremes, worst_window
+from ._time_history import worst_window
 
 _SMOOTH = 60
 """A window is smoothed over this share of its length, where it is short enough for a curve."""
@@ -38,30 +39,22 @@ def plot_residual(
     Returns:
         The figure.
     """
-    figure, ax = axes_for(ax)
     place = worst_window(before)[0] if record is None else record
     chosen = before.restarts.runs[place].record
-    low, high = (chosen.time[0], chosen.time[-1]) if window is None else window
-    shown = (chosen.time >= low) & (chosen.time <= high)
+    low, high, shown = shown_samples(chosen, window)
+    figure, ax = axes_for(ax)
     time = chosen.time[shown]
     for label, fit, colour in pair(before, after):
         values = fit.restarts.runs[place].residual[shown]
-        if values.size > 3000:
-            start, lowest, highest = extremes(time, values)
-            ax.fill_between(start, lowest, highest, color=colour, alpha=0.6, linewidth=0.3, label=label)
-        else:
-            length = max(1, values.size // _SMOOTH)
-            smooth = np.convolve(values, np.ones(length) / length, mode="same")
+        if not is_dense(values):
             ax.plot(time, values, color=colour, linewidth=0.6, alpha=0.3)
-            ax.plot(time, smooth, color=colour, linewidth=1.6, label=f"{label}, smoothed")
+            length = max(1, values.size // _SMOOTH)
+            values = np.convolve(values, np.ones(length) / length, mode="same")
+            label = f"{label}, smoothed"
+        draw_signal(ax, time, values, colour=colour, label=label, width=1.6)
     sigma = before.noise.sigma
     ax.axhspan(-2 * sigma, 2 * sigma, color=BAND, zorder=0, label="noise, ±2σ")
-    quantity = before.campaign.output.quantity
-    ax.set_xlabel("time [s]")
-    ax.set_ylabel(f"residual [{typeset_unit(OUTPUT_UNITS[quantity])}]")
-    ax.set_xlim(low, high)
-    ax.legend(fontsize=8, loc="upper right", ncols=3)
-    ax.margins(y=0.18)
+    finish_time_axes(ax, low, high, "residual", OUTPUT_UNITS[before.campaign.output.quantity])
     entitle(ax, f"residual of {chosen.name} ({ROLES[chosen.role]}), segments restarted")
     return figure
 
@@ -135,7 +128,7 @@ def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None)
     return figure
 
 
-def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure | None:
+def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure:
     """Draw the residual of the worst dwell, averaged over its cycles.
 
     Args:
@@ -144,7 +137,10 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
         ax: axes to draw on.
 
     Returns:
-        The figure; None without dwells.
+        The figure.
+
+    Raises:
+        ValueError: if no record has dwells.
     """
     dwells = [
         (float(np.sum(run.residual[dwell.start : dwell.stop] ** 2)), place, dwell)
@@ -152,7 +148,10 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
         for dwell in run.record.dwells
     ]
     if not dwells:
-        return None
+        raise ValueError(
+            f"Argument `before` must be a fit of records with dwells, but those of "
+            f"{before.campaign.title!r} have none: there is no cycle to average over."
+        )
     figure, ax = axes_for(ax)
     _, place, dwell = max(dwells, key=lambda entry: entry[0])
     record = before.restarts.runs[place].record

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from io import StringIO
+from typing import NamedTuple
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group, RenderableType
@@ -49,44 +50,89 @@ def _table(title: str, *columns: str) -> Table:
     return table
 
 
-def error_table(before: Fit, after: Fit) -> Table:
-    """Give the errors before and after.
+class ErrorRow(NamedTuple):
+    """The errors of one model on the records of one role, in words.
+
+    Attributes:
+        role: "fitted" or "held out".
+        label: "before", "after", or "" where there is one model.
+        rmse: of free runs.
+        nrmse: of free runs.
+        nrmse_segments: segments restarted.
+        chi2_per_dof: segments restarted.
+    """
+
+    role: str
+    label: str
+    rmse: str
+    nrmse: str
+    nrmse_segments: str
+    chi2_per_dof: str
+
+
+def _labelled(before: Fit, after: Fit | None) -> tuple[tuple[str, Fit], ...]:
+    """Give the fits that differ, each with its label; one alone needs none."""
+    if after is None or after is before:
+        return (("", before),)
+    return (("before", before), ("after", after))
+
+
+def error_rows(before: Fit, after: Fit | None = None) -> tuple[ErrorRow, ...]:
+    """Give the errors before and after, role by role.
 
     Args:
         before: the declared model, fitted.
-        after: the final fit.
+        after: the final fit; omitted where there is none.
+
+    Returns:
+        A row for each role that has records, and each fit.
+    """
+    return tuple(
+        ErrorRow(
+            words,
+            label,
+            typeset_number(errors.rmse, 3),
+            typeset_share(errors.nrmse),
+            typeset_share(errors.nrmse_segments),
+            typeset_goodness(errors.chi2_per_dof),
+        )
+        for role, words in ROLES.items()
+        for label, fit in _labelled(before, after)
+        if (errors := fit.errors[role]) is not None
+    )
+
+
+def error_table(before: Fit, after: Fit | None = None) -> Table:
+    """Give the errors before and after; a notebook shows it, `render_text` makes it plain text.
+
+    Args:
+        before: the declared model, fitted.
+        after: the final fit; omitted where there is none.
 
     Returns:
         A table for rich.
     """
     unit = typeset_unit(OUTPUT_UNITS[before.campaign.output.quantity])
     table = _table("Error", "records", "", f"free-run RMSE [{unit}]", "NRMSE", "NRMSE, restarted", "χ²/dof")
-    rows = (("", before),) if before is after else (("before", before), ("after", after))
-    for role, words in ROLES.items():
-        for label, fit in rows:
-            errors = fit.errors[role]
-            if errors is not None:
-                shares = (typeset_share(errors.nrmse), typeset_share(errors.nrmse_segments))
-                size, chi2 = typeset_number(errors.rmse, 3), typeset_goodness(errors.chi2_per_dof)
-                table.add_row(words, label, size, *shares, chi2)
+    for row in error_rows(before, after):
+        table.add_row(*row)
     return table
 
 
-def parameter_table(before: Fit, after: Fit) -> Table:
-    """Give the coefficients before and after.
+def parameter_table(before: Fit, after: Fit | None = None) -> Table:
+    """Give the coefficients before and after; a notebook shows it, `render_text` makes it plain text.
 
     Args:
         before: the declared model, fitted.
-        after: the final fit.
+        after: the final fit; omitted where there is none.
 
     Returns:
         A table for rich.
     """
-    table = _table("Coefficients", "name", *(("fitted",) if before is after else ("before", "after")))
-    fits = (before,) if before is after else (before, after)
-    names = [entry.name for entry in list_parameters(after.model)]
-    for name in names:
-        table.add_row(name, *(parameter_words(fit, name) for fit in fits))
+    fits = _labelled(before, after)
+    table = _table("Coefficients", "name", *(label or "fitted" for label, _ in fits))
+    for entry in list_parameters(fits[-1][1].model):
+        table.add_row(entry.name, *(parameter_words(fit, entry.name) for _, fit in fits))
     return table
 
 
@@ -112,7 +158,7 @@ def parameter_words(fit: Fit, name: str) -> str:
 
 
 def ranking_table(ranking: Sequence[Candidate]) -> Table:
-    """Give the best candidates.
+    """Give the best candidates; a notebook shows it, `render_text` makes it plain text.
 
     Args:
         ranking: candidates, best first.

@@ -1,20 +1,17 @@
 """Pictures of time histories: measured, model before, model after."""
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..identification import Fit
 from ..records import Record
-from ._quantities import OUTPUT_UNITS, typeset_unit
+from ._over_time import draw_signal, finish_time_axes, shown_samples
+from ._quantities import OUTPUT_UNITS
 from ._style import MEASURED, ROLES, axes_for, entitle, pair
 
 _CYCLES = 6.0
 """Cycles of the drive in a zoomed window."""
-
-_DENSE = 6000
-"""Samples above which a curve is drawn by its extremes."""
 
 
 def worst_window(fit: Fit) -> tuple[int, float, float]:
@@ -54,23 +51,6 @@ def _window_length(record: Record) -> int:
     return int(np.clip(_CYCLES * record.rate / frequency, 8, record.time.size - 1))
 
 
-def extremes(
-    time: Float[np.ndarray, " time"], signal: Float[np.ndarray, " time"], pieces: int = 1500
-) -> tuple[Float[np.ndarray, " piece"], Float[np.ndarray, " piece"], Float[np.ndarray, " piece"]]:
-    """Give a long signal by its smallest and largest value in each piece.
-
-    Args:
-        time: [s].
-        signal: the signal.
-        pieces: how many.
-
-    Returns:
-        Start of each piece [s], smallest and largest values.
-    """
-    edges = np.linspace(0, signal.size, min(pieces, signal.size) + 1).astype(int)[:-1]
-    return time[edges], np.minimum.reduceat(signal, edges), np.maximum.reduceat(signal, edges)
-
-
 def plot_time_history(
     before: Fit,
     after: Fit | None = None,
@@ -91,29 +71,16 @@ def plot_time_history(
     Returns:
         The figure.
     """
-    figure, ax = axes_for(ax)
     place = worst_window(before)[0] if record is None else record
     chosen = before.free_runs[place].record
-    low, high = (chosen.time[0], chosen.time[-1]) if window is None else window
-    shown = (chosen.time >= low) & (chosen.time <= high)
-    curves = [("measured", chosen.output, MEASURED)]
-    curves += [(label, fit.free_runs[place].simulated, colour) for label, fit, colour in pair(before, after)]
-    for label, signal, colour in curves:
-        time, values = chosen.time[shown], signal[shown]
-        if values.size > _DENSE:
-            start, lowest, highest = extremes(time, values)
-            ax.fill_between(start, lowest, highest, color=colour, alpha=0.55, linewidth=0.3, label=label)
-        elif label == "measured":
-            ax.plot(time, values, ".", color=colour, markersize=3.0, label=label)
-        else:
-            ax.plot(
-                time, values, "--" if label == "before" else "-", color=colour, linewidth=1.1, label=label
-            )
+    low, high, shown = shown_samples(chosen, window)
+    figure, ax = axes_for(ax)
+    draw_signal(ax, chosen.time[shown], chosen.output[shown], colour=MEASURED, label="measured", style=".")
+    for label, fit, colour in pair(before, after):
+        simulated = fit.free_runs[place].simulated[shown]
+        style = "--" if label == "before" else "-"
+        draw_signal(ax, chosen.time[shown], simulated, colour=colour, label=label, style=style)
     quantity = before.campaign.output.quantity
-    ax.set_xlabel("time [s]")
-    ax.set_ylabel(f"{quantity} [{typeset_unit(OUTPUT_UNITS[quantity])}]")
-    ax.set_xlim(low, high)
-    ax.margins(y=0.18)
-    ax.legend(fontsize=8, loc="upper right", ncols=3)
-    entitle(ax, f"{chosen.name} ({ROLES[chosen.role]})")
+    finish_time_axes(ax, low, high, quantity, OUTPUT_UNITS[quantity])
+    entitle(ax, f"{chosen.name} ({ROLES[chosen.role]}), free run")
     return figure
