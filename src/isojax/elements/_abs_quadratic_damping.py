@@ -40,3 +40,11 @@ class AbsQuadraticDamping(AbstractElement):
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
         """See `AbstractElement.force`."""
         return self.coefficient * jnp.abs(v) * v
+
+    def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
+        """See `AbstractElement.kinks`."""
+        return (v,)
+
+    def force_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Lanes:
+        """See `AbstractElement.force_beside`."""
+        return self.coefficient * sides[0] * v * v

@@ -118,6 +118,64 @@ class AbstractElement(eqx.Module):
         """
         return tuple(0.0 * state for state in s)
 
+    def unphysical_shape(self, displacement: float) -> str | None:
+        """Say what makes the shape parameters no law of matter at an amplitude, if anything.
+
+        Energy over a loop is asked of every element with memory from outside; this is for degenerate shapes
+        that take energy and yet are none.
+
+        Args:
+            displacement: largest displacement visited [m].
+
+        Returns:
+            The end of a sentence about the effect, or None.
+        """
+        return None
+
+    def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
+        """Give the functions of the state at whose zeros the law is continuous but not smooth.
+
+        A periodic orbit is split where one changes sign, so that each piece is smooth. An element that
+        declares any overrides `force_beside` and `state_rate_beside` where the side matters.
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            s: internal states.
+
+        Returns:
+            One value a kink, such as `x` for |x|x.
+        """
+        return ()
+
+    def force_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Lanes:
+        """Give the force with the law of one side of each kink, carried on smoothly past it.
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            s: internal states.
+            sides: +1 or -1, the sign of each of `kinks` on the side that is meant.
+
+        Returns:
+            Force [N]; equal to `force` where the state lies on those sides.
+        """
+        return self.force(x, v, s)
+
+    def state_rate_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Internal:
+        """Give the rates of the internal states with the law of one side of each kink; see `force_beside`.
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            s: internal states.
+            sides: +1 or -1, the sign of each of `kinks` on the side that is meant.
+
+        Returns:
+            One rate an internal state; equal to `state_rate` where the state lies on those sides.
+        """
+        return self.state_rate(x, v, s)
+
     def inertia(self) -> Lanes | float:
         """Give the mass that moves with the isolator [kg]."""
         return 0.0

@@ -57,3 +57,11 @@ class DahlFriction(AbstractElement):
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
         """See `AbstractElement.state_rate`."""
         return ((v - jnp.abs(v) * s[0]) / self.presliding,)
+
+    def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
+        """See `AbstractElement.kinks`."""
+        return (v,)
+
+    def state_rate_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Internal:
+        """See `AbstractElement.state_rate_beside`."""
+        return ((v - sides[0] * v * s[0]) / self.presliding,)

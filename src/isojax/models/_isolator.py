@@ -151,27 +151,60 @@ class Isolator(eqx.Module):
             u, rate = element.drive(u, rate)
         return u
 
-    def restoring_force(self, state: State) -> Lanes:
-        """Give the sum of element forces [N].
+    def kinks(self, state: State) -> State:
+        """Give the functions at whose zeros some law is not smooth.
 
         Args:
             state: displacement, velocity and internal states.
 
         Returns:
+            One value a kink, those of each element in turn.
+        """
+        return tuple(
+            kink
+            for element, internal in zip(self.elements, self._internal(state), strict=True)
+            for kink in element.kinks(state[0], state[1], internal)
+        )
+
+    def _sides(self, state: State, sides: State) -> list[State]:
+        """Share the sides of the kinks out among the elements."""
+        shares, place = [], 0
+        for element, internal in zip(self.elements, self._internal(state), strict=True):
+            count = len(element.kinks(state[0], state[1], internal))
+            shares.append(sides[place : place + count])
+            place += count
+        return shares
+
+    def restoring_force(self, state: State, sides: State | None = None) -> Lanes:
+        """Give the sum of element forces [N].
+
+        Args:
+            state: displacement, velocity and internal states.
+            sides: sign of each of `kinks` whose side is meant; those of the state itself if omitted.
+
+        Returns:
             Force on the left-hand side of the balance [N].
         """
         total = 0.0 * state[0]
-        for element, internal in zip(self.elements, self._internal(state), strict=True):
-            total = total + element.force(state[0], state[1], internal)
+        if sides is None:
+            for element, internal in zip(self.elements, self._internal(state), strict=True):
+                total = total + element.force(state[0], state[1], internal)
+            return total
+        shares = zip(self.elements, self._internal(state), self._sides(state, sides), strict=True)
+        for element, internal, own in shares:
+            total = total + element.force_beside(state[0], state[1], internal, own)
         return total
 
-    def acceleration(self, state: State, u: Lanes, u_rate: Lanes | float = 0.0) -> Lanes:
+    def acceleration(
+        self, state: State, u: Lanes, u_rate: Lanes | float = 0.0, sides: State | None = None
+    ) -> Lanes:
         """Give the acceleration of the coordinate.
 
         Args:
             state: displacement, velocity and internal states.
             u: recorded drive, already shifted.
             u_rate: its time derivative.
+            sides: see `restoring_force`.
 
         Returns:
             Acceleration [m/s^2]; relative to the base under base excitation.
@@ -181,8 +214,8 @@ class Isolator(eqx.Module):
             inertia = inertia + element.inertia()
         drive = self.drive(u, u_rate)
         if self.excitation == "base_acceleration":
-            return -drive - self.restoring_force(state) / inertia
-        return (drive - self.restoring_force(state)) / inertia
+            return -drive - self.restoring_force(state, sides) / inertia
+        return (drive - self.restoring_force(state, sides)) / inertia
 
     def motion(self, state: State, u: Lanes, u_rate: Lanes | float, quantity: Quantity) -> Lanes:
         """Give the motion at the sensor.
@@ -223,7 +256,12 @@ class Isolator(eqx.Module):
         return y
 
     def rates(
-        self, state: State, u: Lanes, u_rate: Lanes | float, quantity: Quantity = "acceleration"
+        self,
+        state: State,
+        u: Lanes,
+        u_rate: Lanes | float,
+        quantity: Quantity = "acceleration",
+        sides: State | None = None,
     ) -> State:
         """Give the time derivative of the state.
 
@@ -233,16 +271,22 @@ class Isolator(eqx.Module):
             u_rate: its time derivative.
             quantity: what the sensor measures; an instrument with memory follows it, as changed by the
                 instruments before.
+            sides: see `restoring_force`.
 
         Returns:
             One rate a state.
         """
+        x, v = state[:2]
         internal_rates: list[Lanes] = []
         if self.internal_states:
             y = self.motion(state, u, u_rate, quantity)
-            for element, internal in zip(self.elements, self._internal(state), strict=True):
-                own = element.state_rate(state[0], state[1], internal)
+            beside = [None] * len(self.elements) if sides is None else self._sides(state, sides)
+            for element, internal, own in zip(self.elements, self._internal(state), beside, strict=True):
+                if own is None:
+                    law = element.state_rate(x, v, internal)
+                else:
+                    law = element.state_rate_beside(x, v, internal, own)
                 sensed = element.reading_rate(y, internal)
-                internal_rates.extend(a + b for a, b in zip(own, sensed, strict=True))
+                internal_rates.extend(a + b for a, b in zip(law, sensed, strict=True))
                 y = element.reading(y, internal)
-        return (state[1], self.acceleration(state, u, u_rate), *internal_rates)
+        return (v, self.acceleration(state, u, u_rate, sides), *internal_rates)
