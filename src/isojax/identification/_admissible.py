@@ -8,6 +8,7 @@ from jaxtyping import Float
 from ..models import Isolator, Quantity
 from ..records import Record
 from ._batch import coordinate_motion
+from ._passivity import find_activity
 
 
 def visited_range(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> tuple[float, float]:
@@ -33,8 +34,8 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
     """Find what is unphysical in a model over the visited motion, if anything.
 
     The static tangent stiffness must be positive wherever the model has a spring, and the static damping
-    force must not drive the motion. Memories are judged by the sign of their strengths, which the bounds
-    hold.
+    force must not drive the motion. A force with memory must take energy over the loops that it was driven
+    around; a static law cannot say so.
 
     Args:
         model: the isolator.
@@ -60,4 +61,5 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
     if float(power.min()) < -1e-9 * float(jnp.abs(power).max()):
         where = 1e3 * float(vs[int(jnp.argmin(power))])
         return f"its damping feeds energy in at {where:.3g} mm/s, within the visited motion"
-    return None
+    activities = (find_activity(element, largest_x, largest_v) for element in model.elements)
+    return next((sentence for sentence in activities if sentence is not None), None)

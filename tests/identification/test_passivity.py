@@ -1,0 +1,74 @@
+"""A force with memory must take energy over the loop that the motion drives it around."""
+
+import math
+
+import numpy as np
+import pytest
+
+from isojax.elements import CATALOGUE, BoucWen, CubicStiffness, DahlFriction, MaxwellBranch, Scales
+from isojax.identification._linear_balance import with_strength
+from isojax.identification._passivity import find_activity, work_per_cycle
+
+AMPLITUDE = np.array([2e-4, 1e-3])
+ANGULAR = np.array([20.0, 35.0])
+SCALES = Scales(800.0, 150.0, 1e-3, 0.03, 1.0, 30.0, 1e-3, 0.01, 1.0)
+
+
+def test_a_maxwell_branch_takes_the_energy_of_its_loss_modulus():
+    stiffness, lag = 3e4, 0.04
+    work, _ = work_per_cycle(MaxwellBranch(stiffness, lag), AMPLITUDE, ANGULAR)
+    phase = ANGULAR * lag
+    # Six cycles are eleven decay times and more.
+    np.testing.assert_allclose(work, math.pi * stiffness * phase / (1 + phase**2) * AMPLITUDE**2, rtol=1e-4)
+
+
+def test_dahl_friction_takes_the_energy_of_its_closed_loop():
+    """Loading obeys dw/dx = (1 - w) / xd, so that w = 1 - (1 + tanh(X/xd)) exp(-(x + X)/xd)."""
+    level, presliding = 7.0, 3e-4
+    work, _ = work_per_cycle(DahlFriction(level, presliding), AMPLITUDE, ANGULAR)
+    ends = np.tanh(AMPLITUDE / presliding)
+    lost = (1 + ends) * presliding * (1 - np.exp(-2 * AMPLITUDE / presliding))
+    np.testing.assert_allclose(work, 2 * level * (2 * AMPLITUDE - lost), rtol=1e-3)
+
+
+def test_a_bouc_wen_law_without_beta_is_a_spring_and_takes_nothing():
+    work, elastic = work_per_cycle(BoucWen(5e4, 0.0, 300.0, 1.0), AMPLITUDE, ANGULAR)
+    assert np.all(np.abs(work) < 1e-4 * elastic)
+
+
+def test_the_truth_of_the_bouc_wen_benchmark_is_admissible():
+    """M. Schoukens and J.-P. Noel, Three benchmarks addressing open challenges, 2017, sec. 4."""
+    assert find_activity(BoucWen(5e4, 800.0, -1100.0, 1.0), 1.5e-3, 0.3) is None
+
+
+def test_a_loop_run_backwards_feeds_energy_in():
+    sentence = find_activity(BoucWen(5e4, -100.0, 0.0, 1.0), 1e-3, 0.03)
+    assert sentence is not None
+    assert "feeds energy" in sentence
+
+
+def test_a_memory_that_blows_up_is_refused():
+    sentence = find_activity(BoucWen(5e4, -1e5, 0.0, 1.0), 1e-3, 0.03)
+    assert sentence is not None
+    assert "runs away" in sentence
+
+
+def test_shape_parameters_that_cancel_are_refused_although_the_loop_takes_energy():
+    law = BoucWen(5e4, 1e5, -0.995e5, 1.0)
+    work, _ = work_per_cycle(law, AMPLITUDE, ANGULAR)
+    assert np.all(work > 0.0)
+    sentence = find_activity(law, 1e-3, 0.03)
+    assert sentence is not None
+    assert "cancel" in sentence
+    # The same ratio at a motion so small that the loop has no knee is a plain spring with slight losses.
+    assert find_activity(law, 1e-5, 3e-4) is None
+
+
+@pytest.mark.parametrize("kind", CATALOGUE.values(), ids=CATALOGUE.keys())
+def test_every_catalogue_shape_takes_energy_at_positive_strength(kind):
+    for probe in kind.grid(SCALES):
+        assert find_activity(with_strength(probe, probe.typical_strength(SCALES)), 1e-3, 0.03) is None
+
+
+def test_a_law_without_memory_is_not_asked():
+    assert find_activity(CubicStiffness(-1e12), 1e-3, 0.03) is None
