@@ -6,9 +6,12 @@ from typing import Any
 
 from ..records import Campaign
 from ._classical_guess import classical_guess
-from ._diagnose import MOST_OF_IT, diagnose, is_good, remaining_bounds
+from ._diagnose import GOOD, MOST_OF_IT, diagnose, is_good
 from ._findings import Extension, Loop, Verdict, VerdictWord
 from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
+from ._look_ahead import find_superfluous
+from ._refit import bic
+from ._scales import scales as campaign_scales
 
 
 def extend(before: Fit, verdict: Verdict) -> Extension:
@@ -59,25 +62,9 @@ def close_loop(
     progress("fit of the declared model")
     before = current = fit(guess.model, campaign, solver=solver, progress=progress)
     first = before.estimate.excess
-    extensions: list[Extension] = []
-    significance, stopped_good = 0.01, False
-    while True:
-        verdict = diagnose(
-            current, first_excess=first, significance=significance, solver=solver, progress=progress
-        )
-        progress(verdict.reason)
-        if verdict.refit is None or len(extensions) == max_iterations:
-            break
-        extensions.append(extend(current, verdict))
-        current = extensions[-1].after
-        significance *= 0.5
-        found = current.estimate
-        stopped_good = is_good(found.chi2 / found.dof, found.excess, first)
-        if stopped_good:
-            break
-    if stopped_good:
-        progress("how large the effects that were not found could still be")
-    bounds = remaining_bounds(current) if stopped_good else verdict.bounds
+    extensions, verdict = _grow(before, first, (), max_iterations, solver, progress)
+    extensions, verdict = _revise(before, first, extensions, verdict, max_iterations, solver, progress)
+    current = extensions[-1].after if extensions else before
     # Asked for here, so that the time of the loop counts it.
     for when, held in (("before", before), ("after", current)):
         progress(f"free-run error {when}: {held.nrmse:.4g} of the measured rms")
@@ -85,13 +72,77 @@ def close_loop(
         campaign,
         guess,
         before,
-        tuple(extensions),
+        extensions,
         current,
         _overall(current, first, bool(extensions), verdict),
         verdict,
-        bounds,
+        verdict.bounds,
         time.perf_counter() - begin,
     )
+
+
+def _grow(
+    before: Fit,
+    first_excess: float,
+    excluded: tuple[str, ...],
+    max_iterations: int,
+    solver: Any,
+    progress: Callable[[str], None],
+) -> tuple[tuple[Extension, ...], Verdict]:
+    """Add effects until nothing is left to add; give the steps and the last diagnosis."""
+    extensions: tuple[Extension, ...] = ()
+    current, significance = before, 0.01
+    while True:
+        verdict = diagnose(
+            current,
+            first_excess=first_excess,
+            significance=significance,
+            excluded=excluded,
+            solver=solver,
+            progress=progress,
+        )
+        progress(verdict.reason)
+        if verdict.refit is None or len(extensions) == max_iterations:
+            return extensions, verdict
+        extensions = (*extensions, extend(current, verdict))
+        current = extensions[-1].after
+        significance *= 0.5
+        found = current.estimate
+        chi2_per_dof = found.chi2 / found.dof
+        # Hardly any of the first excess is left, and yet more than noise: every small model error would be
+        # significant. Where what is left is as small as the noise, a second effect may still stand out of it.
+        if chi2_per_dof > GOOD and is_good(chi2_per_dof, found.excess, first_excess):
+            return extensions, verdict
+
+
+def _revise(
+    before: Fit,
+    first_excess: float,
+    extensions: tuple[Extension, ...],
+    verdict: Verdict,
+    max_iterations: int,
+    solver: Any,
+    progress: Callable[[str], None],
+) -> tuple[tuple[Extension, ...], Verdict]:
+    """Search again without an effect that the later ones made superfluous; keep the better model."""
+    if len(extensions) < 2:
+        return extensions, verdict
+    final = extensions[-1].after
+    earlier = tuple(
+        step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
+    )
+    doubtful = find_superfluous(
+        final.estimate, earlier, final.campaign, campaign_scales(final.campaign), solver, progress
+    )
+    if doubtful is None:
+        return extensions, verdict
+    progress(f"{doubtful} is not needed beside the later findings: search again without it")
+    again, last = _grow(before, first_excess, (doubtful,), max_iterations, solver, progress)
+    if not again:
+        return extensions, verdict
+    new, old = again[-1].after.estimate, final.estimate
+    inflation = max(1.0, min(new.chi2 / new.dof, old.chi2 / old.dof))
+    return (again, last) if bic(new, inflation) <= bic(old, inflation) else (extensions, verdict)
 
 
 def _overall(final: Fit, first_excess: float, any_found: bool, last: Verdict) -> VerdictWord:

@@ -59,7 +59,8 @@ def _residual(free: Float[Array, " column"], local: _Local) -> tuple[Float[Array
 def _compress(matrix: Float[np.ndarray, "column column"]) -> tuple[np.ndarray, np.ndarray]:
     """Give the residual and Jacobian of least size with the same normal equations (Cholesky factor)."""
     count = matrix.shape[0] - 1
-    if not np.all(np.isfinite(matrix)):
+    # A negative sum of squares is what is left of huge numbers that cancel, see `Point.is_finite`.
+    if not np.all(np.isfinite(matrix)) or matrix[-1, -1] < 0.0:
         return np.full(count + 1, RUNAWAY), np.zeros((count + 1, count))
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix / np.outer(size, size)

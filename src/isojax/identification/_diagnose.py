@@ -4,15 +4,27 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from .._parameters import list_parameters, own_parameters
 from .._results import RESULTS
 from ..elements import AbstractElement, Scales
 from ._admissible import find_violation
+from ._balance_start import find_balance_start
 from ._estimate import Estimate
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
-from ._refit import Refit, follows_freely, is_determined, polish, refit_candidate, strength_place
+from ._look_ahead import outdone_by_two
+from ._refit import (
+    Refit,
+    bic,
+    follows_freely,
+    is_determined,
+    polish,
+    refit_candidate,
+    refit_from,
+    strength_place,
+)
 from ._scales import scales as campaign_scales
 from ._score import Score, ScoreTest, absent_effects, score_test
 from ._separate import separating_experiment
@@ -38,6 +50,9 @@ SURVIVORS = 4
 
 WORTH_REFIT = 0.04
 """Linear gain, over that of the leading family, below which no shape parameter makes up the difference."""
+
+FAR = 2.0
+"""chi2/dof above which the balance of measured forces is asked, too: a score is a derivative at the fit."""
 
 CLOSE_BIC = 10.0
 CLOSE_LIKENESS = 0.95
@@ -94,50 +109,100 @@ def diagnose(
     first = fitted.excess if first_excess is None else first_excess
     chi2_per_dof = fitted.chi2 / fitted.dof
     refits: list[Refit] = []
+    leading = (
+        _refit_from_balance(fit, test, scales, solver, max_steps, progress) if chi2_per_dof > FAR else None
+    )
+    if leading is not None:
+        refits.append(leading)
+    strongest = None
     for index, score in enumerate(test.scores):
         if len(refits) == SURVIVORS:
             break
         if not score.admissible or score.p_value > significance:
             continue
-        if refits and score.z**2 < WORTH_REFIT * refits[0].score.z ** 2:
+        if leading is not None and (_explains(leading, fitted) or leading.score.column == score.column):
+            continue
+        if strongest is not None and score.z**2 < WORTH_REFIT * strongest**2:
             break
         # The score says what one linear step could gain at most when the model is near; far away it only
         # ranks.
         if chi2_per_dof <= GOOD and score.z**2 / fitted.dof < SMALLEST_GAIN / 5.0:
             continue
+        strongest = score.z if strongest is None else strongest
         progress(f"refit with {score.element.name}")
         found = refit_candidate(test, index, scales, solver, max_steps, progress)
-        violation = None
-        if found.result != RESULTS.successful or found.excess >= fitted.excess:
-            violation = "its refit did not converge"
-        elif not is_determined(found, score):
-            violation = "its strength is not determined"
-        elif not follows_freely(fitted, found):
-            violation = "its free run is worse than without it"
-        else:
-            violation = find_violation(found.model, fit.campaign.fit_records, fitted.bench.problem.quantity)
-        refits.append(Refit(score, found, violation))
+        refits.append(Refit(score, found, _violation(fit, found, score)))
+    refits = _without_imitations(fit, refits, scales, solver, progress)
     return _judge(fit, test, refits, first, scales, significance, solver, progress)
 
 
-def remaining_bounds(fit: Fit) -> dict[str, tuple[float, str]]:
-    """Say how large each absent effect could still be beside a fitted model, at its typical shape.
-
-    Args:
-        fit: the fit.
-
-    Returns:
-        Upper bound of each strength and its unit, by catalogue name.
-    """
-    scales = campaign_scales(fit.campaign)
-    # One shape an effect will do for a bound; the grids are for finding.
-    typical = {probe.name: type(probe).guess(scales) for probe in absent_effects(fit.model, scales)}
-    test = score_test(fit.estimate, scales, tuple(typical.values()))
-    return _bounds(test, fit.estimate, None)
+def _violation(fit: Fit, found: Estimate, score: Score) -> str | None:
+    """Say what speaks against a refit, whatever it gains."""
+    fitted = fit.estimate
+    if found.result != RESULTS.successful or found.excess >= fitted.excess:
+        return "its refit did not converge"
+    if not is_determined(found, score):
+        return "its strength is not determined"
+    if not follows_freely(fitted, found):
+        return "its free run is worse than without it"
+    return find_violation(found.model, fit.campaign.fit_records, fitted.bench.problem.quantity)
 
 
-def _bic(found: Estimate, inflation: float) -> float:
-    return found.chi2 / inflation + len(found.places) * float(np.log(found.point.samples.sum()))
+def _explains(refit: Refit, fitted: Estimate) -> bool:
+    """Say whether a candidate alone explains most of the excess."""
+    return refit.violation is None and refit.estimate.excess < (1.0 - MOST_OF_IT) * fitted.excess
+
+
+def _refit_from_balance(
+    fit: Fit,
+    test: ScoreTest,
+    scales: Scales,
+    solver: Any,
+    max_steps: int,
+    progress: Callable[[str], None],
+) -> Refit | None:
+    """Refit the effect that the balance of measured forces asks for, if there is one."""
+    absent = tuple(score.element for score in test.scores)
+    start = find_balance_start(fit.campaign, fit.model, scales, absent)
+    if start is None:
+        return None
+    progress(f"refit with {start.element.name}, from the balance of measured forces")
+    found = refit_from(fit.estimate, start.model, scales, solver, max_steps, progress)
+    score = next(one for one in test.scores if one.element.name == start.element.name)
+    # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
+    drop = max(0.0, fit.estimate.chi2 - found.chi2) / max(1.0, found.chi2 / found.dof)
+    extra = max(1, len(found.places) - len(fit.estimate.places))
+    p_value = float(min(1.0, len(absent) * stats.chi2.sf(drop, extra)))
+    score = score._replace(element=start.element, p_value=p_value, admissible=True)
+    return Refit(score, found, _violation(fit, found, score))
+
+
+def _without_imitations(
+    fit: Fit, refits: list[Refit], scales: Scales, solver: Any, progress: Callable[[str], None]
+) -> list[Refit]:
+    """Strike out a best candidate that two simpler effects outdo, until the best stands."""
+    refits = list(refits)
+    while True:
+        usable = _by_evidence(refits)
+        if not usable:
+            return refits
+        pair = outdone_by_two(fit.estimate, usable, fit.campaign, scales, solver, progress)
+        if pair is None:
+            return refits
+        place = next(index for index, one in enumerate(refits) if one is usable[0])
+        refits[place] = usable[0]._replace(violation=f"{pair} explain more with as many coefficients")
+
+
+def _by_evidence(refits: list[Refit]) -> list[Refit]:
+    """List the refits that nothing speaks against, best first."""
+    usable = [refit for refit in refits if refit.violation is None]
+    inflation = _inflation(usable)
+    return sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
+
+
+def _inflation(usable: list[Refit]) -> float:
+    """Give the smallest chi2/dof among refits, at least 1."""
+    return max(1.0, min((refit.estimate.chi2 / refit.estimate.dof for refit in usable), default=1.0))
 
 
 def _judge(
@@ -152,10 +217,8 @@ def _judge(
 ) -> Verdict:
     """Weigh the refits, and word the verdict."""
     fitted = fit.estimate
-    usable = [refit for refit in refits if refit.violation is None]
-    smallest = min((refit.estimate.chi2 / refit.estimate.dof for refit in usable), default=1.0)
-    inflation = max(1.0, smallest)
-    usable.sort(key=lambda refit: _bic(refit.estimate, inflation))
+    usable = _by_evidence(refits)
+    inflation = _inflation(usable)
     good = is_good(fitted.chi2 / fitted.dof, fitted.excess, first_excess)
     ranking = _ranking(test, refits, usable, inflation)
     bounds = _bounds(test, fitted, None)
@@ -165,7 +228,7 @@ def _judge(
         extra = len(best.estimate.places) - len(fitted.places)
         needed = SMALLEST_GAIN if good else max(SMALLEST_GAIN, SMALLEST_SHARE * fitted.excess / fitted.dof)
         enough = gain / fitted.dof >= needed
-        clear = _bic(fitted, inflation) - _bic(best.estimate, inflation) > CLOSE_BIC
+        clear = bic(fitted, inflation) - bic(best.estimate, inflation) > CLOSE_BIC
         share = transferred_share(fit, best.estimate, scales, solver, progress) if enough and clear else 0.0
         if enough and clear and share > 0.0:
             usable[0] = best._replace(estimate=polish(best.estimate, scales, solver, progress))
@@ -246,10 +309,11 @@ def _ranking(
     best = usable[0] if usable else None
     order = {score.element.name: index for index, score in enumerate(test.scores)}
     done = {refit.score.element.name: refit for refit in refits}
-    lowest = _bic(best.estimate, inflation) if best is not None else float("nan")
+    lowest = bic(best.estimate, inflation) if best is not None else float("nan")
 
     def candidate(score: Score) -> Candidate:
         refit = done.get(score.element.name)
+        score = score if refit is None else refit.score
         strength, error = score.strength, score.error
         chi2, delta, admissible = float("nan"), float("nan"), score.admissible
         if refit is not None and len(refit.estimate.places) > len(test.fitted.places):
@@ -258,7 +322,7 @@ def _ranking(
             strength = float(list_parameters(found.model)[found.places[place]].value)
             error = float(found.uncertainty.standard_error[place])
             chi2 = found.chi2 / found.dof
-            delta = _bic(found, inflation) - lowest
+            delta = bic(found, inflation) - lowest
             admissible = admissible and refit.violation is None
         likeness = (
             0.0
@@ -287,7 +351,13 @@ def _ranking(
 
 
 def _bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
-    """Say how large each effect that was not found could still be, inflated by the misfit."""
+    """Say how large each effect that was not found could still be; nothing where the fit is not good.
+
+    A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
+    linear step from there says nothing of any strength.
+    """
+    if not fitted.chi2 / fitted.dof <= GOOD:
+        return {}
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {
         score.element.name: (abs(score.strength) + 1.96 * inflation * score.error, _strength(score.element))

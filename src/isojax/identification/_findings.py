@@ -79,7 +79,8 @@ class Verdict(NamedTuple):
         indistinguishable: catalogue names within the evidence of the best; empty where nothing was found.
         unexplained: share of the excess that is left after the best effect.
         hidden: catalogue names that these data cannot show beside the fitted coefficients.
-        bounds: for each effect that was not found, how large its strength could still be, with its unit.
+        bounds: for each effect that was not found, how large its strength could still be, with its unit;
+            empty where the fit is not good, because a bound takes the rest of the residual for noise.
         refit: the model with the effect, fitted; None where nothing was found.
         reason: one sentence.
     """
@@ -149,7 +150,7 @@ class Loop(NamedTuple):
         verdict: over all iterations.
         last: the last diagnosis: of the final fit where that found nothing, else of the fit before it.
         bounds: for each effect that was not found, how large its strength could still be beside the
-            final model, with its unit.
+            final model, with its unit; empty where its fit is not good.
         seconds: wall time.
     """
 

@@ -12,6 +12,7 @@ from ..models import Isolator
 from ._elimination import Nuisances
 from ._errors import run_freely
 from ._estimate import Estimate, estimate
+from ._information import has_stiffness_scale
 from ._score import Score, ScoreTest
 
 ROUGH = 1.0
@@ -87,6 +88,61 @@ def refit_candidate(
         progress=progress,
         tolerance=ROUGH,
     )
+
+
+def refit_from(
+    fitted: Estimate,
+    model: Isolator,
+    scales: Scales,
+    solver: Any,
+    max_steps: int,
+    progress: Callable[[str], None],
+) -> Estimate:
+    """Fit a model that shares coefficients with a fitted one, everything free, from its own numbers.
+
+    Args:
+        fitted: the estimate whose records and free coefficients count.
+        model: the start; elements that the estimate lacks have all their fitted kinds free.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations at most.
+        progress: told a line a step.
+
+    Returns:
+        The refit.
+    """
+    known = {entry.name for entry in list_parameters(fitted.model)}
+    places = tuple(
+        place
+        for place, entry in enumerate(list_parameters(model))
+        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
+    )
+    # The scatter of a stiffness that the fitted model lacks is still to be found.
+    scatters = has_stiffness_scale(fitted.model) == has_stiffness_scale(model)
+    return estimate(
+        fitted.bench,
+        model,
+        places,
+        scales,
+        nuisances=fitted.point.nuisances._replace(states=np.zeros((0, 0))) if scatters else None,
+        solver=solver,
+        max_steps=max_steps,
+        progress=progress,
+        tolerance=ROUGH,
+    )
+
+
+def bic(found: Estimate, inflation: float) -> float:
+    """Give Schwarz's criterion of an estimate.
+
+    Args:
+        found: the estimate.
+        inflation: chi2/dof of the best model known, at least 1: what model errors add to the noise.
+
+    Returns:
+        chi2 / inflation + coefficients ln(samples).
+    """
+    return found.chi2 / inflation + len(found.places) * float(np.log(found.point.samples.sum()))
 
 
 def _extended(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
