@@ -59,9 +59,10 @@ class BoucWen(AbstractElement):
     def unphysical_shape(self, displacement: float) -> str | None:
         """See `AbstractElement.unphysical_shape`: loads like a plain spring, and lets go at once on return.
 
-        Loading follows `dz/dx = 1 - (beta + gamma) z^n`, the way back `1 + (beta - gamma) z^n`. Where beta and
-        gamma all but cancel, nothing yields on the way out, and where the difference is large all is lost
-        within a small part of the way back: no slip, no friction, but terms of opposite sign that fit noise.
+        Loading follows `dz/dx = 1 - (beta + gamma) z^n`, the way back `1 + (beta - gamma) z^n`. Where beta
+        and gamma all but cancel, nothing yields on the way out, and where the difference is large all is lost
+        within a small part of the way back: no slip and no friction, but terms of opposite sign that fit
+        noise.
         """
         power = displacement ** float(self.exponent)
         forth, back = (float(self.beta) + sign * float(self.gamma) for sign in (1.0, -1.0))
