@@ -17,9 +17,12 @@ class Integrator(eqx.Module):
         rtol: relative tolerance of adaptive steps, or None for fixed steps.
         atol: absolute tolerance of adaptive steps on the state in SI units, used where `rtol` is given.
         max_steps: steps after which one simulation gives up.
+        steps_per_period: steps a drive period of period maps; elements with sharp laws multiply it. Maps over
+            a grid use it as it is and report their error; a single orbit takes as many as its tolerance
+            needs.
 
     Raises:
-        ValueError: if `rtol` is given to a solver that estimates no error.
+        ValueError: if `rtol` is given to a solver that estimates no error, or the steps a period are odd.
     """
 
     solver: diffrax.AbstractSolver = eqx.field(default_factory=RK4)
@@ -27,6 +30,7 @@ class Integrator(eqx.Module):
     rtol: float | None = eqx.field(static=True, default=None)
     atol: float = eqx.field(static=True, default=1e-12)
     max_steps: int = eqx.field(static=True, default=50_000_000)
+    steps_per_period: int = eqx.field(static=True, default=128)
 
     def __check_init__(self):
         """Refuse adaptive steps without an error estimate."""
@@ -34,6 +38,10 @@ class Integrator(eqx.Module):
             raise ValueError(
                 "Argument `solver` must estimate its error where `rtol` is given, such as diffrax.Dopri8(), "
                 f"but is {type(self.solver).__name__}()."
+            )
+        if self.steps_per_period < 8 or self.steps_per_period % 2:
+            raise ValueError(
+                f"Argument `steps_per_period` must be even and at least 8, but is {self.steps_per_period}."
             )
 
     def steps_per_sample(self, model: Isolator) -> int:
@@ -46,6 +54,36 @@ class Integrator(eqx.Module):
             The larger of the two demands.
         """
         return max(self.substeps, model.substeps)
+
+    def steps_a_period(self, model: Isolator) -> int:
+        """Give the integration steps a drive period.
+
+        Args:
+            model: the isolator, whose sharpest element may ask for more.
+
+        Returns:
+            Steps, an even number.
+        """
+        return self.steps_per_period * model.substeps
+
+    @property
+    def orbit_tolerance(self) -> float:
+        """Largest relative closing error of a periodic orbit that counts as found."""
+        return 1e-10
+
+    @property
+    def multiplier_tolerance(self) -> float:
+        """Integration error of the multipliers of a single orbit to which it is refined."""
+        return 1e-11
+
+    @property
+    def map_tolerance(self) -> float:
+        """Largest relative step of Newton's method after which a cell of a map needs no other.
+
+        The multipliers belong to the state before the last step, so this is the size of their error; the
+        error of the orbit itself is of the order of its square.
+        """
+        return 3e-6
 
     def controller(self, times: Float[Array, " time"]) -> diffrax.AbstractStepSizeController:
         """Give diffrax's step size controller.

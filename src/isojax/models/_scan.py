@@ -8,10 +8,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .._types import Lanes
 from ._isolator import Isolator, Quantity, State
 
 
-def sampled_term(model: Isolator, quantity: Quantity, sample_time: float) -> diffrax.ODETerm:
+def sampled_term(model: Isolator, quantity: Quantity, sample_time: Lanes | float) -> diffrax.ODETerm:
     """Give the vector field whose drive is tabulated at the stages of the step.
 
     Time runs from 0 to 1 over one sample and is a Python number, so the table is indexed while tracing and
@@ -43,7 +44,7 @@ def advance(
     model: Isolator,
     solver: diffrax.AbstractSolver,
     quantity: Quantity,
-    sample_time: float,
+    sample_time: Lanes | float,
     state: State,
     drive: tuple[Array, ...],
     drive_rate: tuple[Array | float, ...],
