@@ -6,7 +6,7 @@ from typing import Any
 
 from ..records import Campaign
 from ._classical_guess import classical_guess
-from ._diagnose import GOOD, MOST_OF_IT, diagnose, is_good
+from ._diagnose import MOST_OF_IT, diagnose, is_good
 from ._findings import Extension, Loop, Verdict, VerdictWord
 from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
 from ._look_ahead import find_superfluous
@@ -89,7 +89,10 @@ def _grow(
     solver: Any,
     progress: Callable[[str], None],
 ) -> tuple[tuple[Extension, ...], Verdict]:
-    """Add effects until nothing is left to add; give the steps and the last diagnosis."""
+    """Add effects until nothing is left to add; give the steps and the last diagnosis.
+
+    A good fit is looked at like any other: a second effect may still stand out of what is left.
+    """
     extensions: tuple[Extension, ...] = ()
     current, significance = before, 0.01
     while True:
@@ -107,12 +110,6 @@ def _grow(
         extensions = (*extensions, extend(current, verdict))
         current = extensions[-1].after
         significance *= 0.5
-        found = current.estimate
-        chi2_per_dof = found.chi2 / found.dof
-        # Hardly any of the first excess is left, and yet more than noise: every small model error would be
-        # significant. Where what is left is as small as the noise, a second effect may still stand out of it.
-        if chi2_per_dof > GOOD and is_good(chi2_per_dof, found.excess, first_excess):
-            return extensions, verdict
 
 
 def _revise(

@@ -226,7 +226,7 @@ def _judge(
         best = usable[0]
         gain = fitted.chi2 - best.estimate.chi2
         extra = len(best.estimate.places) - len(fitted.places)
-        needed = SMALLEST_GAIN if good else max(SMALLEST_GAIN, SMALLEST_SHARE * fitted.excess / fitted.dof)
+        needed = max(SMALLEST_GAIN, _needed_share(fitted, good) * fitted.excess / fitted.dof)
         enough = gain / fitted.dof >= needed
         clear = bic(fitted, inflation) - bic(best.estimate, inflation) > CLOSE_BIC
         share = transferred_share(fit, best.estimate, scales, solver, progress) if enough and clear else 0.0
@@ -247,6 +247,17 @@ def _judge(
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
+
+
+def _needed_share(fitted: Estimate, good: bool) -> float:
+    """Give the share of the remaining excess that an effect must explain to be named.
+
+    Where hardly any of the first excess is left and yet more than noise, every small error of the model is
+    significant: only what explains most of the rest counts there.
+    """
+    if fitted.chi2 / fitted.dof <= GOOD:
+        return 0.0
+    return MOST_OF_IT if good else SMALLEST_SHARE
 
 
 def _found(

@@ -9,6 +9,7 @@ from .._parameters import list_parameters, own_parameters, replace_parameters
 from .._results import RESULTS
 from ..elements import AbstractElement, Scales
 from ..models import Isolator
+from ._beginning import best_nuisances
 from ._elimination import Nuisances
 from ._errors import run_freely
 from ._estimate import Estimate, estimate
@@ -77,7 +78,7 @@ def refit_candidate(
         for place, entry in enumerate(listed)
         if entry.name in names or (place >= first_new and entry.spec.fitted)
     )
-    return estimate(
+    found = estimate(
         fitted.bench,
         model,
         places,
@@ -88,6 +89,13 @@ def refit_candidate(
         progress=progress,
         tolerance=ROUGH,
     )
+    if found.result == RESULTS.successful or not found.excess < fitted.excess:
+        return found
+    # Beside a fold the initial states that followed the steps may lie on the other branch: the measured ones
+    # again.
+    progress("the search stalled: again, from the measured states")
+    again = refit_from(found, found.model, scales, solver, max_steps // 2, progress)
+    return again if again.chi2 <= found.chi2 else found
 
 
 def refit_from(
@@ -118,13 +126,19 @@ def refit_from(
         if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
     )
     # The scatter of a stiffness that the fitted model lacks is still to be found.
-    scatters = has_stiffness_scale(fitted.model) == has_stiffness_scale(model)
+    nuisances = None
+    if has_stiffness_scale(fitted.model) == has_stiffness_scale(model):
+        old = fitted.point.nuisances
+        fresh = old._replace(states=np.zeros((0, 0)))
+        # Eliminated by one linear step from far, initial states promise a chi2 that no later step reaches.
+        settled = best_nuisances(fitted.bench, model, old.stiffness_spread, fresh)
+        nuisances = settled.nuisances if settled.is_finite else fresh
     return estimate(
         fitted.bench,
         model,
         places,
         scales,
-        nuisances=fitted.point.nuisances._replace(states=np.zeros((0, 0))) if scatters else None,
+        nuisances=nuisances,
         solver=solver,
         max_steps=max_steps,
         progress=progress,
