@@ -59,7 +59,8 @@ def plot_receptance(
             _backbone(guess, fit, label, colour, width, ax)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("receptance [mm/kN]" if what == "receptance" else "displacement amplitude [mm]")
-    ax.legend(fontsize=7, ncols=2 if len(guess.responses) > 4 else 1)
+    ax.margins(x=0.03, y=0.05 if len(guess.responses) <= 4 else 0.2)
+    ax.legend(fontsize=6.5, ncols=2 if len(guess.responses) > 4 else 1, loc="upper right")
     entitle(ax, "measured receptance" if what == "receptance" else "measured amplitude and model backbone")
     return figure
 

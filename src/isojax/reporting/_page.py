@@ -9,7 +9,7 @@ import jinja2
 from .._parameters import list_parameters
 from ..identification import Candidate, Fit, Loop
 from ..records import data_health
-from ._pictures import error_pictures, evidence_pictures, force_pictures, health_pictures, record_pictures
+from ._pictures import draw_pictures
 from ._quantities import (
     OUTPUT_UNITS,
     plain_unit,
@@ -96,11 +96,7 @@ def _content(loop: Loop) -> dict[str, Any]:
         "caveats": caveats(loop),
         "fit_report_before": str(before),
         "fit_report_after": str(after),
-        "error_pictures": error_pictures(loop),
-        "evidence_pictures": evidence_pictures(loop),
-        "record_pictures": record_pictures(loop),
-        "force_pictures": force_pictures(loop),
-        "health_pictures": health_pictures(loop),
+        **draw_pictures(loop),
         "version": version("isojax"),
         "seconds": f"{loop.seconds:.0f}",
     }

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .._results import is_successful
-from ..identification import Fit, Loop, residual
+from ..identification import ClassicalGuess, Fit, Loop, residual
 from ._classical import centre_frequency, plot_equivalent, plot_receptance, visited_amplitudes
 from ._cycles import trace_cycles
 from ._evidence import plot_errors, plot_ranking, plot_stiffness_scatter
@@ -53,6 +53,30 @@ def encode(figure: Figure) -> str:
     return base64.b64encode(page.getvalue()).decode("ascii")
 
 
+def draw_pictures(loop: Loop) -> dict[str, tuple[Picture, ...]]:
+    """Draw the pictures of the report.
+
+    Where the fit before failed, only those are drawn that need none.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        Section to its pictures: error_pictures, evidence_pictures, record_pictures, force_pictures,
+        health_pictures.
+    """
+    before = loop.before if is_successful(loop.before.result) else None
+    differs = loop.after is not loop.before and is_successful(loop.after.result)
+    after = loop.after if differs else None
+    return {
+        "error_pictures": () if before is None else _error_pictures(before, after),
+        "evidence_pictures": _evidence_pictures(loop, before, after),
+        "record_pictures": () if before is None else _record_pictures(before, after),
+        "force_pictures": _force_pictures(loop.guess, before, after),
+        "health_pictures": () if before is None else _health_pictures(before, after),
+    }
+
+
 def _draw(
     name: str,
     caption: str,
@@ -67,18 +91,8 @@ def _draw(
     return (Picture(name, caption, encode(plot(*args, ax=ax, **options)), wide),)
 
 
-def error_pictures(loop: Loop) -> tuple[Picture, ...]:
-    """Draw the errors before and after.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        The pictures.
-    """
-    before, after = _models(loop)
-    if before is None:
-        return ()
+def _error_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the errors before and after."""
     goodness = "Segments restarted, over the noise. One is all that noise allows."
     free = "Each record simulated from start to end, nothing fed back."
     return (
@@ -87,15 +101,8 @@ def error_pictures(loop: Loop) -> tuple[Picture, ...]:
     )
 
 
-def evidence_pictures(loop: Loop) -> tuple[Picture, ...]:
-    """Draw the ranking behind each finding, or behind the verdict, and the effects by themselves.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        The pictures.
-    """
+def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the ranking behind each finding, or behind the verdict, and the effects by themselves."""
     caption = "Score of each absent effect, what a refit would absorb projected out; χ²/dof where refitted."
     rankings = [(one.ranking, one.effect, one.indistinguishable) for one in loop.findings]
     if not rankings:
@@ -113,7 +120,6 @@ def evidence_pictures(loop: Loop) -> tuple[Picture, ...]:
                 ).add_subplot(),
             )
             pictures.append(Picture(name, caption, encode(figure), True))
-    before, after = _models(loop)
     if before is not None and any(run.record.dwells for run in before.restarts.runs):
         caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force stays."
         pictures += _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
@@ -143,18 +149,8 @@ def _motion(loop: Loop) -> tuple[float, float, float]:
     return min(sizes), max(sizes), float(np.mean(frequencies))
 
 
-def record_pictures(loop: Loop) -> tuple[Picture, ...]:
-    """Draw the worst record against the models, and what they leave.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        The pictures.
-    """
-    before, after = _models(loop)
-    if before is None:
-        return ()
+def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the worst record against the models, and what they leave."""
     place, low, high = worst_window(before)
     caption = "Free run, nothing fed back; the record on which the model before is worst."
     zoomed = "The same, at the cycles where the model before is worst."
@@ -191,17 +187,8 @@ def record_pictures(loop: Loop) -> tuple[Picture, ...]:
     )
 
 
-def force_pictures(loop: Loop) -> tuple[Picture, ...]:
-    """Draw the force laws of the models beside what the classical route sees.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        The pictures.
-    """
-    before, after = _models(loop)
-    guess = loop.guess
+def _force_pictures(guess: ClassicalGuess, before: Fit | None, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the force laws of the models beside what the classical route sees."""
     fits = [] if before is None else [(label, fit) for label, fit, _ in pair(before, after)]
     pictures: tuple[Picture, ...] = ()
     if guess.responses or guess.linear:
@@ -222,24 +209,9 @@ def force_pictures(loop: Loop) -> tuple[Picture, ...]:
     return pictures
 
 
-def health_pictures(loop: Loop) -> tuple[Picture, ...]:
-    """Draw how the stiffness scatters between records.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        The pictures.
-    """
-    before, after = _models(loop)
-    if before is None or len(loop.campaign.records) < 2 or not np.any(before.restarts.stiffness):
+def _health_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw how the stiffness scatters between records."""
+    if len(before.campaign.records) < 2 or not np.any(before.restarts.stiffness):
         return ()
     caption = "Scatter is data health; a trend in the order of the test is drift."
     return _draw("stiffness of each record", caption, plot_stiffness_scatter, before, after, wide=True)
-
-
-def _models(loop: Loop) -> tuple[Fit | None, Fit | None]:
-    """Give the fits that can be drawn: before, and after where it is another and succeeded."""
-    before = loop.before if is_successful(loop.before.result) else None
-    differs = loop.after is not loop.before and is_successful(loop.after.result)
-    return before, loop.after if differs else None
