@@ -1,0 +1,131 @@
+"""Two effects at once: neither an imitation of both nor a name given too early may stand."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from isojax import rig
+from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
+from isojax.identification import close_loop, diagnose, fit, scales, silent
+from isojax.identification._diagnose import GOOD
+from isojax.identification._fit import DEFAULT_SOLVER
+from isojax.identification._look_ahead import find_superfluous, outdone_by_two
+from isojax.identification._refit import Refit, refit_candidate
+from isojax.identification._score import absent_effects, score_test
+from isojax.models import Integrator, Isolator
+
+LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
+START = Isolator(800.0, (LinearStiffness(1.05e6), LinearDamping(1.1e4)))
+PLAN = rig.Multisine(
+    (20.0, 40.0, 60.0, 80.0, 100.0, 120.0),
+    2.0,
+    14.0,
+    period=1.0,
+    periods=3,
+    lines="full",
+    holdout_levels=(90.0,),
+)
+BENCH = rig.Bench(rate=250.0, noise=1e-2, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+BOTH = (rig.CubicStiffness(2.5e11), rig.CoulombFriction(4.0))
+
+
+@pytest.fixture(scope="module")
+def thin(simulated):
+    """Six records of three seconds each, of a plant with two effects that the declared model lacks."""
+    return simulated(LINEAR.plus(*BOTH), PLAN, 2, BENCH, stiffness=("linear",), damping=("linear",))
+
+
+def _superfluous(campaign, start, *names):
+    found = fit(start, campaign, integrator=Integrator())
+    return find_superfluous(found.estimate, names, campaign, scales(campaign), DEFAULT_SOLVER, silent)
+
+
+@pytest.mark.slow
+def test_both_effects_are_named_although_the_first_makes_the_fit_good(thin):
+    loop = close_loop(thin)
+    first = loop.extensions[0].after.estimate
+    assert first.chi2 / first.dof < GOOD
+    assert {finding.effect for finding in loop.findings} == {"coulomb_friction", "cubic_stiffness"}
+    assert loop.verdict == "found"
+    found = {entry.name: float(entry.value) for entry in loop.after.model.parameters}
+    errors = loop.after.standard_errors
+    for name, truth in (("coulomb_friction.force_level", 4.0), ("cubic_stiffness.coefficient", 2.5e11)):
+        assert abs(found[name] - truth) < 3.5 * errors[name]
+
+
+def test_what_the_plant_has_is_not_superfluous(thin):
+    start = START.with_elements(CoulombFriction(3.0, 2e-4), CubicStiffness(1e11))
+    assert _superfluous(thin, start, "coulomb_friction", "cubic_stiffness") is None
+
+
+def test_what_the_plant_lacks_is_superfluous(thin):
+    start = START.with_elements(MaxwellBranch(5e3, 0.03), CoulombFriction(3.0, 2e-4), CubicStiffness(1e11))
+    assert _superfluous(thin, start, "maxwell_branch", "coulomb_friction") == "maxwell_branch"
+
+
+def _outdone(campaign, law, rival):
+    """Which two effects outdo a law that a rival candidate stands behind."""
+    found = fit(START, campaign, integrator=Integrator())
+    magnitudes = scales(campaign)
+    test = score_test(found.estimate, magnitudes, absent_effects(found.model, magnitudes))
+    place = {score.element.name: index for index, score in enumerate(test.scores)}
+    usable = [
+        Refit(
+            test.scores[place[name]],
+            refit_candidate(test, place[name], magnitudes, DEFAULT_SOLVER, 40, silent),
+            None,
+        )
+        for name in (law, rival)
+    ]
+    return outdone_by_two(found.estimate, usable, campaign, magnitudes, DEFAULT_SOLVER, silent)
+
+
+@pytest.mark.slow
+def test_a_law_of_three_coefficients_has_to_beat_two_simple_effects(thin):
+    words = _outdone(thin, "bouc_wen", "coulomb_friction")
+    assert words is not None
+    assert words.startswith(CoulombFriction.words)
+
+
+@pytest.mark.slow
+def test_a_true_law_of_three_coefficients_stands_against_two_simple_effects(simulated):
+    law = rig.BoucWen(4e5, 4e3, -1.2e3)
+    campaign = simulated(LINEAR.plus(law), PLAN, 4, BENCH, stiffness=("linear",), damping=("linear",))
+    assert _outdone(campaign, "bouc_wen", "coulomb_friction") is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plan", "bench"),
+    [
+        (PLAN, BENCH),
+        (
+            rig.SteppedSine((50.0, 90.0, 140.0), (5.0, 5.4, 5.8, 6.2, 6.6, 7.0), cycles=8),
+            dataclasses.replace(BENCH, noise=1e-5, output="displacement"),
+        ),
+    ],
+    ids=["multisine", "stepped_sine"],
+)
+def test_a_spring_that_the_declared_model_lacks_is_found_from_afar(plan, bench, simulated):
+    campaign = simulated(LINEAR, plan, 1, bench, stiffness=(), damping=("linear",))
+    far = fit(Isolator(800.0, (LinearDamping(1.1e4),)), campaign, integrator=Integrator())
+    assert far.estimate.chi2 / far.estimate.dof > 50.0
+    verdict = diagnose(far)
+    assert verdict.verdict == "found"
+    assert verdict.finding.effect == "linear_stiffness"
+    assert verdict.ranking[0].admissible
+    best = verdict.ranking[0]
+    assert abs(best.strength - 1.08e6) < 3.5 * best.strength_error
+    assert verdict.refit.chi2 / verdict.refit.dof == pytest.approx(1.0, abs=GOOD - 1.0)
+
+
+def test_no_bound_is_given_beside_a_fit_that_is_not_good(simulated):
+    campaign = simulated(
+        LINEAR.plus(rig.CoulombFriction(8.0)), PLAN, 3, BENCH, stiffness=("linear",), damping=("linear",)
+    )
+    found = fit(START, campaign, integrator=Integrator())
+    assert found.estimate.chi2 / found.estimate.dof > GOOD
+    verdict = diagnose(found, excluded=("coulomb_friction", "dahl_friction", "bouc_wen"))
+    assert verdict.bounds == {}
+    assert np.isfinite(verdict.unexplained)
