@@ -46,7 +46,7 @@ def read_campaign(path: str | Path) -> Campaign:
             row, what was found and what was expected.
 
     Source:
-        The form of campaign.toml is described in the README.
+        The form of campaign.toml is described in docs/campaign.md.
     """
     declared = read_declaration(path)
     file, sections = declared.file, declared.sections
