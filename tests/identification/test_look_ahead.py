@@ -92,7 +92,7 @@ def test_a_law_of_three_coefficients_has_to_beat_two_simple_effects(thin):
 def test_a_true_law_of_three_coefficients_stands_against_two_simple_effects(simulated):
     law = rig.BoucWen(4e5, 4e3, -1.2e3)
     campaign = simulated(LINEAR.plus(law), PLAN, 4, BENCH, stiffness=("linear",), damping=("linear",))
-    assert _outdone(campaign, "bouc_wen", "coulomb_friction") is None
+    assert _outdone(campaign, "bouc_wen", "dahl_friction") is None
 
 
 @pytest.mark.slow
