@@ -66,6 +66,12 @@ def _hold_of(records: tuple[Record, ...], **changes) -> Campaign:
 
 
 @pytest.fixture(scope="session")
+def as_record() -> Callable[[rig.SimulatedRecord], Record]:
+    """Gives the function that makes a simulated record one of the reader's."""
+    return _as_record
+
+
+@pytest.fixture(scope="session")
 def campaign_of() -> Callable[..., Campaign]:
     """Gives the function that puts records into a campaign."""
     return _hold_of

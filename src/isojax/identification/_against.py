@@ -33,6 +33,7 @@ class Against:
             quantity=fitted.quantity,
             hold=fitted.hold,
             noise=fitted.noise,
+            share=fitted.share,
             integrator=fitted.integrator,
         )
         nuisances = found.point.nuisances

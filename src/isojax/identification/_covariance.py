@@ -1,4 +1,22 @@
-"""Uncertainty of fitted coefficients, in physical units: where information turns into error bars."""
+"""Uncertainty of fitted coefficients, in physical units: where information turns into error bars.
+
+What the error bars hold: the noise of the output, by its density inside its band; the initial states; the
+scatter of the linear stiffness from record to record, by its prior, so that the mean over n records is
+uncertain by scatter/sqrt(n) too.
+
+What they do not hold, and what can exceed them once the noise is small:
+
+- the calibration of the channels. A gain 1 + s that both share leaves every linear coefficient as it is and
+  nothing in the residual, but moves the coefficient of a force of degree n by -(n - 1) s: a filter with the
+  gain 1.00015 shifts a cubic spring by -0.03 %. A gain of one channel moves every coefficient by about s, the
+  mass being declared. No record shows either; error bars would have to be declared with the gains.
+- noise of the force. Through the isolator it becomes motion; at 0.02 N on 800 kg (1 kHz) its density is below
+  a thousandth of that of 0.003 m/s^2 of sensor noise, and it is left out. A force as noisy as the response
+  would bias the coefficients.
+- the regularising width of dry friction and the instants at which it is sampled. Where the jump 2 Fc/m is
+  several times the noise, readings inside the jump pull at Fc: by 0.2 to 0.5 % at Fc/m = 2.5 sigma, several
+  standard errors, and about half as much at half the width.
+"""
 
 from typing import NamedTuple
 

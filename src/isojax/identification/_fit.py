@@ -27,7 +27,7 @@ class Statistics(NamedTuple):
     """Counts and criteria of a fit.
 
     Attributes:
-        samples: samples that count.
+        samples: samples that count, filtered noise counted by its independent samples.
         coefficients: free coefficients.
         chi2: squared whitened residual after the nuisances.
         dof: samples less nuisances less coefficients.
@@ -164,7 +164,7 @@ def fit(
             f"{campaign.file}: the noise of the output must be above 0, but the records, so short or so "
             f"clean, show {noise.sigma:g}; declare it: [output] noise = its rms"
         )
-    bench = bench_for(model, campaign, noise.sigma, integrator)
+    bench = bench_for(model, campaign, noise.white, integrator, noise.share)
     found = estimate(
         bench,
         model,
@@ -188,14 +188,17 @@ def _check_excitation(model: Isolator, campaign: Campaign) -> None:
         )
 
 
-def bench_for(model: Isolator, campaign: Campaign, noise: float, integrator: Integrator | None) -> Bench:
+def bench_for(
+    model: Isolator, campaign: Campaign, noise: float, integrator: Integrator | None, share: float = 1.0
+) -> Bench:
     """Give the bench of a campaign's fitting records.
 
     Args:
         model: the isolator.
         campaign: the measurements.
-        noise: rms of the noise [SI unit of the output].
+        noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
         integrator: solver and steps, or None to choose them.
+        share: share of the samples of which the noise is independent.
 
     Returns:
         The bench.
@@ -206,6 +209,7 @@ def bench_for(model: Isolator, campaign: Campaign, noise: float, integrator: Int
         quantity=campaign.output.quantity,
         hold=campaign.input.hold,
         noise=noise,
+        share=share,
         integrator=Integrator() if integrator is None else integrator,
     )
     if integrator is None:

@@ -25,10 +25,12 @@ class Problem(NamedTuple):
         segments: pieces of them.
         quantity: what the sensor measures.
         hold: what the drive does between samples.
-        noise: rms of the noise [SI unit of the output].
+        noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
         integrator: solver and steps.
         heads: the beginning of each record, where records are left whole and only their beginnings may set
             the initial states; empty where every segment settles its own.
+        step_error: rms error of the integration over the noise of a sample.
+        share: share of the samples of which the noise is independent; below 1 where a filter has limited it.
     """
 
     records: tuple[Record, ...]
@@ -39,6 +41,7 @@ class Problem(NamedTuple):
     integrator: Integrator
     heads: tuple[Segment, ...] = ()
     step_error: float = float("nan")
+    share: float = 1.0
 
 
 class Point(NamedTuple):
@@ -48,7 +51,8 @@ class Point(NamedTuple):
         model: the isolator.
         nuisances: where they stand.
         reduced: normal equations of the columns asked for.
-        samples: count of samples that count in each record.
+        samples: independent samples that count in each record: N `share`, because noise that is white up to a
+            filter's cut-off and nothing beyond leaves, weighed by its density, so much chi-square.
     """
 
     model: Isolator
@@ -58,7 +62,7 @@ class Point(NamedTuple):
 
     @property
     def free_samples(self) -> float:
-        """Samples less the degrees of freedom that the nuisances took."""
+        """Independent samples less the degrees of freedom that the nuisances took."""
         return float(np.sum(self.samples - self.reduced.eliminated))
 
     @property
@@ -68,8 +72,11 @@ class Point(NamedTuple):
 
     @property
     def is_finite(self) -> bool:
-        """Whether every segment's simulation stayed finite."""
-        return bool(np.all(np.isfinite(self.reduced.matrix)))
+        """Whether every segment's simulation stayed finite.
+
+        A sum of squares below zero is what is left of huge numbers that cancel: a simulation that ran away.
+        """
+        return bool(np.all(np.isfinite(self.reduced.matrix)) and self.chi2 >= 0.0)
 
 
 HUGE = 1e150
@@ -233,7 +240,7 @@ class Bench:
             nuisances,
             heads,
         )
-        return Point(model, nuisances, reduced, prepared.samples)
+        return Point(model, nuisances, reduced, prepared.samples * self.problem.share)
 
     def _matrices(
         self, unknowns: Unknowns, carried: int, prepared: Prepared

@@ -19,6 +19,7 @@ def build_problem(
     hold: Hold,
     noise: float,
     integrator: Integrator,
+    share: float = 1.0,
 ) -> Problem:
     """Cut records into segments for a model.
 
@@ -31,8 +32,9 @@ def build_problem(
         model: the isolator, for its memory.
         quantity: what the sensor measures.
         hold: what the drive does between samples.
-        noise: rms of the noise [SI unit of the output].
+        noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
         integrator: solver and steps.
+        share: share of the samples of which the noise is independent.
 
     Returns:
         The problem.
@@ -49,4 +51,4 @@ def build_problem(
     segments = cut_segments(records, model)
     whole = slowest_decay(model) == 0.0 and not any(record.dwells for record in records)
     heads = head_segments(records) if whole else ()
-    return Problem(records, segments, quantity, hold, noise, integrator, heads)
+    return Problem(records, segments, quantity, hold, noise, integrator, heads, share=share)

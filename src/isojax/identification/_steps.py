@@ -38,7 +38,7 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     difference = (outcomes[0] - outcomes[1]) * weight
     if not np.all(np.isfinite(difference)):
         return float("inf")
-    return float(np.sqrt(np.sum(difference**2) / np.sum(weight)) / problem.noise)
+    return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise)
 
 
 def find_integrator(problem: Problem, model: Isolator) -> Problem:

@@ -6,10 +6,15 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.signal
+import scipy.stats
 from jaxtyping import Float
 from scipy.fft import next_fast_len
 
+from ._noise_band import NoiseBand
 from ._record import Record
+
+_AVERAGES = 15
+"""Segments over which the spectrum of a floor is averaged; they overlap by half."""
 
 
 @dataclass(frozen=True)
@@ -45,26 +50,47 @@ def power_spectrum(
     return frequency, density
 
 
-def spectral_floor(signal: Float[np.ndarray, " time"], rate: float, above: float, below: float) -> float:
-    """Gives the median power density of a signal between two frequencies, corrected to a mean.
+def spectral_floor(
+    signal: Float[np.ndarray, " time"], band: NoiseBand, *spans: tuple[float, float]
+) -> tuple[float, float]:
+    """Gives the power density of white noise that would leave the median floor of a signal's spectrum.
+
+    The spectrum is divided by the gain of the filter that the noise has passed, and the median corrected to a
+    mean by the chi-square distribution of averaged periodograms.
 
     Args:
         signal: Samples, (time,).
-        rate: Samples per second [Hz].
-        above: Lower end [Hz].
-        below: Upper end [Hz].
+        band: The band that the noise fills.
+        spans: Lower and upper ends [Hz]; the lines between any of them count.
 
     Returns:
-        Power per Hz; NaN where fewer than 8 lines lie between.
+        Power per Hz and its relative standard error; NaN where fewer than 8 lines lie between.
+
+    Source: Welch 1967 (degrees of freedom of overlapping segments).
     """
-    averages = 15
-    frequency, density = power_spectrum(signal, rate, averages)
-    inside = (frequency > above) & (frequency < below)
-    if np.count_nonzero(inside) < 8:
-        return float("nan")
-    # median of a chi-square over its mean, at the degrees of freedom of overlapping segments
-    freedom = 2.0 * averages * 0.9
-    return float(np.median(density[inside])) / (1.0 - 2.0 / (9.0 * freedom)) ** 3
+    frequency, density = power_spectrum(signal, band.rate, _AVERAGES)
+    inside = np.any([(frequency > low) & (frequency < high) for low, high in spans], axis=0)
+    lines = np.count_nonzero(inside)
+    if lines < 8:
+        return float("nan"), float("nan")
+    freedom, alike = _freedom(signal.size, 2 * (frequency.size - 1))
+    level = np.median(density[inside] / band.power_gain(frequency[inside]))
+    error = np.sqrt(0.5 * np.pi * (2.0 / freedom) * alike / lines)
+    return float(level * freedom / scipy.stats.chi2.ppf(0.5, freedom)), float(error)
+
+
+def _freedom(size: int, segment: int) -> tuple[float, float]:
+    """Gives the degrees of freedom of a line of the averaged spectrum, and how many lines go as one.
+
+    Both follow from the window: segments that overlap by half share some noise, and so do neighbouring lines.
+    """
+    window = np.asarray(scipy.signal.get_window("blackmanharris", segment), dtype=np.float64)
+    half = segment // 2
+    count = max(1, (size - half) // (segment - half))
+    power = float(np.sum(window**2))
+    shared = float(np.sum(window[half:] * window[: segment - half])) / power
+    freedom = 2.0 * count / (1.0 + 2.0 * shared**2 * (1.0 - 1.0 / count))
+    return freedom, segment * float(np.sum(window**4)) / power**2
 
 
 def excited_band(record: Record) -> Band:

@@ -12,12 +12,23 @@ from jaxtyping import Float
 from ._band import spectral_floor
 from ._campaign import Campaign
 from ._harmonics import harmonic_basis
+from ._noise_band import NoiseBand
 from ._record import Dwell, Record
 from ._repeats import repeat_difference, repeat_groups
 
 NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency"]
-_MOST_HARMONICS = 40
+_MOST_HARMONICS = 120
+"""Those of dry friction fall as 1/n: the fortieth may still stand above the noise."""
+
 _QUANTILE = 0.25
+_UNSETTLED = 1e-3
+"""Chance of a settled dwell to scatter as much as one that does not count."""
+
+_FLOORS = ((0.35, 0.5), (0.5, 0.65), (0.65, 0.8), (0.8, 0.95))
+"""Parts of the band whose floors are compared."""
+
+_AGREE = 3.0
+"""Standard errors within which two floors are one."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +36,14 @@ class NoiseEstimate:
     """rms noise of the output channel [its SI unit].
 
     Attributes:
-        sigma: Pooled over the records.
+        sigma: Pooled over the records; of the samples as the campaign holds them, filtered where it filters.
         method: How it was found; where records differ, the method of most of them.
         per_record: One value per record, in the campaign's order.
         methods: The method of each record.
         bandwidth_hz: Frequency up to which the noise reaches [Hz]: half the rate, or the [filter]'s cut-off.
         note: What to keep in mind, or "".
+        share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
+            independent.
     """
 
     sigma: float
@@ -39,17 +52,26 @@ class NoiseEstimate:
     methods: tuple[NoiseMethod, ...]
     bandwidth_hz: float
     note: str = ""
+    share: float = 1.0
+
+    @property
+    def white(self) -> float:
+        """White noise of the density that this noise has inside its band, its rms: sigma / sqrt(share).
+
+        It is this, not the smaller rms of what a filter left, that a coefficient is uncertain by: the motion
+        lies inside the band, where a filter has taken nothing off the noise.
+        """
+        return self.sigma / float(np.sqrt(self.share))
 
 
 def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     """Gives the output noise of a campaign.
 
-    Per record, the first that applies: the declared one; the scatter about the harmonics of settled dwells;
-        the
-    scatter between periods; the difference of repeats at equal level and direction, where it is not explained
-    by the records themselves; the floor of the spectrum above the excited band. Forces and stiffness that
-    change from repeat to repeat move harmonics, not the scatter about them, so stepped sines never need the
-    repeats.
+    Per record, the first that applies: the declared one (of the column as the file holds it); the scatter
+    about the harmonics of settled dwells; the scatter between periods; the difference of repeats at equal
+    level and direction, where it is not explained by the records themselves; the floor of the spectrum above
+    the excited band. Forces and stiffness that change from repeat to repeat move harmonics, not the scatter
+    about them, so stepped sines never need the repeats.
 
     Args:
         campaign: The campaign.
@@ -57,20 +79,21 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     Returns:
         The estimate.
     """
-    nyquist = 0.5 * campaign.rate
-    bandwidth, note = nyquist, ""
+    band, note = NoiseBand(campaign.rate, campaign.filter), ""
     if campaign.filter is not None:
-        bandwidth = min(campaign.filter.cutoff_hz, nyquist)
         note = (
-            f"the noise is band limited by the {campaign.filter.kind} filter at {bandwidth:g} Hz: "
-            "its samples are correlated"
+            f"the noise is band limited by the {campaign.filter.kind} filter at {band.highest:g} Hz: "
+            f"its samples are correlated, and {100.0 * band.share:.2g} % of them count as independent"
         )
     records = campaign.records
     if campaign.output.noise is not None:
         declared = float(campaign.output.noise)
+        if campaign.filter is not None and not campaign.filter.applied:
+            declared *= float(np.sqrt(band.share))
         methods: tuple[NoiseMethod, ...] = ("declared",) * len(records)
-        return NoiseEstimate(declared, "declared", (declared,) * len(records), methods, bandwidth, note)
-    found = _estimate_each(records, bandwidth)
+        each = (declared,) * len(records)
+        return NoiseEstimate(declared, "declared", each, methods, band.highest, note, band.share)
+    found = _estimate_each(records, band)
     seen: list[NoiseMethod] = [
         method for value, method in found if np.isfinite(value) and method != "high_frequency"
     ]
@@ -83,20 +106,21 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
         method=common,
         per_record=tuple(value if keep else sigma for (value, _), keep in zip(found, kept, strict=True)),
         methods=tuple(method if keep else common for (_, method), keep in zip(found, kept, strict=True)),
-        bandwidth_hz=bandwidth,
+        bandwidth_hz=band.highest,
         note=note,
+        share=band.share,
     )
 
 
-def _estimate_each(records: tuple[Record, ...], bandwidth: float) -> list[tuple[float, NoiseMethod]]:
+def _estimate_each(records: tuple[Record, ...], band: NoiseBand) -> list[tuple[float, NoiseMethod]]:
     partners = repeat_groups(records)
     found = []
     for record in records:
         group = [one for one in partners.get(record.name, ()) if one.kind != "stepped_sine"]
         tries: list[tuple[NoiseMethod, Callable[[], float]]] = [
-            ("cycle_scatter", lambda record=record: cycle_scatter(record, bandwidth)),
+            ("cycle_scatter", lambda record=record: cycle_scatter(record, band)),
             ("periods", lambda record=record: period_scatter(record)),
-            ("repeats", lambda record=record, group=group: _repeat_scatter(record, group, bandwidth)),
+            ("repeats", lambda record=record, group=group: _repeat_scatter(record, group, band)),
         ]
         for method, estimate in tries:
             value = estimate()
@@ -104,38 +128,39 @@ def _estimate_each(records: tuple[Record, ...], bandwidth: float) -> list[tuple[
                 found.append((value, method))
                 break
         else:
-            found.append((high_frequency_floor(record, bandwidth), "high_frequency"))
+            found.append((high_frequency_floor(record, band), "high_frequency"))
     return found
 
 
-def cycle_scatter(record: Record, bandwidth: float) -> float:
+def cycle_scatter(record: Record, band: NoiseBand) -> float:
     """Gives the rms about the harmonics of the last quarter of each dwell, at least four cycles; NaN if none
     is long.
 
-    As many harmonics are taken as the band holds, up to 40, and the fundamental may drift linearly. Over the
-    dwells the lower quartile of the mean squares counts, corrected to their mean by chi-square: dwells that
-    never settle, near a fold or in modulation, do not raise it.
+    As many harmonics are taken as the band holds, up to 120, and the fundamental may drift linearly. Dwells
+    that never settle, near a fold or in modulation, do not count: beyond the chance of one in a thousand, by
+    chi-square, from the level that the lower quartile of the dwells shows.
 
     Args:
         record: The record.
-        bandwidth: Highest frequency of the noise [Hz].
+        band: The band that the noise fills.
 
     Returns:
         rms per sample in the output's unit.
     """
-    scatters = [
-        one for dwell in record.dwells if (one := dwell_scatter(record, dwell, bandwidth)) is not None
-    ]
-    if not scatters:
+    found = [dwell_scatter(record, dwell, band) for dwell in record.dwells]
+    scatters = np.array([one for one in found if one is not None]).reshape(-1, 2)
+    if not scatters.size:
         return float("nan")
-    squares = [square for square, _ in scatters]
-    freedom = float(np.median([freedom for _, freedom in scatters]))
-    quantile = _QUANTILE if len(squares) >= 4 else 0.5
-    corrected = np.quantile(squares, quantile) * freedom / scipy.stats.chi2.ppf(quantile, freedom)
-    return float(np.sqrt(corrected))
+    squares, freedom = scatters.T
+    quantile = _QUANTILE if squares.size >= 4 else 0.5
+    level = np.quantile(squares * freedom / scipy.stats.chi2.ppf(quantile, freedom), quantile)
+    for _ in range(3):
+        settled = squares * freedom <= level * scipy.stats.chi2.isf(_UNSETTLED, freedom)
+        level = np.average(squares[settled], weights=freedom[settled]) if np.any(settled) else level
+    return float(np.sqrt(level))
 
 
-def dwell_scatter(record: Record, dwell: Dwell, bandwidth: float) -> tuple[float, float] | None:
+def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float, float] | None:
     """Gives mean square about the harmonics of a dwell's end and its degrees of freedom; None if it is too
     short.
     """
@@ -144,16 +169,14 @@ def dwell_scatter(record: Record, dwell: Dwell, bandwidth: float) -> tuple[float
     if window > 0.7 * (dwell.stop - dwell.start):
         return None
     signal = record.output[dwell.stop - window : dwell.stop]
-    highest = 0.9 * min(0.5 * record.rate, bandwidth)
-    orders = min(_MOST_HARMONICS, int(highest / dwell.frequency), max(1, window // 8))
+    orders = min(_MOST_HARMONICS, int(0.9 * band.highest / dwell.frequency), max(1, window // 8))
     design, inverse = _drifting_harmonics(window, record.rate, dwell.frequency, orders)
     # noise of a narrow band has fewer degrees of freedom than samples; the harmonics take theirs from them
-    share = bandwidth / (0.5 * record.rate)
-    freedom = window * share - design.shape[1]
+    freedom = window * band.share - design.shape[1]
     if freedom < design.shape[1]:
         return None
     rest = signal - design @ (inverse @ (design.T @ signal))
-    return float(rest @ rest) * share / freedom, float(freedom)
+    return float(rest @ rest) * band.share / freedom, float(freedom)
 
 
 @functools.lru_cache(maxsize=64)
@@ -191,18 +214,38 @@ def period_scatter(record: Record) -> float:
     return float(np.sqrt(chosen))
 
 
-def high_frequency_floor(record: Record, bandwidth: float) -> float:
-    """Gives the rms of white noise up to `bandwidth` that has the density of the spectrum's quietest upper
-    part.
+def high_frequency_floor(record: Record, band: NoiseBand) -> float:
+    """Gives the rms of noise that has the density of the spectrum's quietest upper part.
+
+    The quietest of four parts alone would be low by the luck of the draw. Those that agree with it are
+    therefore taken together; where the response fills the lower ones, the quietest stands alone, and no
+    choice between equals has been made.
+
+    Args:
+        record: The record.
+        band: The band that the noise fills.
+
+    Returns:
+        rms per sample in the output's unit.
     """
-    floors = [
-        spectral_floor(record.output, record.rate, low * bandwidth, (low + 0.15) * bandwidth)
-        for low in (0.35, 0.5, 0.65, 0.8)
-    ]
-    known = [one for one in floors if np.isfinite(one)]
-    if not known:  # a short record has too few lines for narrow bands
-        known = [spectral_floor(record.output, record.rate, 0.4 * bandwidth, 0.95 * bandwidth)]
-    return float(np.sqrt(min(known) * bandwidth))
+    spans = [(low * band.highest, high * band.highest) for low, high in _FLOORS]
+    found = [(*spectral_floor(record.output, band, span), span) for span in spans]
+    known = sorted(one for one in found if np.isfinite(one[0]))
+    if not known:  # a short record has too few lines for narrow parts
+        density, _ = spectral_floor(record.output, band, (0.4 * band.highest, 0.95 * band.highest))
+    else:
+        density, error, quietest = known[0]
+        alike = [quietest]
+        for level, own, span in known[1:]:
+            if level <= density * (1.0 + _AGREE * np.hypot(own, error)):
+                alike.append(span)
+                density, error = spectral_floor(record.output, band, *alike)
+    return _rms(density, band)
+
+
+def _rms(density: float, band: NoiseBand) -> float:
+    """Gives the rms per sample of noise whose white density [per Hz] is known."""
+    return float(np.sqrt(density * band.share * 0.5 * band.rate))
 
 
 def _between(periods: Float[np.ndarray, "period time"]) -> float:
@@ -210,22 +253,19 @@ def _between(periods: Float[np.ndarray, "period time"]) -> float:
     return float(np.mean(rest**2)) * periods.shape[0] / (periods.shape[0] - 1)
 
 
-def _repeat_scatter(record: Record, group: list[Record], bandwidth: float) -> float:
-    """Gives the rms noise of a record from the unexplained difference to its repeats; NaN without any."""
+def _repeat_scatter(record: Record, group: list[Record], band: NoiseBand) -> float:
+    """Gives the rms noise of a record from the unexplained difference to its repeats; NaN without any.
+
+    The median over the band counts: lines that a drift still moves are the minority.
+    """
     squares = []
     for other in group:
         difference = repeat_difference(record, other)
         if difference is not None:
-            squares.append(0.5 * high_density(difference, record.rate, bandwidth) * bandwidth)
+            density, _ = spectral_floor(difference, band, (0.0, 0.95 * band.highest))
+            squares.append(0.5 * _rms(density, band) ** 2)
     known = [one for one in squares if np.isfinite(one)]
     return float(np.sqrt(np.mean(known))) if known else float("nan")
-
-
-def high_density(difference: Float[np.ndarray, " time"], rate: float, bandwidth: float) -> float:
-    """Gives the median power density of a difference of repeats: lines that a drift still moves are the
-    minority.
-    """
-    return spectral_floor(difference, rate, 0.0, 0.95 * bandwidth)
 
 
 def _pool(values: list[float]) -> float:

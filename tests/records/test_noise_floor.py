@@ -1,0 +1,96 @@
+"""The floor of a spectrum against white noise that was put in, over many draws."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.signal
+from jaxtyping import Float
+
+from isojax.records import Campaign, Filter, InputChannel, OutputChannel, Record, estimate_noise
+from isojax.records._noise_band import NoiseBand
+
+RATE, SIGMA, SEEDS = 500.0, 0.013, 24
+LOW = Filter("butterworth", 4, 60.0, applied=True)
+
+
+def found_in(output: Float[np.ndarray, " time"], low: Filter | None = None) -> float:
+    drive = np.sin(np.arange(output.size) / RATE)
+    time = np.arange(output.size) / RATE
+    record = Record("a", Path("a.npz"), time, RATE, drive, output, drive, output)
+    campaign = Campaign(
+        title="made",
+        file=Path("campaign.toml"),
+        mass=1.0,
+        mass_free=False,
+        input=InputChannel("force", "f", "N"),
+        output=OutputChannel("displacement", "x", "m"),
+        filter=low,
+        rate=RATE,
+        stiffness=(),
+        damping=(),
+        elements=(),
+        records=(record,),
+    )
+    noise = estimate_noise(campaign)
+    assert noise.method == "high_frequency"
+    return noise.sigma
+
+
+def signal_of(kind: str, seed: int, size: int) -> Float[np.ndarray, " time"]:
+    time = np.arange(size) / RATE
+    if kind == "silent":
+        return np.zeros(size)
+    if kind == "swept":
+        return 5.0 * scipy.signal.chirp(time, 3.0, time[-1], 8.0)
+    if kind == "decay":
+        return 2.0 * np.exp(-time / 2.0) * np.cos(2 * np.pi * 5.0 * time)
+    # broadband: the response fills the band up to the named share of half the rate
+    sections = scipy.signal.butter(8, float(kind) * 0.5 * RATE, fs=RATE, output="sos")
+    return scipy.signal.sosfilt(sections, np.random.default_rng(1000 + seed).normal(size=size))
+
+
+@pytest.mark.parametrize("size", [2500, 10000, 40000])
+@pytest.mark.parametrize("kind", ["silent", "swept", "decay", "0.1", "0.3"])
+def test_the_floor_is_unbiased(kind: str, size: int) -> None:
+    found = np.array(
+        [
+            found_in(signal_of(kind, seed, size) + SIGMA * np.random.default_rng(seed).normal(size=size))
+            for seed in range(SEEDS)
+        ]
+    )
+    error = np.std(found) / np.sqrt(SEEDS)
+    assert abs(np.mean(found) - SIGMA) < 0.01 * SIGMA + 2.0 * error
+    if size > 2500:
+        assert np.mean(found) == pytest.approx(SIGMA, rel=0.012)
+
+
+def test_a_response_that_fills_the_lower_parts_is_no_noise() -> None:
+    found = [
+        found_in(signal_of("0.5", seed, 20000) + SIGMA * np.random.default_rng(seed).normal(size=20000))
+        for seed in range(SEEDS)
+    ]
+    # the skirt of the response is really there: up to three standard errors of a part, 2 % here, may pass
+    assert 0.995 * SIGMA < np.mean(found) < 1.035 * SIGMA
+
+
+def test_noise_that_a_bench_filtered_is_what_the_filter_left() -> None:
+    sections = scipy.signal.butter(LOW.order, LOW.cutoff_hz, fs=RATE, output="sos")
+    made, found = [], []
+    for seed in range(SEEDS):
+        noise = scipy.signal.sosfilt(sections, SIGMA * np.random.default_rng(seed).normal(size=20000))
+        made.append(np.std(noise))
+        found.append(found_in(signal_of("swept", seed, 20000) + noise, LOW))
+    assert np.mean(found) == pytest.approx(np.mean(made), rel=0.015)
+
+
+@pytest.mark.parametrize("applied", [True, False], ids=["bench", "reader"])
+def test_power_gain_is_that_of_the_filter(applied: bool) -> None:
+    frequency = np.linspace(0.0, 0.49 * RATE, 60)
+    sections = scipy.signal.butter(LOW.order, LOW.cutoff_hz, fs=RATE, output="sos")
+    gain = np.abs(scipy.signal.sosfreqz(sections, frequency, fs=RATE)[1]) ** (2 if applied else 4)
+    band = NoiseBand(RATE, Filter("butterworth", LOW.order, LOW.cutoff_hz, applied))
+    np.testing.assert_allclose(band.power_gain(frequency), gain, atol=1e-12)
+    noise = np.random.default_rng(1).normal(size=400_000)
+    left = (scipy.signal.sosfilt if applied else scipy.signal.sosfiltfilt)(sections, noise)
+    assert band.share == pytest.approx(np.mean(left**2) / np.mean(noise**2), rel=0.01)
