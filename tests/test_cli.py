@@ -107,6 +107,60 @@ def test_fit_prints_its_report_and_writes_it(tmp_path, capsys):
     assert float(model["linear_stiffness.coefficient"]) == pytest.approx(1.12e6, rel=0.02)
 
 
+def failing_campaign(folder):
+    """Two records of the demo with a force of the wrong sign: no spring and no damper fits them."""
+    campaign = small_campaign(folder)
+    file = campaign / "campaign.toml"
+    text = file.read_text(encoding="utf-8").replace('unit = "N"', 'unit = "N"\ngain = -40.0', 1)
+    file.write_text(text.replace("[output]", "[output]\nnoise = 1e-9", 1), encoding="utf-8")
+    return campaign
+
+
+@pytest.mark.parametrize(("command", "file"), [("fit", "fit.txt"), ("close-loop", "report.html")])
+def test_a_fit_that_failed_ends_with_code_one_and_its_report_says_so(
+    command, file, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("isojax.identification._descent.MOST_REFUSALS", 1)
+    monkeypatch.setattr("isojax.identification._descent.STALLED", 0.0)
+    campaign = failing_campaign(tmp_path / "campaign")
+    assert main([command, str(campaign), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    assert capsys.readouterr().err == ""
+    report = (tmp_path / "out" / file).read_text(encoding="utf-8")
+    assert "The search failed." in report
+    assert "is not good, but" not in report
+    isojax.load_model(tmp_path / "out" / "model.json")
+    if command == "close-loop":
+        assert "The fit failed" in report
+        result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+        assert result["verdict"] == "unexplained"
+        assert result["bounds"] == {}
+        assert set(result["after"]["error"]["fit"].values()) == {None}
+        assert result["after"]["parameters"]["linear_stiffness.coefficient"]["value"] is None
+        assert result["after"]["parameters"]["mass"]["value"] == 800.0
+
+
+def test_help_says_what_the_exit_codes_mean(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "0 done; 1 the fit did not converge" in shown
+    assert "2 an argument or a file is bad" in shown
+
+
+def test_an_unknown_effect_is_refused_before_a_data_file_is_opened(tmp_path, capsys):
+    campaign = small_campaign(tmp_path / "campaign")
+    for data in campaign.glob("*.npz"):
+        data.unlink()
+    file = campaign / "campaign.toml"
+    file.write_text(file.read_text(encoding="utf-8").replace('"cubic"', '"kubic"', 1), encoding="utf-8")
+    assert main(["fit", str(campaign), "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert "model.stiffness" in error
+    assert "kubic" in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_demo_finds_the_friction_that_was_put_in(tmp_path, capsys):
     assert main(["demo", "--out", str(tmp_path)]) == 0

@@ -43,6 +43,7 @@ from .identification import classical_guess as classical_guess
 from .identification import diagnose as diagnose
 from .identification import extend as extend
 from .identification import fit as fit
+from .identification import read_campaign as read_campaign
 from .identification import residual as residual
 from .models import Integrator as Integrator
 from .models import Isolator as Isolator
@@ -54,7 +55,6 @@ from .records import Campaign as Campaign
 from .records import Record as Record
 from .records import data_health as data_health
 from .records import estimate_noise as estimate_noise
-from .records import read_campaign as read_campaign
 from .reporting import ClosedLoop as ClosedLoop
 from .reporting import close_loop as close_loop
 from .reporting import error_table as error_table

@@ -12,13 +12,19 @@ import jax
 from rich.console import Console
 from rich.text import Text
 
+from ._results import is_successful
 from .demo import campaign_folder
-from .identification import classical_guess, fit
-from .models import save_model, write_whole
-from .records import read_campaign
-from .reporting import catalogue_table, check_folder, close_loop, loop_summary
+from .identification import Fit, classical_guess, fit, read_campaign
+from .reporting import catalogue_table, check_folder, close_loop, loop_summary, model_text, write_texts
 
 _WIDTH = 120
+
+_NOT_CONVERGED = 1
+
+_EXIT_CODES = (
+    "Exit codes: 0 done; 1 the fit did not converge, which its report says; 2 an argument or a file is bad, "
+    "and nothing is written."
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -28,7 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words after the command's name; those of the process if omitted.
 
     Returns:
-        Exit code: 0, or 2 where an argument or a file is bad.
+        Exit code: 0, 1 where the fit did not converge (its report is written all the same), or 2 where an
+        argument or a file is bad.
     """
     jax.config.update("jax_enable_x64", True)
     cache = os.environ.get("ISOJAX_CACHE")
@@ -46,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="isojax",
         description="Identify a nonlinear vibration isolator from time histories; name what its model lacks.",
-        epilog="ISOJAX_CACHE names a folder in which compiled code is kept between runs.",
+        epilog=f"{_EXIT_CODES} ISOJAX_CACHE names a folder in which compiled code is kept between runs.",
     )
     parser.add_argument("--version", action="version", version=f"isojax {version('isojax')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -100,8 +107,8 @@ def _results() -> Console:
 
 
 def _close_loop(campaign: str | Path, out: str, quiet: bool) -> int:
-    begin, folder, progress = time.perf_counter(), check_folder(out), _progress(quiet)
-    measured = read_campaign(campaign)
+    begin, folder = time.perf_counter(), check_folder(out)
+    measured, progress = read_campaign(campaign), _progress(quiet)
     progress(f"{len(measured.records)} records read")
     loop = close_loop(measured, progress=progress)
     progress("writing the report")
@@ -109,26 +116,28 @@ def _close_loop(campaign: str | Path, out: str, quiet: bool) -> int:
     console = _results()
     console.print(loop_summary(loop.loop))
     console.print(Text(f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}"))
-    return 0
+    return _exit_code(loop.after)
 
 
 def _fit(campaign: str | Path, out: str | None, quiet: bool) -> int:
-    begin, progress = time.perf_counter(), _progress(quiet)
+    begin = time.perf_counter()
     folder = None if out is None else check_folder(out)
-    measured = read_campaign(campaign)
-    progress(f"{len(measured.records)} records read")
+    measured, progress = read_campaign(campaign), _progress(quiet)
     guess = classical_guess(measured)
+    progress(f"{len(measured.records)} records read")
     for note in guess.notes:
         progress(note)
     fitted = fit(guess.model, measured, progress=progress)
     report = str(fitted)
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        save_model(fitted.model, folder / "model.json")
-        write_whole(folder / "fit.txt", report + "\n")
+        write_texts(folder, {"model.json": model_text(fitted.model), "fit.txt": report + "\n"})
     print(report)
     print(f"{time.perf_counter() - begin:.1f} s with compiling")
-    return 0
+    return _exit_code(fitted)
+
+
+def _exit_code(fitted: Fit) -> int:
+    return 0 if is_successful(fitted.result) else _NOT_CONVERGED
 
 
 def _effects() -> int:

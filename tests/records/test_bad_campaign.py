@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from isojax.records import read_campaign
@@ -140,6 +141,23 @@ MISTAKES = {
         RECORD + '\nschedule = "no.csv"',
         r"no\.csv does not exist; it is the schedule",
     ),
+    "an unknown kind": (
+        RECORD,
+        RECORD + '\nkind = "free decay"',
+        r"number 1 kind = 'free decay' must be one of .*; did you mean `free_decay`",
+    ),
+    "a kind against a period": (
+        RECORD,
+        RECORD + '\nperiod = 100\nkind = "swept"',
+        r'number 1 has kind = "swept" and a period; .* is of kind "periodic"',
+    ),
+    "a kind that needs a period": (
+        RECORD,
+        RECORD + '\nkind = "periodic"',
+        r'kind = "periodic", but lacks the field `period`',
+    ),
+    "a folder for a file": ('"run.csv"', '"."', r"file = '\.' must be the name of a file"),
+    "a folder that is there": ('"run.csv"', '"inner"', r"inner is a folder; a record must be one file"),
     "text for a level": (RECORD, RECORD + '\nlevel = "60 N"', r"level = '60 N' must be a finite number"),
 }
 
@@ -148,6 +166,7 @@ MISTAKES = {
 def test_a_mistake_in_the_toml_is_named(mistake: str, tiny: Callable[..., Path]) -> None:
     pattern, replacement, message = MISTAKES[mistake]
     folder = tiny((pattern, replacement))
+    (folder / "inner").mkdir()
     with pytest.raises(ValueError, match=message) as caught:
         read_campaign(folder)
     assert str(folder) in str(caught.value)
@@ -209,3 +228,11 @@ def test_settle_samples_of_a_held_out_record_may_be_fitted_ones(tiny: Callable[.
     campaign = read_campaign(tiny((RECORD, more)))
     assert [record.name for record in campaign.records] == ["run[0:1000]", "run[950:]"]
     assert [record.role for record in campaign.records] == ["fit", "holdout"]
+
+
+@pytest.mark.parametrize("kind", ["swept", "free_decay", "impulse", "broadband"])
+def test_a_declared_kind_goes_before_the_detected_one(kind: str, tiny: Callable[..., Path]) -> None:
+    record = read_campaign(tiny((RECORD, f'{RECORD}\nkind = "{kind}"'))).records[0]
+    assert record.kind == kind
+    assert np.any(record.raw_input)
+    assert np.any(record.input) == (kind != "free_decay")

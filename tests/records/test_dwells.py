@@ -106,7 +106,7 @@ KINDS: dict[str, tuple[str, Callable[[int], np.ndarray]]] = {
         "broadband",
         lambda size: np.convolve(np.random.default_rng(1).normal(size=size), np.hanning(60), mode="same"),
     ),
-    "hammer": ("free_decay", impulse),
+    "hammer": ("impulse", impulse),
     "one sine": ("stepped_sine", lambda size: np.sin(2 * np.pi * 5.0 * np.arange(size) / RATE)),
 }
 
@@ -148,3 +148,26 @@ def test_a_schedule_is_cut_to_the_samples_of_its_record(shared_data: Path, tmp_p
         (5762, 8000, 4.4),
     ]
     assert dwells[0].cycles == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("order", [0, 2])
+def test_a_small_release_under_a_noisy_force_channel_is_a_free_decay(order: int) -> None:
+    """The noise of the channel is a twentieth of the inertia; a drive in the band of the motion is none."""
+    time = np.arange(5000) / RATE
+    pole = complex(-1.5, 2.0 * np.pi * 6.0)
+    response = (1e-4 * pole**order * np.exp(pole * time)).real
+    inertia = 800.0 * abs(pole) ** (2 - order)
+    random = np.random.default_rng(3)
+    noise = 0.05 * inertia * np.std(response) * random.normal(size=time.size)
+    assert detect_kind(noise, response, RATE, inertia)[1] == "free_decay"
+    heard = np.convolve(random.normal(size=time.size), np.hanning(80), mode="same")
+    heard *= np.std(noise) / np.std(heard)
+    assert detect_kind(heard, response, RATE, inertia)[1] == "broadband"
+
+
+def test_a_light_blow_in_noise_is_an_impulse_and_noise_alone_is_none() -> None:
+    drive = impulse(20000)
+    noise = 0.02 * np.max(drive) * np.random.default_rng(4).normal(size=drive.size)
+    response = oscillator(drive)
+    assert detect_kind(drive + noise, response, RATE, inertia=39.5)[1] == "impulse"
+    assert detect_kind(noise, response, RATE)[1] == "free_decay"

@@ -23,7 +23,7 @@ class InputOffset(AbstractElement):
     strength: ClassVar[str] = "offset"
     signed: ClassVar[bool] = True
 
-    offset: Scalar = parameter(symbol="F0", unit="N")
+    offset: Scalar = parameter(symbol="F0", unit="SI unit of the input")
 
     @classmethod
     def guess(cls, scales: Scales) -> "InputOffset":

@@ -18,6 +18,7 @@ from ._findings import Finding as Finding
 from ._findings import Loop as Loop
 from ._findings import Residual as Residual
 from ._findings import Verdict as Verdict
+from ._fit import DEFAULT_SOLVER as DEFAULT_SOLVER
 from ._fit import Fit as Fit
 from ._fit import Statistics as Statistics
 from ._fit import fit as fit
@@ -30,5 +31,8 @@ from ._harmonic_balance import normalised_law as normalised_law
 from ._linear_response import linear_response as linear_response
 from ._paper_table import PaperTable as PaperTable
 from ._paper_table import paper_table as paper_table
+from ._read_campaign import read_campaign as read_campaign
 from ._residual import residual as residual
 from ._scales import scales as scales
+from ._units import OUTPUT_UNITS as OUTPUT_UNITS
+from ._units import plain_unit as plain_unit

@@ -1,6 +1,8 @@
 """The model that a campaign declares, before any number is known."""
 
 import difflib
+from collections.abc import Sequence
+from pathlib import Path
 
 from ..elements import CATALOGUE, AbstractElement
 from ..models import Isolator
@@ -8,7 +10,7 @@ from ..records import Campaign
 from ._scales import scales
 
 
-def _element_class(campaign: Campaign, field: str, found: str, suffix: str) -> type[AbstractElement]:
+def _element_class(file: Path, field: str, found: str, suffix: str) -> type[AbstractElement]:
     """Give the catalogue class of a declared name, short (`cubic`) or in full (`cubic_stiffness`)."""
     for name in (found + suffix, found):
         if name in CATALOGUE:
@@ -16,8 +18,35 @@ def _element_class(campaign: Campaign, field: str, found: str, suffix: str) -> t
     short = [name.removesuffix(suffix) for name in CATALOGUE if suffix and name.endswith(suffix)]
     near = difflib.get_close_matches(found, [*short, *CATALOGUE], n=1, cutoff=0.0)[0]
     raise ValueError(
-        f"Field `{field}` of {campaign.file} must name effects of the catalogue, but has {found!r}; "
-        f"nearest: {near!r}."
+        f"Field `{field}` of {file} must name effects of the catalogue, but has {found!r}; nearest: {near!r}."
+    )
+
+
+def catalogue_names(
+    file: Path, stiffness: Sequence[str], damping: Sequence[str], elements: Sequence[str]
+) -> tuple[str, ...]:
+    """List the catalogue names that the [model] of a campaign.toml means.
+
+    Args:
+        file: the campaign.toml.
+        stiffness: springs, short (`cubic`) or in full (`cubic_stiffness`).
+        damping: dampers, likewise.
+        elements: further effects.
+
+    Returns:
+        Their names, as written and in this order.
+
+    Raises:
+        ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
+    """
+    return tuple(
+        _element_class(file, field, found, suffix).name
+        for field, names, suffix in (
+            ("model.stiffness", stiffness, "_stiffness"),
+            ("model.damping", damping, "_damping"),
+            ("model.elements", elements, ""),
+        )
+        for found in names
     )
 
 
@@ -35,15 +64,11 @@ def declared_names(campaign: Campaign, *, extra: bool = True) -> tuple[str, ...]
     Raises:
         ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
     """
-    declared = [
-        _element_class(campaign, field, found, suffix).name
-        for field, names, suffix in (
-            ("model.stiffness", campaign.stiffness, "_stiffness"),
-            ("model.damping", campaign.damping, "_damping"),
-            ("model.elements", campaign.elements if extra else (), ""),
+    declared = list(
+        catalogue_names(
+            campaign.file, campaign.stiffness, campaign.damping, campaign.elements if extra else ()
         )
-        for found in names
-    ]
+    )
     freed = {
         "input_gain": campaign.input.gain_free,
         "input_offset": campaign.input.offset_free,

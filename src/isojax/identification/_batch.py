@@ -163,7 +163,9 @@ def prepare(
         owner[lane] = segment.record
         for state in range(2):
             starts[state, lane] = motion[state][segment.start]
-            spread[state, lane] = max(np.std(motion[state][window]), 1e-300)
+            # A motion that rings down is largest at its beginning, far above the rms of its record.
+            size = np.ptp(motion[state][window]) if record.rings_down else np.std(motion[state][window])
+            spread[state, lane] = max(size, 1e-300)
     share = lanes // threads
     batches = tuple(
         Batch(
@@ -210,6 +212,14 @@ def _memory_along(
     return jax.lax.scan(body, rest, (x[:-1], v[:-1], x[1:], v[1:], drive[:-1]))[1]
 
 
+def _rms(values: Float[np.ndarray, " time"]) -> float:
+    """Give the rms, infinite or NaN where a value is; a memory that ran away may be too large to square."""
+    largest = float(np.max(np.abs(values)))
+    if not 0.0 < largest < np.inf:
+        return largest
+    return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
+
+
 def internal_starts(
     model: Isolator, records: tuple[Record, ...], prepared: Prepared
 ) -> tuple[Float[np.ndarray, "internal lanes"], Float[np.ndarray, "internal lanes"]]:
@@ -241,5 +251,5 @@ def internal_starts(
             first = min(segment.start, length - 2)
             starts[state, lane] = history[first, segment.record]
             piece = history[first : segment.stop, segment.record]
-            spread[state, lane] = max(np.sqrt(np.mean(piece**2)), 1e-300)
+            spread[state, lane] = max(_rms(piece), 1e-300)
     return starts, spread

@@ -1,7 +1,7 @@
 """Nuisances at given coefficients, and the state in which a record begins."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from .._parameters import list_parameters
 from ..models import Isolator
@@ -13,9 +13,20 @@ from ._segments import Segment
 ROUNDS = 3
 """Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
 
+RELEASED_ROUNDS = 12
+"""The same where a record begins with a release: its first states are poorly known, its motion is large."""
+
+HALVINGS = 5
+"""How often the step of a record is halved before it is given up."""
+
+HELD = 1e-9
+"""Spread of the linear stiffness between records that leaves it where it is."""
 
 SETTLED = 1e-2
 """Change of chi2, per max(chi2/dof, 1), below which the nuisances stand."""
+
+SMALL_STEP = 1e-4
+"""Step of a state, over its range, that no longer counts."""
 
 
 def best_nuisances(bench: Bench, model: Isolator, spread: float, known: Nuisances | None = None) -> Point:
@@ -34,14 +45,41 @@ def best_nuisances(bench: Bench, model: Isolator, spread: float, known: Nuisance
     carried = len(model.elements)
     point = bench.evaluate(model, nothing, bench.settle(known, model, carried, spread))
     owner = bench.prepared(model, carried).record
-    for _ in range(ROUNDS):
+    released = any(record.kind == "free_decay" for record in bench.problem.records)
+    for _ in range(RELEASED_ROUNDS if released else ROUNDS):
         if not point.is_finite:
             break
         moved = step_nuisances(point.reduced, owner, point.nuisances, np.zeros(0))
         before, point = point, bench.evaluate(model, nothing, moved)
-        if abs(before.chi2 - point.chi2) < SETTLED * max(1.0, point.chi2 / max(1.0, point.free_samples)):
+        if released:
+            point = _shortened(bench, before, point, owner)
+        # chi2 is that at the end of the step, as if the response were linear; of a release also the step must
+        # be small, since its motion is not.
+        is_small = not released or np.max(np.abs(moved.states - before.nuisances.states)) < SMALL_STEP
+        if is_small and abs(before.chi2 - point.chi2) < SETTLED * max(
+            1.0, point.chi2 / max(1.0, point.free_samples)
+        ):
             break
     return point
+
+
+def _shortened(bench: Bench, before: Point, after: Point, owner: Int[np.ndarray, " lanes"]) -> Point:
+    """Halve the step of each record whose error it raised; where that does not help, stay."""
+    nothing = np.zeros((len(list_parameters(before.model)), 0))
+    known, share = before.reduced.by_record[:, -1, -1], np.ones(before.samples.size)
+    old, new, found = before.nuisances, after.nuisances, after
+    for halving in range(HALVINGS + 1):
+        worse = ~(found.reduced.by_record[:, -1, -1] <= known * (1.0 + 1e-9))
+        if not np.any(worse):
+            break
+        share = np.where(worse, 0.5 * share if halving < HALVINGS else 0.0, share)
+        moved = share[owner][:, None]
+        between = old._replace(
+            states=old.states + np.where(moved > 0.0, moved * (new.states - old.states), 0.0),
+            stiffness=old.stiffness + np.where(share > 0.0, share * (new.stiffness - old.stiffness), 0.0),
+        )
+        found = bench.evaluate(before.model, nothing, between)
+    return found
 
 
 def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
@@ -74,6 +112,6 @@ def beginning_states(problem: Problem, model: Isolator) -> Float[np.ndarray, "st
         States, one column a record.
     """
     bench = Bench(problem._replace(segments=head_segments(problem.records), heads=()), at_rest=True)
-    point = best_nuisances(bench, model, 1e-9)
+    point = best_nuisances(bench, model, HELD)
     starts, scales = bench.starts(model, bench.prepared(model, len(model.elements)))
     return (starts + scales * point.nuisances.states.T)[:, : len(problem.records)]

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from .._results import RESULTS, is_successful
 from ..records import Campaign
 from ._classical_guess import classical_guess
 from ._diagnose import MOST_OF_IT, diagnose, is_good
@@ -49,13 +50,18 @@ def close_loop(
 
     Args:
         campaign: the measurements.
-        max_iterations: effects that may be added at most.
+        max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         solver: an optimistix least-squares solver.
         progress: told a line a step.
 
     Returns:
         The loop: fits before and after, the findings, and the verdict over all.
+
+    Raises:
+        ValueError: if `max_iterations` is negative, or as `classical_guess` and `fit` raise it.
     """
+    if max_iterations < 0:
+        raise ValueError(f"Argument `max_iterations` must be 0 or more, but is {max_iterations}.")
     begin = time.perf_counter()
     progress("classical guess")
     guess = classical_guess(campaign)
@@ -65,6 +71,11 @@ def close_loop(
     extensions, verdict = _grow(before, first, (), max_iterations, solver, progress)
     extensions, verdict = _revise(before, first, extensions, verdict, max_iterations, solver, progress)
     current = extensions[-1].after if extensions else before
+    if not is_successful(current.result):
+        verdict = _without_evidence(current)
+    elif verdict.refit is not None and not extensions:
+        reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
+        verdict = verdict._replace(verdict="unexplained", reason=reason)
     # Asked for here, so that the time of the loop counts it.
     for when, held in (("before", before), ("after", current)):
         progress(f"free-run error {when}: {held.nrmse:.4g} of the measured rms")
@@ -79,6 +90,12 @@ def close_loop(
         verdict.bounds,
         time.perf_counter() - begin,
     )
+
+
+def _without_evidence(failed: Fit) -> Verdict:
+    """Say that a fit that failed tells nothing: no ranking and no bound may come of it."""
+    reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[failed.result]}"
+    return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
 
 
 def _grow(
@@ -146,7 +163,7 @@ def _overall(final: Fit, first_excess: float, any_found: bool, last: Verdict) ->
     """Give the verdict over all iterations."""
     found = final.estimate
     good = is_good(found.chi2 / found.dof, found.excess, first_excess)
-    if not any_found:
+    if not any_found or not is_successful(final.result):
         return last.verdict
     if good:
         return "found"

@@ -60,3 +60,15 @@ def logarithmic_decrement(
     damped = 1.0 / float(np.mean(1.0 / frequency))
     ratio = delta / np.hypot(2 * np.pi, delta)
     return Decrement(amplitude, frequency, damped / float(np.sqrt(1.0 - ratio**2)), float(ratio))
+
+
+def about_rest(output: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+    """Give a free decay about the place where it ends: the mean of its last fifth.
+
+    Args:
+        output: the decay.
+
+    Returns:
+        The decay less that mean.
+    """
+    return output - np.mean(output[-max(1, output.size // 5) :])

@@ -62,8 +62,9 @@ def _compress(matrix: Float[np.ndarray, "column column"]) -> tuple[np.ndarray, n
     # A negative sum of squares is what is left of huge numbers that cancel, see `Point.is_finite`.
     if not np.all(np.isfinite(matrix)) or matrix[-1, -1] < 0.0:
         return np.full(count + 1, RUNAWAY), np.zeros((count + 1, count))
-    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix / np.outer(size, size)
+    # Beside a simulation that almost ran away a column may cancel to nothing: its scale must stay a number.
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300 + 1e-60 * np.max(np.diag(matrix))))
+    scaled = matrix / size[:, None] / size[None, :]
     ridge = 1e-14
     while True:
         try:

@@ -97,7 +97,12 @@ def eliminate(
     inner = source[:, drop[:, None], drop] + np.eye(states)
     cross = source[:, drop[:, None], keep].copy()
     cross[:, :, -1] -= offset
-    states_map = np.linalg.solve(inner, cross)
+    try:
+        states_map = np.linalg.solve(inner, cross)
+        taken = states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
+    except np.linalg.LinAlgError:
+        # Only a simulation that ran away makes a state's column as large as to drown its own prior.
+        states_map, taken = np.full_like(cross, np.nan), np.full(used, np.nan)
     left = matrices[:, keep[:, None], keep].copy()
     if heads is None:
         left[:, -1, -1] += np.sum(offset**2, axis=1)
@@ -107,7 +112,7 @@ def eliminate(
         curved = np.swapaxes(states_map, 1, 2) @ matrices[:, drop[:, None], drop] @ states_map
         left += curved - mixed - np.swapaxes(mixed, 1, 2)
     eliminated = np.zeros(records)
-    np.add.at(eliminated, owner[:used], states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2))
+    np.add.at(eliminated, owner[:used], taken)
 
     per_record = np.zeros((records, shared + 1, shared + 1))
     np.add.at(per_record, owner[:used], left)

@@ -4,14 +4,19 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
+from jaxtyping import Array
 
-from .._parameters import Parameter, list_parameters
+from .._parameters import Parameter, list_parameters, replace_parameters
 from .._results import RESULTS, is_successful
 from ..elements import Scales
+from ..excitations import Hold
 from ..models import Isolator
 from ..records import Record
+from ._beginning import HELD, best_nuisances
 from ._covariance import Uncertainty, uncertainty, unknown
 from ._descent import descend
 from ._elimination import Nuisances
@@ -161,6 +166,24 @@ def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: floa
     return 1e-3
 
 
+def _check_delay(model: Isolator, places: tuple[int, ...], hold: Hold) -> None:
+    """Refuse to fit a delay of a drive that jumps: the response has no derivative with respect to it."""
+    if hold != "zero_order":
+        return
+    listed = list_parameters(model)
+
+    def shift(values: list[Array]) -> Array:
+        return jnp.asarray(replace_parameters(model, values).shift(), dtype=float)
+
+    slopes = jax.grad(shift)([jnp.asarray(entry.value, dtype=float) for entry in listed])
+    for place in places:
+        if float(slopes[place]) != 0.0:
+            raise ValueError(
+                f"{listed[place].name} cannot be fitted where the drive is held from sample to "
+                "sample: what jumps has no derivative in time. Fix it, or declare another [input] hold."
+            )
+
+
 def estimate(
     bench: Bench,
     model: Isolator,
@@ -189,9 +212,15 @@ def estimate(
     Returns:
         The estimate.
     """
+    _check_delay(model, places, bench.problem.hold)
     carried = len(model.elements)
     known = nuisances is not None
     start = bench.settle(nuisances, model, carried, FIRST_STIFFNESS_SPREAD)
+    if not known and any(record.kind == "free_decay" for record in bench.problem.records):
+        # A release is largest where its integral is least known: the states are sought before a coefficient.
+        settled = best_nuisances(bench, model, HELD)
+        if settled.is_finite:
+            start = settled.nuisances._replace(stiffness_spread=FIRST_STIFFNESS_SPREAD)
     sizes = magnitudes(model, places, scales)
     # The scatter of the stiffness is found from a rough solution; the search goes on from there.
     rough = max(tolerance, 1.0) if has_stiffness_scale(model) and not known else tolerance

@@ -8,8 +8,8 @@ from .._parameters import Parameter, list_parameters
 from .._results import RESULTS, is_successful
 from ._errors import Errors
 from ._fit import Fit
+from ._units import OUTPUT_UNITS, plain_unit
 
-_UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}
 _ROLES = {"fit": "fitted", "holdout": "held out"}
 _STRONG = 0.9
 """Correlations of this magnitude and more are listed."""
@@ -56,7 +56,7 @@ def _model(fit: Fit) -> list[str]:
 
 
 def _statistics(fit: Fit) -> list[str]:
-    stats, unit = fit.stats, _UNITS[fit.campaign.output.quantity]
+    stats, unit = fit.stats, OUTPUT_UNITS[fit.campaign.output.quantity]
     integrator = fit.estimate.bench.problem.integrator
     rows = [
         ("samples", f"{stats.samples}"),
@@ -81,7 +81,7 @@ def _statistics(fit: Fit) -> list[str]:
 
 
 def _errors(fit: Fit) -> list[str]:
-    unit = _UNITS[fit.campaign.output.quantity]
+    unit = OUTPUT_UNITS[fit.campaign.output.quantity]
     lines = [f"{'records':<10}{'free run RMSE':>20}{'NRMSE':>10}{'restarted NRMSE':>18}{'chi2/dof':>11}"]
     return lines + [
         _error_line(_ROLES[role], errors, unit) for role, errors in fit.errors.items() if errors is not None
@@ -100,20 +100,20 @@ def _coefficients(fit: Fit) -> list[str]:
     listed = list_parameters(fit.model)
     width = max(len(entry.name) for entry in listed) + 1
     return [
-        f"{entry.name + ':':<{width}} {_value(entry, errors.get(entry.name), start.get(entry.name))}"
+        f"{entry.name + ':':<{width}} {_value(entry, errors.get(entry.name), start.get(entry.name), fit)}"
         for entry in listed
     ]
 
 
-def _value(entry: Parameter, error: float | None, start: float | None) -> str:
-    value = float(entry.value)
+def _value(entry: Parameter, error: float | None, start: float | None, fit: Fit) -> str:
+    value, unit = float(entry.value), plain_unit(entry.spec.unit, fit.campaign)
     if error is None:
-        return f"{value:<12.6g} {entry.spec.unit} (fixed)"
+        return f"{value:<12.6g} {unit} (fixed)"
     begun = "(added)" if start is None else f"(init = {start:.6g})"
     if not math.isfinite(error):
-        return f"{value:<12.6g} +/- unknown {entry.spec.unit} {begun}"
+        return f"{value:<12.6g} +/- unknown {unit} {begun}"
     share = f" ({100 * error / abs(value):.2g} %)" if value != 0.0 else ""
-    return f"{value:<12.6g} +/- {error:.3g} {entry.spec.unit}{share} {begun}"
+    return f"{value:<12.6g} +/- {error:.3g} {unit}{share} {begun}"
 
 
 def _correlations(fit: Fit) -> list[str]:
@@ -148,7 +148,8 @@ def warnings_of(fit: Fit) -> list[str]:
         bound = _touched_bound(entry, errors[entry.name])
         if bound is not None:
             lines.append(
-                f"{entry.name} is at its bound of {bound:g} {entry.spec.unit}; its error bar means little."
+                f"{entry.name} is at its bound of {bound:g} {plain_unit(entry.spec.unit, fit.campaign)}; "
+                "its error bar means little."
             )
         begun = start.get(entry.name, math.nan)
         if abs(float(entry.value) - begun) <= _UNMOVED * abs(begun):

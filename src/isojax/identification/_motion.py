@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from ..records import Band, Campaign, Record, excited_band, measured_state, power_spectrum
+from ..records import Band, Campaign, Record, excited_band, measured_state
 
 _NEARER = 1.5
 """Lowest frequency to integrate, over half the lowest excited one: the nearer, the shorter the stray ends."""
@@ -55,14 +55,6 @@ def is_absolute(campaign: Campaign) -> bool:
     return campaign.input.quantity == "base_acceleration" and campaign.output.quantity == "acceleration"
 
 
-def _ringing(record: Record) -> float:
-    """Give a third of the frequency at which a free decay rings [Hz]; zero for any other record."""
-    if record.kind != "free_decay":
-        return 0.0
-    frequency, power = power_spectrum(record.output, record.rate)
-    return float(frequency[np.argmax(power)]) / 3.0
-
-
 def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> Motion:
     """Estimate the motion of the isolator's coordinate from what was measured.
 
@@ -82,7 +74,7 @@ def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> 
         )
     band, margin = excited_band(own), 0
     if campaign.output.quantity != "displacement":
-        lowest = min(_NEARER * max(band.lowest, _ringing(own)), 0.5 * band.highest)
+        lowest = min(_NEARER * band.lowest, 0.5 * band.highest)
         band = Band(lowest, band.highest)
         margin = round(min(_PERIODS * record.rate / lowest, _SHARE * record.time.size))
     x, v, a = measured_state(own, campaign.output.quantity, band.lowest, band.highest)

@@ -18,6 +18,16 @@ def _amplitude(signals: list[Float[np.ndarray, " _"]]) -> float:
     return max(float(np.sqrt(2.0) * np.std(signal)) for signal in signals)
 
 
+def _largest(record: Record, motion: Motion, signal: Float[np.ndarray, " time"]) -> float:
+    """Give the amplitude of an estimated signal: of the sine as strong as it where its integrals are good.
+
+    A motion that rings down is largest where they are poorest: its peak there is better than no word of it.
+    """
+    if record.rings_down:
+        return float(np.max(np.abs(signal)))
+    return _amplitude([signal[motion.trusted]])
+
+
 def excited_centre(record: Record, motion: Motion) -> float:
     """Give the centre of the excited band.
 
@@ -31,7 +41,7 @@ def excited_centre(record: Record, motion: Motion) -> float:
     """
     if record.dwells:
         return 2 * np.pi * float(np.mean([dwell.frequency for dwell in record.dwells]))
-    driven = np.std(record.input) > 0 and record.kind != "free_decay"
+    driven = np.std(record.input) > 0 and not record.rings_down
     signal = record.input if driven else motion.displacement
     power = np.abs(np.fft.rfft((signal - np.mean(signal)) * np.hanning(signal.size))) ** 2
     omega = 2 * np.pi * np.fft.rfftfreq(signal.size, 1.0 / record.rate)
@@ -76,7 +86,7 @@ def scales(campaign: Campaign) -> Scales:
     if reading == 0:
         raise ValueError(f"The output of {campaign.file} must move, but is constant in every record to fit.")
     centres = [excited_centre(record, motion) for record, motion in zip(records, motions, strict=True)]
-    pairs = zip(records, motions, centres, strict=True)
+    pairs = list(zip(records, motions, strict=True))
     acceleration = _amplitude([motion.acceleration for motion in motions])
     force = _amplitude([motion.drive for motion in motions])
     if campaign.input.quantity == "base_acceleration":
@@ -85,11 +95,11 @@ def scales(campaign: Campaign) -> Scales:
         mass=campaign.mass,
         # A free decay has no drive: inertia is then the force that counts.
         force=force if force > 0 else campaign.mass * acceleration,
-        displacement=_amplitude([motion.displacement[motion.trusted] for motion in motions]),
-        velocity=_amplitude([motion.velocity[motion.trusted] for motion in motions]),
+        displacement=max(_largest(record, motion, motion.displacement) for record, motion in pairs),
+        velocity=max(_largest(record, motion, motion.velocity) for record, motion in pairs),
         acceleration=acceleration,
         angular_frequency=float(np.mean(centres)),
         sample_time=1.0 / campaign.rate,
-        slowest_velocity=min(_slowest(*pair) for pair in pairs),
+        slowest_velocity=min(_slowest(*pair, centre) for pair, centre in zip(pairs, centres, strict=True)),
         reading=reading,
     )

@@ -116,14 +116,17 @@ def score_test(
     sizes += [1e-3 * probe.typical_strength(scales) for probe in probes]
     point = fitted.bench.evaluate(model, one_hot(model, places, sizes), fitted.point.nuisances, carried)
     count = len(fitted.places)
-    by_record = point.reduced.by_record
+    by_record, raw_square = point.reduced.by_record.copy(), point.reduced.raw.copy()
+    # A probe whose memory ran away along the motion has no column: it is as good as hidden.
+    lost = np.flatnonzero(~np.isfinite(np.diagonal(by_record, axis1=1, axis2=2).sum(axis=0)))
+    by_record[:, lost], by_record[:, :, lost], raw_square[lost] = 0.0, 0.0, 1.0
     matrix = by_record.sum(axis=0)
     base, cross = matrix[:count, :count], matrix[:count, count:]
     absorbed = np.linalg.pinv(base, rcond=1e-12, hermitian=True) @ cross
     information = matrix[count:-1, count:-1] - cross[:, :-1].T @ absorbed[:, :-1]
     score = matrix[count:-1, -1] - cross[:, :-1].T @ absorbed[:, -1]
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    raw = np.sqrt(np.maximum(point.reduced.raw[count:], 1e-300))
+    raw = np.sqrt(np.maximum(raw_square[count:], 1e-300))
     visibility = size / raw
     seen = visibility > SMALLEST_VISIBILITY
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)

@@ -3,12 +3,11 @@
 import dataclasses
 
 import numpy as np
-from jaxtyping import Float
 
 from ..models import Isolator
 from ..records import Campaign, Record
 from ._all_dwells import dwell_motion, fit_all_dwells
-from ._decrement import Decrement, logarithmic_decrement
+from ._decrement import Decrement, about_rest, logarithmic_decrement
 from ._linear_balance import BalanceFit
 from ._linear_response import LinearResponse, linear_response
 from ._motion import measured_motion
@@ -17,6 +16,7 @@ from ._restoring_force import fit_restoring_force
 from ._sanity import sane_fit
 from ._scales import excited_centre
 from ._sensor_zero import output_mean
+from ._swings import start_from_swings
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class TimeStart:
     """What records without dwells say.
 
     Attributes:
-        fit: coefficients from the force balance in time.
+        fit: coefficients from the force balance.
         linear: best linear receptance of each driven record.
         decrements: logarithmic decrement of each free decay, by record name.
         notes: what the reader must know, a sentence each.
@@ -60,7 +60,7 @@ def start_from_dwells(
 def start_from_time(
     campaign: Campaign, base: Isolator, names: tuple[str, ...], records: tuple[Record, ...], mass_free: bool
 ) -> TimeStart:
-    """Start from the force balance in time of records without dwells.
+    """Start from records without dwells: from the force balance in time, or the swings of free decays alone.
 
     Args:
         campaign: says what the channels measure.
@@ -79,7 +79,9 @@ def start_from_time(
     offset_free = campaign.input.offset_free or campaign.output.offset_free
     highest = max(float(np.max(np.abs(motion.displacement[motion.trusted]))) for motion in motions)
     fastest = max(float(np.max(np.abs(motion.velocity[motion.trusted]))) for motion in motions)
-    fit, notes = sane_fit(
+    released = all(record.rings_down for record in records)
+    by_swings = start_from_swings(campaign, base, names, records) if released else None
+    fit, notes = by_swings or sane_fit(
         lambda chosen: fit_restoring_force(
             base, chosen, motions, centres, campaign.rate, campaign.output.quantity, offset_free, mass_free
         ),
@@ -94,13 +96,8 @@ def start_from_time(
         if record.kind != "free_decay" and np.any(motion.drive)
     )
     decrements = {
-        record.name: logarithmic_decrement(_about_rest(record.output), record.rate)
+        record.name: logarithmic_decrement(about_rest(record.output), record.rate)
         for record in records
-        if record.kind == "free_decay"
+        if record.rings_down
     }
     return TimeStart(fit, linear, decrements, notes)
-
-
-def _about_rest(output: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
-    """Give a free decay about the place where it ends: the mean of its last fifth."""
-    return output - np.mean(output[-max(1, output.size // 5) :])

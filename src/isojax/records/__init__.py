@@ -3,10 +3,13 @@
 from ._band import Band as Band
 from ._band import excited_band as excited_band
 from ._band import power_spectrum as power_spectrum
+from ._band import ringing_frequency as ringing_frequency
 from ._campaign import Campaign as Campaign
 from ._campaign import Filter as Filter
 from ._campaign import InputChannel as InputChannel
 from ._campaign import OutputChannel as OutputChannel
+from ._declaration import Declaration as Declaration
+from ._declaration import read_declaration as read_declaration
 from ._filter import zero_phase_butterworth as zero_phase_butterworth
 from ._harmonics import DwellHarmonics as DwellHarmonics
 from ._harmonics import dwell_harmonics as dwell_harmonics

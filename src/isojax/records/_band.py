@@ -22,7 +22,8 @@ class Band:
     """Where a record's signal is.
 
     Attributes:
-        lowest: Half of the lowest excited frequency [Hz], at least two per record.
+        lowest: Half of the lowest excited frequency [Hz], at least two per record; of a motion that rings
+            down a third of the frequency at which it rings, since a release or a blow excites every one.
         highest: Frequency above which the output is noise [Hz].
     """
 
@@ -93,6 +94,12 @@ def _freedom(size: int, segment: int) -> tuple[float, float]:
     return freedom, segment * float(np.sum(window**4)) / power**2
 
 
+def ringing_frequency(signal: Float[np.ndarray, " time"], rate: float) -> float:
+    """Gives the frequency of the strongest line of a signal's spectrum [Hz]."""
+    frequency, power = power_spectrum(signal, rate)
+    return float(frequency[1 + np.argmax(power[1:])])
+
+
 def excited_band(record: Record) -> Band:
     """Gives the band in which a record's signal stands above its noise.
 
@@ -116,6 +123,8 @@ def _find_band(record: Record) -> Band:
     highest = min(1.25 * float(above[-1]) if above.size else nyquist, 0.8 * nyquist)
     if record.dwells:
         lowest = 0.5 * min(dwell.frequency for dwell in record.dwells)
+    elif record.rings_down:
+        lowest = ringing_frequency(record.output, record.rate) / 3.0
     else:
         driven = record.output if not np.any(record.input) else record.input
         frequency, power = power_spectrum(driven, record.rate)

@@ -40,6 +40,8 @@ def read_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
         ValueError: If the file is missing, empty or broken, its ending unknown, a column missing or no list
             of numbers, or if the columns differ in length, rate or (by a fraction of a sample) in start.
     """
+    if file.is_dir():
+        raise ValueError(f"{file} is a folder; a record must be one file, ending in {', '.join(_READERS)}")
     if not file.is_file():
         near = nearest(file.name, [one.name for one in file.parent.glob("*")] if file.parent.is_dir() else [])
         raise ValueError(f"{file} does not exist; it is listed in the campaign{near}")

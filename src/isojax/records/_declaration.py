@@ -5,8 +5,9 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
+from ._record import Kind
 from ._words import listing, nearest
 
 
@@ -41,6 +42,14 @@ def _is_names(value: Any) -> bool:
 
 def _text(required: bool = False) -> Field:
     return Field("a text that is not empty", _is_text, required)
+
+
+def _is_file(value: Any) -> bool:
+    return _is_text(value) and Path(value).name not in ("", "..")
+
+
+def _file(required: bool = False) -> Field:
+    return Field('the name of a file, such as "run1.csv"', _is_file, required)
 
 
 def _choice(*choices: str, required: bool = False, default: str | None = None) -> Field:
@@ -107,7 +116,7 @@ _SECTIONS: Mapping[str, Mapping[str, Field]] = {
     },
 }
 _RECORD: Mapping[str, Field] = {
-    "file": _text(required=True),
+    "file": _file(required=True),
     "role": _choice("fit", "holdout", required=True),
     "level": _number(),
     "direction": _choice("forward", "backward", "none", default="none"),
@@ -116,7 +125,8 @@ _RECORD: Mapping[str, Field] = {
     "stop": _count(at_least=1),
     "period": _count(at_least=2),
     "settle": _count(default=0),
-    "schedule": _text(),
+    "schedule": _file(),
+    "kind": _choice(*get_args(Kind)),
 }
 _REQUIRED_SECTIONS = ("campaign", "input", "output")
 
@@ -243,5 +253,18 @@ def _check_together(file: Path, sections: Mapping[str, Any], records: tuple[Mapp
             f'{file}: [input] and [output] both name column = "{sections["input"]["column"]}"; '
             "they must be two different channels"
         )
+    for number, record in enumerate(records, start=1):
+        _check_kind(f"{file}: [[record]] number {number}", record)
     if not any(record["role"] == "fit" for record in records):
         raise ValueError(f'{file}: no [[record]] has role = "fit"; at least one record is needed to fit')
+
+
+def _check_kind(where: str, record: Mapping[str, Any]) -> None:
+    kind = record["kind"]
+    for field, implied in (("period", "periodic"), ("schedule", "stepped_sine")):
+        if record[field] is not None and kind not in (None, implied):
+            raise ValueError(
+                f'{where} has kind = "{kind}" and a {field}; a record with a {field} is of kind "{implied}"'
+            )
+    if kind == "periodic" and record["period"] is None:
+        raise ValueError(f'{where} has kind = "periodic", but lacks the field `period` (samples)')

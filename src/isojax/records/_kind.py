@@ -1,10 +1,29 @@
-"""What an undeclared excitation is: free decay, stepped sine, sweep, or anything else (broadband)."""
+"""What an undeclared excitation is: free decay, blow, stepped sine, sweep, or anything else (broadband)."""
 
 import numpy as np
 from jaxtyping import Float
 
+from ._band import power_spectrum, ringing_frequency
 from ._record import Dwell, Kind
 from ._segment import rising_crossings, segment_dwells
+
+_PARTS = 10
+"""Parts of a record whose sizes are compared."""
+
+_DIED_OUT = 0.7
+"""A motion whose end is above this share of its largest part has not died out."""
+
+_BRIEF = 0.05
+"""Share of a record that a blow takes at most, and share of its peak below which the drive is off."""
+
+_ABOVE_NOISE = 5.0
+"""What exceeds so many standard deviations of the noise is no noise."""
+
+_IDLE = 0.1
+"""A drive below this share of the inertia, within the band of the motion, did not make the motion ..."""
+
+_FEATURELESS = 4.0
+"""... if its power there is not above so many times that of its other frequencies either."""
 
 
 def detect_kind(
@@ -20,13 +39,16 @@ def detect_kind(
         response: Output, (time,).
         rate: Samples per second [Hz].
         inertia: Input per unit of output that inertia alone would take (the mass, where the output is an
-            acceleration), or None; it tells a small input from none.
+            acceleration), or None where it is not known; it tells a small input from none.
 
     Returns:
         Dwells and kind.
     """
-    if _is_free_decay(drive, response, inertia):
-        return (), "free_decay"
+    if _dies_out(response):
+        if _is_brief(drive):
+            return (), "impulse"
+        if _is_idle(drive, response, rate, inertia):
+            return (), "free_decay"
     crossings = rising_crossings(drive, rate)
     if crossings.size < 6:
         return (), "broadband"
@@ -63,18 +85,37 @@ def _is_monotone(periods: Float[np.ndarray, " cycle"]) -> bool:
     return abs(int(np.sum(np.sign(steps)))) > 0.7 * steps.size
 
 
-def _is_free_decay(
-    drive: Float[np.ndarray, " time"], response: Float[np.ndarray, " time"], inertia: float | None
+def _dies_out(response: Float[np.ndarray, " time"]) -> bool:
+    """Whether the motion is largest near its beginning and has fallen off by its end."""
+    rest = float(np.mean(response[-max(response.size // _PARTS, 1) :]))
+    size = np.array([np.sqrt(np.mean(part**2)) for part in np.array_split(response - rest, _PARTS)])
+    return bool(np.argmax(size) < 3 and size[-1] < _DIED_OUT * np.max(size))
+
+
+def _is_brief(drive: Float[np.ndarray, " time"]) -> bool:
+    """Whether the drive stands above its noise for a small share of the record only."""
+    centred = np.abs(drive - np.median(drive))
+    noise = 1.4826 * float(np.median(centred))
+    peak = float(np.max(centred))
+    on = centred > max(_BRIEF * peak, _ABOVE_NOISE * noise)
+    return bool(peak > 2.0 * _ABOVE_NOISE * noise and np.count_nonzero(on) < _BRIEF * drive.size)
+
+
+def _is_idle(
+    drive: Float[np.ndarray, " time"],
+    response: Float[np.ndarray, " time"],
+    rate: float,
+    inertia: float | None,
 ) -> bool:
-    parts = np.array_split(response - np.mean(response[-max(response.size // 10, 1) :]), 10)
-    size = np.array([np.sqrt(np.mean(part**2)) for part in parts])
-    if not size[-1] < 0.3 * np.max(size[:3]):
-        return False
-    centred = drive - np.median(drive)
-    peak = float(np.max(np.abs(centred)))
-    if peak == 0.0:
+    """Whether the drive knows nothing of the motion: it is zero, or noise far below the inertia."""
+    if np.ptp(drive) == 0.0:
         return True
-    brief = np.count_nonzero(np.abs(centred) > 0.05 * peak) < 0.05 * drive.size
-    first = float(np.sqrt(np.mean(parts[0] ** 2)))
-    small = inertia is not None and float(np.sqrt(np.mean(drive**2))) < 0.02 * inertia * first
-    return bool(brief or small)
+    frequency, motion = power_spectrum(response, rate)
+    noise = power_spectrum(drive, rate)[1]
+    ringing = ringing_frequency(response, rate)
+    band = (frequency >= 0.5 * ringing) & (frequency <= 2.0 * ringing)
+    if np.mean(noise[band]) > _FEATURELESS * np.median(noise[1:]):
+        return False
+    if inertia is None:
+        return True
+    return bool(np.sum(noise[band]) < _IDLE**2 * inertia**2 * np.sum(motion[band]))

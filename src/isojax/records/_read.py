@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from ._band import ringing_frequency
 from ._campaign import Campaign, Filter, InputChannel, OutputChannel
 from ._columns import read_columns
 from ._declaration import Declaration, read_declaration
@@ -14,7 +15,7 @@ from ._filter import zero_phase_butterworth
 from ._kind import detect_kind
 from ._record import Dwell, Kind, Record
 from ._schedule import read_schedule, scheduled_dwells
-from ._segment import check_dwells
+from ._segment import check_dwells, segment_dwells
 from ._time_base import find_rate
 from ._units import si_factor
 from ._words import row
@@ -135,12 +136,14 @@ def _read_record(
                 zero_phase_butterworth(one, rate, reader_filter.order, reader_filter.cutoff_hz)
                 for one in (raw_input, raw_output)
             )
-    dwells, kind = _excitation(declared, entry, rate, (start, stop, total), shown_input, shown_output)
+    dwells, kind = _excitation(where, declared, entry, rate, (start, stop, total), shown_input, shown_output)
     if kind != "free_decay" and not np.any(raw_input):
         raise ValueError(
             f"{file}: column `{drive}` is 0 throughout, and the output does not decay; expected a force "
-            "that varies"
+            'that varies, or kind = "free_decay"'
         )
+    if kind == "free_decay":
+        shown_input = np.zeros_like(shown_input)
     return Record(
         name=name,
         file=file,
@@ -209,6 +212,7 @@ def _check_not_constant(file: Path, column: str, samples: Float[np.ndarray, " ti
 
 
 def _excitation(
+    where: str,
     declared: Declaration,
     entry: Mapping[str, Any],
     rate: float,
@@ -224,14 +228,23 @@ def _excitation(
         dwells = scheduled_dwells(file, read_schedule(file), rate, *span)
         check_dwells(file, drive, rate, dwells)
         return dwells, "stepped_sine"
+    kind = entry["kind"]
+    if kind == "stepped_sine":
+        dwells = segment_dwells(drive, rate)
+        if not dwells:
+            raise ValueError(
+                f'{where} has kind = "stepped_sine", but no dwell of four like cycles is found in its input; '
+                "give its `schedule`"
+            )
+        return dwells, kind
+    if kind is not None:
+        return (), kind
     sections = declared.sections
-    if sections["output"]["quantity"] != "acceleration":
-        inertia = None
-    else:
-        inertia = (
-            1.0 if sections["input"]["quantity"] == "base_acceleration" else sections["campaign"]["mass"]
-        )
-    return detect_kind(drive, response, rate, inertia)
+    based = sections["input"]["quantity"] == "base_acceleration"
+    mass = 1.0 if based else sections["campaign"]["mass"]
+    ringing = 2.0 * np.pi * ringing_frequency(response, rate)
+    order = {"acceleration": 0, "velocity": 1, "displacement": 2}[sections["output"]["quantity"]]
+    return detect_kind(drive, response, rate, mass * ringing**order)
 
 
 def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:

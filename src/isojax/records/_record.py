@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 Direction = Literal["forward", "backward", "none"]
 Role = Literal["fit", "holdout"]
-Kind = Literal["stepped_sine", "periodic", "swept", "free_decay", "broadband"]
+Kind = Literal["stepped_sine", "periodic", "swept", "free_decay", "impulse", "broadband"]
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,10 @@ class Record:
         time: Seconds since the record's first sample.
         rate: Samples per second [Hz].
         input: Force on the mass [N] (from a reaction mass: -moving_mass * acceleration), base acceleration
-            [m/s^2], or gain * command.
+            [m/s^2], or gain * command; 0 in a free decay, where the channel shows its own noise.
         output: Acceleration [m/s^2], velocity [m/s] or displacement [m].
-        raw_input: The input before the reader's [filter]; the same array where the reader does not filter.
+        raw_input: The input before the reader's [filter], and as measured in a free decay; elsewhere the same
+            array where the reader does not filter.
         raw_output: The output before the reader's [filter].
         level: Nominal excitation level, or None.
         direction: Direction of the sweep.
@@ -69,3 +70,8 @@ class Record:
     settle: int = 0
     dwells: tuple[Dwell, ...] = ()
     kind: Kind = "broadband"
+
+    @property
+    def rings_down(self) -> bool:
+        """Whether the motion, once begun, is left to itself: after a release or a blow."""
+        return self.kind in ("free_decay", "impulse")

@@ -25,4 +25,6 @@ from ._summary import render_text as render_text
 from ._summary import verdict_summary as verdict_summary
 from ._time_history import plot_time_history as plot_time_history
 from ._write import check_folder as check_folder
+from ._write import model_text as model_text
 from ._write import write_report as write_report
+from ._write import write_texts as write_texts

@@ -3,8 +3,9 @@
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from ..identification import ClassicalGuess, Finding, Fit, Loop, silent
+from ..identification import DEFAULT_SOLVER, ClassicalGuess, Finding, Fit, Loop, silent
 from ..identification import close_loop as find_loop
 from ..records import Campaign
 from ._summary import loop_summary, render_text
@@ -73,13 +74,18 @@ class ClosedLoop:
 
 
 def close_loop(
-    campaign: Campaign, *, max_iterations: int = 3, progress: Callable[[str], None] = silent
+    campaign: Campaign,
+    *,
+    max_iterations: int = 3,
+    solver: Any = DEFAULT_SOLVER,
+    progress: Callable[[str], None] = silent,
 ) -> ClosedLoop:
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 
     Args:
         campaign: the measurements.
-        max_iterations: effects that may be added at most.
+        max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
+        solver: an optimistix least-squares solver.
         progress: told a line a step.
 
     Returns:
@@ -89,4 +95,4 @@ def close_loop(
         ValueError: if the campaign has no record to fit, or names an effect that is not in the catalogue.
         RuntimeError: if JAX is not in 64-bit mode.
     """
-    return ClosedLoop(find_loop(campaign, max_iterations=max_iterations, progress=progress))
+    return ClosedLoop(find_loop(campaign, max_iterations=max_iterations, solver=solver, progress=progress))

@@ -7,12 +7,10 @@ from typing import Any
 import jinja2
 
 from .._parameters import list_parameters
-from ..identification import Candidate, Fit, Loop
-from ..records import data_health
+from ..identification import OUTPUT_UNITS, Candidate, Fit, Loop, plain_unit
+from ..records import Campaign, data_health
 from ._pictures import draw_pictures
 from ._quantities import (
-    OUTPUT_UNITS,
-    plain_unit,
     typeset_goodness,
     typeset_number,
     typeset_p_value,
@@ -63,11 +61,11 @@ def _content(loop: Loop) -> dict[str, Any]:
                 "effect": one.effect,
                 "words": effect_words(one.effect),
                 "lines": finding_words(one),
-                "ranking": [_candidate(candidate, quantity) for candidate in one.ranking[:_MOST]],
+                "ranking": [_candidate(candidate, campaign) for candidate in one.ranking[:_MOST]],
             }
             for one in loop.findings
         ],
-        "last_ranking": [_candidate(candidate, quantity) for candidate in loop.last.ranking[:_MOST]],
+        "last_ranking": [_candidate(candidate, campaign) for candidate in loop.last.ranking[:_MOST]],
         "unit": typeset_unit(OUTPUT_UNITS[quantity]),
         "errors": error_rows(before, after),
         "declared": _elements(before),
@@ -86,7 +84,7 @@ def _content(loop: Loop) -> dict[str, Any]:
             (
                 effect,
                 effect_words(effect),
-                f"{typeset_number(upper, 3)} {typeset_unit(plain_unit(unit, quantity))}",
+                f"{typeset_number(upper, 3)} {typeset_unit(plain_unit(unit, campaign))}",
             )
             for effect, (upper, unit) in loop.bounds.items()
         ],
@@ -125,13 +123,13 @@ def _facts(loop: Loop) -> list[tuple[str, str]]:
     return facts
 
 
-def _candidate(one: Candidate, quantity: str) -> dict[str, Any]:
+def _candidate(one: Candidate, campaign: Campaign) -> dict[str, Any]:
     return {
         "effect": one.effect,
         "words": effect_words(one.effect),
         "z": typeset_number(one.z, 3),
         "p": typeset_p_value(one.p_value),
-        "strength": with_error(one.strength, one.strength_error, plain_unit(one.unit, quantity)),
+        "strength": with_error(one.strength, one.strength_error, plain_unit(one.unit, campaign)),
         "visibility": typeset_share(one.visibility),
         "chi2_per_dof": typeset_goodness(one.chi2_per_dof),
         "delta_bic": typeset_number(one.delta_bic, 3),

@@ -3,9 +3,6 @@
 import math
 import re
 
-OUTPUT_UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}
-"""SI unit of each output quantity."""
-
 INPUT_WORDS = {
     "force": ("force", "N"),
     "base_acceleration": ("base acceleration", "m/s^2"),
@@ -16,19 +13,6 @@ INPUT_WORDS = {
 
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _UNKNOWN = "–"
-
-
-def plain_unit(unit: str, quantity: str) -> str:
-    """Give the unit of a parameter, where that depends on what was measured.
-
-    Args:
-        unit: as the element declares it.
-        quantity: what the output measures.
-
-    Returns:
-        The unit.
-    """
-    return OUTPUT_UNITS[quantity] if unit == "SI unit of the output" else unit
 
 
 def typeset_unit(unit: str) -> str:

@@ -5,9 +5,10 @@ from typing import Literal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..identification import OUTPUT_UNITS
 from ..records import Campaign, Record
 from ._over_time import draw_signal, finish_time_axes, shown_samples
-from ._quantities import INPUT_WORDS, OUTPUT_UNITS
+from ._quantities import INPUT_WORDS
 from ._style import BAND, MEASURED, NEUTRAL, ROLES, axes_for, entitle
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..identification import Fit, Residual, Run
+from ..identification import OUTPUT_UNITS, Fit, Residual, Run
 from ._over_time import draw_signal, finish_time_axes, is_dense, shown_samples
-from ._quantities import OUTPUT_UNITS, typeset_unit
+from ._quantities import typeset_unit
 from ._style import BAND, ROLES, axes_for, entitle, pair
 from ._time_history import worst_window
 

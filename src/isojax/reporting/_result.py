@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 from .._parameters import list_parameters
-from ..identification import Errors, Finding, Fit, Loop
-from ._quantities import plain_unit
+from .._results import is_successful
+from ..identification import Errors, Finding, Fit, Loop, plain_unit
 
 SCHEMA = 1
 
@@ -17,7 +17,8 @@ def result_dict(loop: Loop) -> dict[str, Any]:
         loop: the closed loop.
 
     Returns:
-        Numbers, words, lists and dictionaries that JSON holds; None where a number is not finite.
+        Numbers, words, lists and dictionaries that JSON holds; None where a number is not finite, and for the
+        coefficients of a fit that failed.
     """
     return {
         "schema": SCHEMA,
@@ -27,7 +28,7 @@ def result_dict(loop: Loop) -> dict[str, Any]:
         "findings": [_finding(finding) for finding in loop.findings],
         "after": _fit(loop.after),
         "bounds": {
-            effect: {"upper": _number(upper), "unit": plain_unit(unit, loop.campaign.output.quantity)}
+            effect: {"upper": _number(upper), "unit": plain_unit(unit, loop.campaign)}
             for effect, (upper, unit) in loop.bounds.items()
         },
         "seconds": _number(loop.seconds),
@@ -39,14 +40,14 @@ def _number(value: float) -> float | None:
 
 
 def _fit(fit: Fit) -> dict[str, Any]:
-    errors = fit.standard_errors
+    errors, found = fit.standard_errors, is_successful(fit.result)
     return {
         "elements": [element.name for element in fit.model.elements],
         "parameters": {
             entry.name: {
-                "value": _number(float(entry.value)),
+                "value": _number(float(entry.value)) if found or entry.name not in errors else None,
                 "standard_error": _number(errors.get(entry.name, math.nan)),
-                "unit": plain_unit(entry.spec.unit, fit.campaign.output.quantity),
+                "unit": plain_unit(entry.spec.unit, fit.campaign),
             }
             for entry in list_parameters(fit.model)
         },

@@ -5,11 +5,9 @@ import math
 from .._parameters import Parameter, list_parameters
 from .._results import RESULTS, is_successful
 from ..elements import CATALOGUE
-from ..identification import Finding, Fit, Loop
+from ..identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
 from ..records import DataHealth
 from ._quantities import (
-    OUTPUT_UNITS,
-    plain_unit,
     typeset_goodness,
     typeset_number,
     typeset_p_value,
@@ -57,7 +55,7 @@ def strength_words(fit: Fit, effect: str) -> str:
         Such as "Fc = 3.983 ± 0.051 N".
     """
     entry, error = own_strength(fit, effect)
-    unit = plain_unit(entry.spec.unit, fit.campaign.output.quantity)
+    unit = plain_unit(entry.spec.unit, fit.campaign)
     return f"{entry.spec.symbol} = {typeset_with_error(float(entry.value), error, unit)}"
 
 
@@ -101,6 +99,12 @@ def headline(loop: Loop) -> str:
         return f"{_capital(effects)}, {verb} missing; {error}."
     if loop.verdict == "partly_explained" and found:
         return f"{_capital(effects)}, {verb} missing, but something else is too; {error} (noise alone: 1)."
+    pending = loop.last.finding
+    if pending is not None and not found:
+        return (
+            f"Something is missing, and {effect_words(pending.effect)} explains it best, but no effect "
+            f"might be added; {error} (noise alone: 1)."
+        )
     known = f" even with {effects}" if found else ""
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
 
@@ -198,7 +202,8 @@ def caveats(loop: Loop) -> tuple[str, ...]:
     held = {entry.name for entry in list_parameters(loop.before.model)}
     for entry in list_parameters(after.model):
         if not entry.spec.fitted and entry.name not in held:
-            value = f"{typeset_number(float(entry.value), 3)} {typeset_unit(entry.spec.unit)}"
+            unit = typeset_unit(plain_unit(entry.spec.unit, after.campaign))
+            value = f"{typeset_number(float(entry.value), 3)} {unit}"
             lines.append(f"{entry.name} = {value} is declared, not fitted.")
     jumps = after.errors["fit"]
     if jumps is not None and jumps.nrmse > 2.0 * jumps.nrmse_segments:

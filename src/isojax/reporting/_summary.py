@@ -11,10 +11,8 @@ from rich.text import Text
 
 from .._parameters import list_parameters, own_parameters
 from ..elements import CATALOGUE
-from ..identification import Candidate, Fit, Loop, Verdict
+from ..identification import OUTPUT_UNITS, Candidate, Fit, Loop, Verdict, plain_unit
 from ._quantities import (
-    OUTPUT_UNITS,
-    plain_unit,
     typeset_goodness,
     typeset_number,
     typeset_p_value,
@@ -150,7 +148,7 @@ def parameter_words(fit: Fit, name: str) -> str:
     if name not in listed:
         return ""
     entry, error = listed[name], fit.standard_errors.get(name)
-    unit = plain_unit(entry.spec.unit, fit.campaign.output.quantity)
+    unit = plain_unit(entry.spec.unit, fit.campaign)
     words = with_error(float(entry.value), float("nan") if error is None else error, unit)
     if error is None:
         return f"{words} (fixed)"

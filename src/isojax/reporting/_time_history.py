@@ -4,10 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..identification import Fit
+from ..identification import OUTPUT_UNITS, Fit
 from ..records import Record
 from ._over_time import draw_signal, finish_time_axes, shown_samples
-from ._quantities import OUTPUT_UNITS
 from ._style import MEASURED, ROLES, axes_for, entitle, pair
 
 _CYCLES = 6.0

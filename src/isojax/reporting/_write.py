@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from ..identification import Loop
-from ..models import model_to_dict, write_whole
+from ..models import Isolator, model_to_dict, write_whole
 from ._page import render_page
 from ._result import result_dict
 
@@ -45,10 +45,35 @@ def write_report(loop: Loop, folder: str | Path) -> None:
                 f"Argument `loop` must hold a finite model, but its {entry.name} is {entry.value}."
             )
     texts = {
-        "model.json": json.dumps(model_to_dict(loop.after.model), indent=1, allow_nan=False) + "\n",
+        "model.json": model_text(loop.after.model),
         "report.html": render_page(loop),
         "result.json": json.dumps(result_dict(loop), indent=1, allow_nan=False) + "\n",
     }
+    write_texts(folder, texts)
+
+
+def model_text(model: Isolator) -> str:
+    """Give a model as `save_model` writes it.
+
+    Args:
+        model: the isolator.
+
+    Returns:
+        JSON.
+
+    Raises:
+        ValueError: if a parameter is not finite.
+    """
+    return json.dumps(model_to_dict(model), indent=1, allow_nan=False) + "\n"
+
+
+def write_texts(folder: Path, texts: dict[str, str]) -> None:
+    """Write files whole; the folder is made now that everything to write is ready.
+
+    Args:
+        folder: where they go.
+        texts: content by file name.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         write_whole(folder / name, text)

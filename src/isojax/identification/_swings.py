@@ -1,0 +1,90 @@
+"""Start from motions that ring down: the harmonic balance of every swing, as if it were a dwell."""
+
+import numpy as np
+
+from ..models import Isolator
+from ..records import Campaign, Record
+from ._all_dwells import dwell_motion, fit_all_dwells
+from ._decrement import about_rest, logarithmic_decrement
+from ._linear_balance import BalanceFit
+from ._receptance import FrequencyResponse
+from ._sanity import sane_fit
+
+_SMOOTH = np.array([0.25, 0.5, 0.25])
+"""Weights of a half swing and its neighbours: what differs between the two sides of rest drops out."""
+
+_FEWEST = 1
+"""Swings a coefficient that the balance needs at least; each gives a spring and a damper equation."""
+
+_OFF = 0.02
+"""Share of its peak below which the drive of a blow is over."""
+
+
+def decaying_response(campaign: Campaign, record: Record) -> FrequencyResponse:
+    """Give the swings of a free decay as the dwells of a drive that makes up for the decay.
+
+    `x = X exp(-alpha t) sin(omega t)` obeys the balance of a steady swing under the force
+    `m X (alpha^2 + 2 i alpha omega)`, in phase and ahead by a quarter.
+
+    Args:
+        campaign: says what the channels measure, and the mass.
+        record: a free decay, or a blow and what follows it.
+
+    Returns:
+        A line a half swing, the first and the last left out; none where the decay has fewer than three.
+    """
+    order = {"displacement": 0, "velocity": 1, "acceleration": 2}[campaign.output.quantity]
+    driven = np.abs(record.input) > _OFF * np.max(np.abs(record.input))
+    begin = int(np.flatnonzero(driven)[-1]) + 1 if np.any(driven) else 0
+    swings = logarithmic_decrement(about_rest(record.output)[begin:], record.rate)
+    nothing = np.zeros(0)
+    if swings.amplitude.size < 3:
+        empty = np.zeros((0, 1), complex)
+        return FrequencyResponse(record.name, record.level, record.direction, nothing, empty, empty, nothing)
+    half = np.convolve(0.5 / swings.frequency, _SMOOTH, mode="valid")
+    size = np.convolve(np.log(swings.amplitude), _SMOOTH, mode="valid")
+    omega = np.pi / half
+    alpha = 0.5 * np.log(swings.amplitude[:-2] / swings.amplitude[2:]) / half
+    displacement = np.exp(size) / np.hypot(omega, alpha) ** order
+    force = campaign.mass * displacement * (alpha**2 + 2j * alpha * omega)
+    return FrequencyResponse(
+        record.name,
+        record.level,
+        record.direction,
+        omega / (2.0 * np.pi),
+        force[:, None],
+        displacement[:, None].astype(complex),
+        nothing,
+    )
+
+
+def start_from_swings(
+    campaign: Campaign, base: Isolator, names: tuple[str, ...], records: tuple[Record, ...]
+) -> tuple[BalanceFit, tuple[str, ...]] | None:
+    """Start from the swings of motions that ring down; the mass stays as declared.
+
+    The force balance in time would need the displacement at the beginning of the record, where the motion is
+    largest and its integral least known.
+
+    Args:
+        campaign: says what the channels measure, and the mass.
+        base: the declared structure.
+        names: catalogue names of the elements to fit.
+        records: free decays and blows.
+
+    Returns:
+        The fit and its notes; None where the decays are too short to tell so many coefficients.
+    """
+    responses = tuple(decaying_response(campaign, record) for record in records)
+    if sum(one.frequency.size for one in responses) < _FEWEST * len(names):
+        return None
+    motion = dwell_motion(base, responses)
+    highest, fastest = (float(np.max(np.abs(s))) for s in (motion.displacement, motion.velocity))
+    found, notes = sane_fit(lambda chosen: fit_all_dwells(base, chosen, responses), names, highest, fastest)
+    # The balance is judged by the force that makes up for the decay; without a drive, inertia is what counts.
+    made_up = np.concatenate([one.force[:, 0] for one in responses])
+    inertia = campaign.mass * np.concatenate(
+        [(2.0 * np.pi * one.frequency) ** 2 * one.displacement[:, 0] for one in responses]
+    )
+    share = float(np.linalg.norm(made_up) / np.linalg.norm(inertia))
+    return BalanceFit(found.model, found.unexplained * share, found.fitted), notes

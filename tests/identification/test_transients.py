@@ -1,0 +1,68 @@
+"""Releases and blows, written to disk by the rig and read back; the model is complete or lacks a spring."""
+
+import json
+
+import pytest
+
+from isojax import close_loop, read_campaign, rig
+
+PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(2.5e11), rig.LinearDamping(5e3)))
+PLANS = {
+    "free_decay": rig.FreeDecay((2e-4, 5e-4, 1e-3, 1.5e-3), seconds=3.0, holdout_levels=(8e-4,)),
+    "impulse": rig.Impulse((60.0, 200.0, 700.0, 1500.0), seconds=3.0, holdout_levels=(1000.0,)),
+}
+NOISE = 5e-3
+
+
+def written(folder, kind, stiffness):
+    """Campaign of a plan, with the noise of the sensor declared and only these springs in its model."""
+    bench = rig.Bench(rate=500.0, noise=NOISE)
+    file = rig.write_campaign(folder, PLANT, PLANS[kind], 5, kind, bench)
+    text = file.read_text(encoding="utf-8")
+    text = text.replace('["linear", "abs_quadratic", "cubic"]', stiffness, 1)
+    text = text.replace('["linear", "abs_quadratic", "cubic"]', '["linear"]', 1)
+    text = text.replace('unit = "m/s^2"\n', f'unit = "m/s^2"\nnoise = {NOISE}\n', 1)
+    file.write_text(text, encoding="utf-8")
+    campaign = read_campaign(file)
+    assert {record.kind for record in campaign.records} == {kind}
+    return campaign
+
+
+@pytest.mark.parametrize("kind", PLANS)
+def test_the_loop_comes_to_none_where_the_model_is_complete(kind, tmp_path):
+    loop = close_loop(written(tmp_path, kind, '["linear", "cubic"]'))
+    assert loop.verdict == "none"
+    assert loop.findings == ()
+    errors = loop.after.standard_errors
+    for name, truth in (
+        ("linear_stiffness.coefficient", 1.08e6),
+        ("cubic_stiffness.coefficient", 2.5e11),
+        ("linear_damping.coefficient", 5e3),
+    ):
+        # Standard errors know nothing of the drift of the stiffness from record to record, 5e-4 of it.
+        assert abs(float(loop.after.model[name]) - truth) < 4.0 * errors[name] + 1e-3 * truth
+    assert loop.after.errors["holdout"].chi2_per_dof == pytest.approx(1.0, abs=0.15)
+    loop.report(tmp_path / "out")
+    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    assert result["schema"] == 1
+    assert result["verdict"] == "none"
+    assert result["findings"] == []
+    assert result["before"] == result["after"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", PLANS)
+def test_the_loop_finds_a_hidden_cubic_spring(kind, tmp_path):
+    loop = close_loop(written(tmp_path, kind, '["linear"]'))
+    assert loop.verdict == "found"
+    assert [finding.effect for finding in loop.findings] == ["cubic_stiffness"]
+    assert float(loop.after.model["cubic_stiffness.coefficient"]) == pytest.approx(2.5e11, rel=0.02)
+
+
+def test_without_leave_to_add_a_missing_effect_is_named_and_not_called_found(tmp_path):
+    loop = close_loop(written(tmp_path, "impulse", '["linear"]'), max_iterations=0)
+    assert loop.verdict == "unexplained"
+    assert loop.findings == ()
+    assert "cubic spring explains it best, but no effect might be added" in str(loop)
+    with pytest.raises(ValueError, match="`max_iterations` must be 0 or more, but is -1"):
+        close_loop(loop.loop.campaign, max_iterations=-1)
