@@ -1,0 +1,181 @@
+"""Following a curve of solutions by pseudo-arc-length: past folds, where the parameter turns back."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+TOLERANCE = 1e-8
+"""Largest step of Newton's method after which a point counts as found, in scaled unknowns: at a kink of the
+law Newton may stall below it."""
+
+_PATIENCE, _FIRST_PATIENCE = 7, 30
+"""Steps of Newton's method for a point before a shorter step is tried, and for the first point."""
+
+_SHORTEST = 1e-5
+"""Smallest step along the curve, over the largest."""
+
+_ANGLE = 0.25
+"""Turn of the tangent between two points that counts as large [rad]; twice of it is refused."""
+
+RAN_OUT, REACHED_BOUND, CLOSED, STALLED, NEVER_BEGAN = range(5)
+"""Why a curve ends."""
+
+
+class Followed(NamedTuple):
+    """A curve of solutions.
+
+    Attributes:
+        unknowns: points of the curve; unused places hold the last.
+        tangents: unit vectors along it.
+        found: how many points.
+        ending: why it ends.
+    """
+
+    unknowns: Float[Array, "point unknown"]
+    tangents: Float[Array, "point unknown"]
+    found: Int[Array, ""]
+    ending: Int[Array, ""]
+
+
+class _Walk(NamedTuple):
+    """Where the search stands: one step of Newton's method at a time, so that a batch never waits."""
+
+    here: Float[Array, " unknown"]
+    predicted: Float[Array, " unknown"]
+    base: Float[Array, " unknown"]
+    tangent: Float[Array, " unknown"]
+    row: Float[Array, " unknown"]
+    step: Float[Array, ""]
+    landing: Bool[Array, ""]
+    tries: Int[Array, ""]
+    followed: Followed
+
+
+def follow(
+    equations: Callable[[Float[Array, " unknown"]], Float[Array, " equation"]],
+    first: Float[Array, " unknown"],
+    row: Float[Array, " unknown"],
+    tangent: Float[Array, " unknown"],
+    lower: Float[Array, " unknown"],
+    upper: Float[Array, " unknown"],
+    *,
+    step: float,
+    most: int,
+) -> Followed:
+    """Follow the curve `equations(u) = 0`, one equation fewer than unknowns.
+
+    Tangent predictor, Newton corrector in the plane across it, steps by the corrector's effort and by how far
+    the tangent turns. The curve ends exactly on a bound, or where it closes on its first point.
+
+    Args:
+        equations: what vanishes on the curve; unknowns scaled to order one.
+        first: start of the search for the first point.
+        row: direction across which the first point is sought; a unit vector picks the unknown held fixed.
+        tangent: direction in which to leave.
+        lower: bounds of the unknowns, minus infinity where there is none.
+        upper: in the same way.
+        step: largest step.
+        most: points to make room for.
+
+    Returns:
+        The curve.
+
+    Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Doedel, Keller & Kernevez 1991, Int. J.
+    Bifurcation and Chaos 1:493.
+    """
+    size = first.shape[0]
+    units = jnp.eye(size)
+
+    def predict(base: Array, tangent: Array, length: Array) -> tuple[Array, Array, Array]:
+        ahead = base + length * tangent
+        limit = jnp.where(tangent > 0.0, upper, lower)
+        # A little before the bound counts too: the corrector could step over it.
+        beyond = (
+            (ahead + 0.1 * length * jnp.sign(tangent) - limit) * jnp.sign(tangent) > 0.0
+        ) & jnp.isfinite(limit)
+        reach = jnp.where(beyond, (limit - base) / jnp.where(tangent == 0.0, 1.0, tangent), jnp.inf)
+        place = jnp.argmin(reach)
+        landing = jnp.any(beyond)
+        short = jnp.where(landing, reach[place], length)
+        return base + short * tangent, jnp.where(landing, units[place], tangent), landing
+
+    def accept(walk: _Walk, found: Array, ahead: Array) -> _Walk:
+        past = walk.followed
+        length = jnp.linalg.norm(found - walk.base)
+        begin, way = past.unknowns[0], past.tangents[0]
+        share = jnp.clip(
+            jnp.dot(begin - walk.base, found - walk.base) / jnp.maximum(length, 1e-300) ** 2, 0, 1
+        )
+        apart = jnp.linalg.norm(walk.base + share * (found - walk.base) - begin)
+        closed = (past.found >= 5) & (apart < 0.2 * length) & (jnp.dot(way, ahead) > 0.5)
+        found, ahead = jnp.where(closed, begin, found), jnp.where(closed, way, ahead)
+        done = walk.landing | closed
+        bend = jnp.arccos(jnp.clip(jnp.dot(ahead, walk.tangent), -1.0, 1.0))
+        ease = jnp.where(walk.tries <= 2, 1.5, jnp.where(walk.tries <= 3, 1.2, 0.7))
+        ease = jnp.minimum(ease, jnp.clip(_ANGLE / jnp.maximum(bend, 1e-12), 0.5, 1.5))
+        following = jnp.where(past.found == 0, walk.step, jnp.minimum(walk.step * ease, step))
+        predicted, row, landing = predict(found, ahead, following)
+        count = past.found + 1
+        ending = jnp.where(closed, CLOSED, jnp.where(done, REACHED_BOUND, past.ending))
+        followed = Followed(
+            past.unknowns.at[past.found].set(found), past.tangents.at[past.found].set(ahead), count, ending
+        )
+        return _Walk(predicted, predicted, found, ahead, row, following, landing, jnp.array(0), followed)
+
+    def refuse(walk: _Walk) -> _Walk:
+        shorter = 0.5 * jnp.minimum(walk.step, jnp.linalg.norm(walk.predicted - walk.base))
+        past = walk.followed
+        predicted, row, landing = predict(walk.base, walk.tangent, shorter)
+        stuck = jnp.where(past.found == 0, NEVER_BEGAN, STALLED)
+        ending = jnp.where((shorter < _SHORTEST * step) | (past.found == 0), stuck, past.ending)
+        return _Walk(
+            predicted,
+            predicted,
+            walk.base,
+            walk.tangent,
+            row,
+            shorter,
+            landing,
+            jnp.array(0),
+            past._replace(ending=ending),
+        )
+
+    def improve(walk: _Walk) -> _Walk:
+        value, slope = equations(walk.here), jax.jacfwd(equations)(walk.here)
+        across = jnp.dot(walk.row, walk.here - walk.predicted)
+        change = jnp.linalg.solve(
+            jnp.concatenate([slope, walk.row[None]]), jnp.concatenate([value, across[None]])
+        )
+        moved = walk.here - change
+        ahead = jnp.linalg.solve(jnp.concatenate([slope, walk.tangent[None]]), units[-1])
+        ahead = ahead / jnp.linalg.norm(ahead)
+        beginning = walk.followed.found == 0
+        span = jnp.linalg.norm(walk.predicted - walk.base)
+        sane = jnp.all(jnp.isfinite(change)) & (
+            beginning | (jnp.linalg.norm(moved - walk.predicted) < 0.5 * span + 1e-9)
+        )
+        found = sane & (jnp.max(jnp.abs(change)) < TOLERANCE)
+        straight = beginning | (jnp.dot(ahead, walk.tangent) > jnp.cos(2.0 * _ANGLE))
+        patience = jnp.where(beginning, _FIRST_PATIENCE, _PATIENCE)
+        over = ~sane | (walk.tries >= patience) | (found & ~(straight & jnp.all(jnp.isfinite(ahead))))
+        going = walk._replace(here=moved, tries=walk.tries + 1)
+        choices = (accept(walk, moved, ahead), refuse(walk), going)
+        return jax.tree.map(lambda yes, no, on: jnp.where(over, no, jnp.where(found, yes, on)), *choices)
+
+    def running(walk: _Walk) -> Array:
+        return (walk.followed.ending == RAN_OUT) & (walk.followed.found < most)
+
+    nothing = Followed(jnp.zeros((most, size)), jnp.zeros((most, size)), jnp.array(0), jnp.array(RAN_OUT))
+    begin = _Walk(
+        first, first, first, tangent, row, jnp.asarray(0.25 * step), jnp.array(False), jnp.array(0), nothing
+    )
+    followed = jax.lax.while_loop(running, improve, begin).followed
+    last = jnp.maximum(followed.found - 1, 0)
+    used = (jnp.arange(most) < followed.found)[:, None]
+    return followed._replace(
+        unknowns=jnp.where(used, followed.unknowns, followed.unknowns[last][None]),
+        tangents=jnp.where(used, followed.tangents, followed.tangents[last][None]),
+    )
