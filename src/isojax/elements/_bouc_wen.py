@@ -80,3 +80,15 @@ class BoucWen(AbstractElement):
         # |z|^n has a NaN derivative in n at rest; the floor is far below any measured displacement.
         power = jnp.maximum(jnp.abs(z), 1e-30) ** self.exponent
         return (v - self.beta * jnp.abs(v) * power * jnp.sign(z) - self.gamma * v * power,)
+
+    def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
+        """See `AbstractElement.kinks`."""
+        return (v, s[0])
+
+    def state_rate_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Internal:
+        """See `AbstractElement.state_rate_beside`."""
+        forth, out = sides
+        reach = out * s[0]
+        # With n = 1 this is linear in z on either side of the kink; the floor acts on the other factor alone.
+        power = reach * jnp.maximum(reach, 1e-30) ** (self.exponent - 1.0)
+        return (v - self.beta * forth * v * power * out - self.gamma * v * power,)

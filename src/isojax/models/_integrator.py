@@ -66,6 +66,19 @@ class Integrator(eqx.Module):
         """
         return self.steps_per_period * model.substeps
 
+    def with_steps(self, steps_per_period: int) -> "Integrator":
+        """Give the same integrator with other steps a period.
+
+        Args:
+            steps_per_period: even, at least 8.
+
+        Returns:
+            The integrator.
+        """
+        return Integrator(
+            self.solver, self.substeps, self.rtol, self.atol, self.max_steps, steps_per_period
+        )
+
     @property
     def orbit_tolerance(self) -> float:
         """Largest relative closing error of a periodic orbit that counts as found."""

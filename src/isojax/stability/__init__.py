@@ -5,6 +5,13 @@ from ._branch import BranchPoints as BranchPoints
 from ._branch import SpecialPoint as SpecialPoint
 from ._continuation import continue_branch as continue_branch
 from ._floquet import Floquet as Floquet
+from ._locus import Cusp as Cusp
+from ._locus import FoldCurve as FoldCurve
+from ._locus import PeriodDoublingCurve as PeriodDoublingCurve
+from ._locus import fold_curve as fold_curve
+from ._locus import period_doubling_curve as period_doubling_curve
+from ._map import StabilityMap as StabilityMap
+from ._map import stability_map as stability_map
 from ._orbit import Orbit as Orbit
 from ._orbit import find_periodic_orbit as find_periodic_orbit
 from ._switching import switch_branch as switch_branch

@@ -18,13 +18,14 @@ class Crossings(NamedTuple):
     Attributes:
         phases: tau at each crossing [rad]; unused places hold the end of the motion.
         kinks: which of the model's kinks; -1 in unused places.
-        sides: signs of all kinks before the first crossing, between two, and after the last.
+        sides: signs of all kinks before the first crossing, between two, and after the last; None where each
+            state is to be taken on its own side.
         complete: whether every crossing found a place.
     """
 
     phases: Float[Array, " crossing"]
     kinks: Int[Array, " crossing"]
-    sides: Float[Array, "piece kink"]
+    sides: Float[Array, "piece kink"] | None
     complete: Bool[Array, ""]
 
 
@@ -60,14 +61,19 @@ def find_crossings(model: Isolator, path: State, end: float, places: int) -> Cro
     return Crossings(phases, kink, sides, jnp.sum(crossed) <= places)
 
 
+def _turned(angle: tuple[Lanes, Lanes], turn: tuple[Lanes, Lanes]) -> tuple[Lanes, Lanes]:
+    """Give sine and cosine of the sum of two angles."""
+    return angle[0] * turn[1] + angle[1] * turn[0], angle[1] * turn[1] - angle[0] * turn[0]
+
+
 def advance_in_pieces(
     model: Isolator,
     integrator: Integrator,
     drive: Sine,
     state: State,
     crossings: Crossings,
-    end: float,
-    steps: Int[Array, ""],
+    end: Lanes | float,
+    steps: Int[Array, ""] | int,
 ) -> tuple[State, Float[Array, " crossing"]]:
     """Advance the state from phase 0 to `end`, each piece with the smooth law of its side.
 
@@ -83,27 +89,30 @@ def advance_in_pieces(
     Returns:
         The state at the end, and the value of the kink at each crossing, zero where the phase is right.
     """
-    bounds = jnp.concatenate([jnp.zeros(1), crossings.phases, jnp.full(1, end)])
+    bounds = jnp.concatenate([jnp.zeros(1), crossings.phases, jnp.reshape(end, 1)])
 
-    def piece(carry: State, along: tuple[Array, Array, Array]) -> tuple[State, Lanes]:
+    def piece(carry: State, along: tuple[Array, Array, Array | None]) -> tuple[State, Lanes]:
         start, stop, sides = along
         length = (stop - start) / steps
         step_time = length / drive.angular_frequency
-        beside = tuple(sides)
+        beside = None if sides is None else tuple(sides)
+        turn = jnp.sin(0.5 * length), jnp.cos(0.5 * length)
 
-        def step(index: Array, here: State) -> State:
-            phases = [start + length * (index + part) for part in (0.0, 0.5, 1.0)]
-            at = [drive.at(jnp.sin(phase), jnp.cos(phase)) for phase in phases]
+        def step(_: Array, here: tuple[State, tuple[Array, Array]]) -> tuple[State, tuple[Array, Array]]:
+            state, angle = here
+            # Turned from stage to stage: a sine a stage and lane would cost as much as the law.
+            angles = [angle, angle := _turned(angle, turn), angle := _turned(angle, turn)]
+            at = [drive.at(*pair) for pair in angles]
 
             def field(t: float, y: State, args: None) -> State:
                 u, u_rate = at[round(2.0 * t)]
                 return tuple(step_time * rate for rate in model.rates(y, u, u_rate, sides=beside))
 
             term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
-            moved, *_ = integrator.solver.step(term, 0.0, 1.0, here, None, None, False)
-            return moved
+            moved, *_ = integrator.solver.step(term, 0.0, 1.0, state, None, None, False)
+            return moved, angle
 
-        last = jax.lax.fori_loop(0, steps, step, carry)
+        last, _ = jax.lax.fori_loop(0, steps, step, (carry, (jnp.sin(start), jnp.cos(start))))
         kinks = model.kinks(last)
         return last, jnp.stack(kinks) if kinks else jnp.zeros(0)
 

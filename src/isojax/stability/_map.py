@@ -1,0 +1,212 @@
+"""Stability over a whole plane of drive amplitude and frequency."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float, Int
+
+from .._results import RESULTS
+from .._types import check_float64
+from ..models import Integrator, Isolator
+from ._chunks import fingerprint, run_chunks
+from ._drive import Sine
+from ._pass import (
+    FOUND,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    Found,
+    Lane,
+    Method,
+    cell_solver,
+    sampled_error,
+    states_at_zero,
+)
+from ._starts import Candidates, find_candidates
+from ._surface import find_surface
+from ._symmetry import is_odd
+
+
+class StabilityMap(eqx.Module):
+    """Periodic orbits and their multipliers over drive amplitude and frequency.
+
+    With `coexisting` every array of a cell has an axis `orbit` in front, by rising displacement; places that a
+    cell does not fill are NaN.
+
+    Attributes:
+        model: the isolator.
+        amplitudes: drive amplitudes [N, or m/s^2 for base excitation].
+        frequencies: [Hz].
+        spectral_radius: largest modulus of the multipliers; stable below one.
+        multipliers: Floquet multipliers over one drive period.
+        start: state of each orbit at the phase at which it is largest.
+        direction: drive over its amplitude, sine and cosine part, with the phase counted from there.
+        phases: where each orbit passes kinks, counted from there; empty where orbits are not split.
+        response: half the peak-to-peak displacement [m].
+        count: orbits found in each cell.
+        result: how the search ended in each cell; beside NaN, why.
+        error: largest integration error of a multiplier in a sample of cells, against steps four times finer.
+        symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
+        integrator: steps a period.
+    """
+
+    model: Isolator
+    amplitudes: Float[Array, " amplitude"]
+    frequencies: Float[Array, " frequency"]
+    spectral_radius: Float[Array, "*orbit amplitude frequency"]
+    multipliers: Complex[Array, "*orbit amplitude frequency multiplier"]
+    start: Float[Array, "*orbit amplitude frequency state"]
+    direction: Float[Array, "*orbit amplitude frequency 2"]
+    phases: Float[Array, "*orbit amplitude frequency crossing"]
+    response: Float[Array, "*orbit amplitude frequency"]
+    count: Int[Array, "amplitude frequency"]
+    result: RESULTS
+    error: float
+    symmetric: bool = eqx.field(static=True)
+    integrator: Integrator
+
+    @property
+    def stable(self) -> Array:
+        """Whether each orbit is stable; False where there is none."""
+        return self.spectral_radius < 1.0
+
+    @property
+    def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
+        """State of each orbit at t = 0 of the recorded drive, by integration from `start`."""
+        force = jnp.broadcast_to(self.amplitudes[:, None], self.spectral_radius.shape).ravel()
+        frequency = jnp.broadcast_to(self.frequencies, self.spectral_radius.shape).ravel()
+        state = tuple(self.start.reshape(force.size, -1).T)
+        sine, cosine = self.direction.reshape(force.size, 2).T * force
+        lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel())
+        method = Method(self.integrator, self.symmetric, None)
+        return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)
+
+
+def stability_map(
+    model: Isolator,
+    amplitudes: Any,
+    frequencies: Any,
+    *,
+    coexisting: bool = False,
+    reach: float = 3.0,
+    integrator: Integrator | None = None,
+    chunk: int = 65536,
+    checkpoint: str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+    devices: Any = None,
+) -> StabilityMap:
+    """Find the periodic orbits over a grid of drive amplitude and frequency, and their Floquet multipliers.
+
+    The orbits are found first on a coarse grid of displacement amplitude and frequency, over which they do not
+    fold; from there each cell gets a start so good that one step of Newton's method on the period map, with its
+    derivative by `jax.jacfwd` under `vmap`, finishes nearly all. Odd models use the half-period map.
+
+    Args:
+        model: the isolator.
+        amplitudes: drive amplitudes, ascending and positive [N, or m/s^2 for base excitation].
+        frequencies: ascending and positive [Hz].
+        coexisting: whether to give every orbit of a cell; else the one of the smallest motion, to which rest
+            leads as the drive grows.
+        reach: displacement up to which orbits are sought, over the largest that grows from rest without a jump
+            anywhere in the window.
+        integrator: steps a period; 128 steps of RK4 if omitted.
+        chunk: orbits computed at once; bounds the memory.
+        checkpoint: folder in which finished chunks are kept; a run that was killed goes on from there and gives
+            the same numbers.
+        progress: called with a line now and then.
+        devices: devices to spread each chunk over; all of this process if omitted.
+
+    Returns:
+        The map. Where nothing converged the numbers are NaN and `result` says why.
+
+    Raises:
+        ValueError: if a grid is empty, not positive or not ascending, `reach` is below one, `chunk` is no
+            positive count, or the checkpoint belongs to another map.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
+    """
+    check_float64()
+    integrator = Integrator() if integrator is None else integrator
+    forces, band = _axis("amplitudes", amplitudes), _axis("frequencies", frequencies)
+    if not 1.0 <= reach < math.inf:
+        raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
+    if chunk < 1:
+        raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
+    half = is_odd(model)
+    surface = find_surface(model, integrator, half, forces, band, reach)
+    if progress is not None:
+        progress("orbits over displacement and frequency found")
+    candidates = find_candidates(surface, forces)
+    if not coexisting:
+        candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
+    solver = cell_solver(model, integrator, half, surface, forces, devices)
+    folder = None if checkpoint is None else Path(checkpoint)
+    identity = fingerprint(model, integrator, forces, band, coexisting, reach, chunk)
+    found = run_chunks(solver, candidates, chunk, folder, identity, progress)
+    error = sampled_error(solver, candidates, found, forces, band)
+    arrays = _gridded(candidates, found, len(forces), len(band), coexisting)
+    code = arrays.pop("code")
+    ending = _ending
+    for _ in range(code.ndim):
+        ending = jax.vmap(ending)
+    result = ending(jnp.asarray(code))
+    return StabilityMap(
+        model=model,
+        amplitudes=jnp.asarray(forces),
+        frequencies=jnp.asarray(band),
+        result=result,
+        error=error,
+        symmetric=half,
+        integrator=integrator,
+        **{name: jnp.asarray(values) for name, values in arrays.items()},
+    )
+
+
+def _ending(code: Array) -> RESULTS:
+    """Give the outcome that a code of the search stands for."""
+    failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
+    return RESULTS.where(code == FOUND, RESULTS.promote(diffrax.RESULTS.successful), failed)
+
+
+def _gridded(
+    candidates: Candidates, found: Found, rows: int, columns: int, coexisting: bool
+) -> dict[str, np.ndarray]:
+    """Put the orbits into their cells; a cell in which none was found says that nothing converged."""
+    orbits = int(candidates.order.max()) + 1 if candidates.order.size else 1
+    place = (candidates.order, candidates.force, candidates.frequency)
+    arrays: dict[str, np.ndarray] = {}
+    names = {"states": "start", "radius": "spectral_radius", "swing": "response"}
+    names |= {name: name for name in ("direction", "phases", "multipliers")}
+    for name, public in names.items():
+        values = getattr(found, name)
+        grid = np.full((orbits, rows, columns, *values.shape[1:]), np.nan, dtype=values.dtype)
+        grid[place] = values
+        arrays[public] = grid if coexisting else grid[0]
+    code = np.full((orbits, rows, columns), NOT_CONVERGED, dtype=np.int8)
+    code[place] = found.code
+    arrays["code"] = code if coexisting else code[0]
+    arrays["count"] = (code == FOUND).sum(axis=0)
+    return arrays
+
+
+def _axis(name: str, values: Any) -> Float[np.ndarray, " axis"]:
+    axis = np.asarray(values, dtype=float)
+    if axis.ndim != 1 or not axis.size:
+        raise ValueError(f"Argument `{name}` must be a list of numbers, but has shape {axis.shape}.")
+    bad = np.flatnonzero(~(np.isfinite(axis) & (axis > 0.0)))
+    if bad.size:
+        raise ValueError(f"Argument `{name}` must be positive, but {name}[{bad[0]}] = {axis[bad[0]]}.")
+    bad = np.flatnonzero(np.diff(axis) <= 0.0)
+    if bad.size:
+        place = bad[0] + 1
+        raise ValueError(
+            f"Argument `{name}` must ascend, but {name}[{place}] = {axis[place]} follows {axis[place - 1]}."
+        )
+    return axis

@@ -1,0 +1,225 @@
+"""The surface of periodic orbits over displacement amplitude and frequency, where it has one sheet.
+
+Over force and frequency the orbits fold: one force belongs to several of them. Over displacement and frequency
+each point belongs to one force. So the orbits are found there, on a coarse grid, and read off for any force.
+"""
+
+import math
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.interpolate import make_interp_spline
+
+from .._types import Lanes
+from ..models import Integrator, Isolator
+from ._describing import imposed_balance, response_amplitudes, rest_displacement
+from ._drive import Sine
+from ._period_map import period_map, trajectory
+from ._pieces import Crossings, find_crossings
+
+_NEWTON = 6
+"""Steps of Newton's method on the coarse grid."""
+
+_NODES = (96, 33)
+"""Displacement amplitudes and frequencies of the coarse grid."""
+
+_FINE = 1024
+"""Displacement amplitudes between which roots are sought."""
+
+_CROSSINGS = 16
+"""Kinks an orbit to make room for."""
+
+_EDGE = 1e-4
+"""Share of the motion at either end within which a kink counts as lying at the end."""
+
+_SPLINE = 5
+"""Degree of the splines between the nodes."""
+
+
+class Surface(NamedTuple):
+    """Orbits over displacement amplitude and frequency; each orbit starts at its largest displacement.
+
+    Attributes:
+        rest: displacement at rest [m].
+        amplitudes: a, largest displacement over rest [m], equidistant in the logarithm.
+        frequencies: [Hz].
+        stiffness: drive in phase (sine) and in quadrature (cosine) over a [N/m].
+        internal: internal states at the largest displacement, over a.
+        swing: half the peak-to-peak displacement over a.
+        phases: phase of each orbit at which it passes each kink [rad], where all pass the same ones in the
+            same order; else empty.
+        sides: signs of the kinks between these; None where the orbits differ.
+    """
+
+    rest: float
+    amplitudes: Float[np.ndarray, " displacement"]
+    frequencies: Float[np.ndarray, " frequency"]
+    stiffness: Float[np.ndarray, "2 frequency displacement"]
+    internal: Float[np.ndarray, "internal frequency displacement"]
+    swing: Float[np.ndarray, "frequency displacement"]
+    phases: Float[np.ndarray, "crossing frequency displacement"]
+    sides: Float[np.ndarray, "piece kink"] | None
+
+    @property
+    def tables(self) -> Float[np.ndarray, "table frequency displacement"]:
+        """All that is read off for a candidate: stiffness, internal states, swing, phases."""
+        return np.concatenate([self.stiffness, self.internal, self.swing[None], self.phases])
+
+    @property
+    def force(self) -> Float[np.ndarray, "frequency displacement"]:
+        """Drive amplitude that holds each orbit [N, or m/s^2 for base excitation]."""
+        return self.amplitudes * np.hypot(self.stiffness[0], self.stiffness[1])
+
+
+@eqx.filter_jit
+def _nodes(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: Float[Array, ""],
+    amplitude: Float[Array, " node"],
+    frequency: Float[Array, " node"],
+) -> tuple[Array, Array, Array, Crossings]:
+    turns = 0.5 if half else 1.0
+
+    def node(a: Array, f: Array) -> tuple[Array, Array, Array, Crossings]:
+        guess, cycle = imposed_balance(model, a, f, rest)
+        push = jnp.hypot(guess.sine, jnp.asarray(guess.cosine))
+        internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
+        inner = jnp.where(internal == 0.0, a, jnp.abs(internal))
+        omega = 2.0 * math.pi * f
+
+        def unpack(unknown: Array) -> tuple[Sine, tuple[Lanes, ...]]:
+            state = (rest + a, 0.0 * a, *(unknown[2:] * inner))
+            return Sine(unknown[0] * push, unknown[1] * push, f), state
+
+        def gap(unknown: Array) -> Array:
+            drive, state = unpack(unknown)
+            moved = period_map(model, integrator, drive, state, turns=turns)
+            scale = (a, a * omega, *inner)
+            return jnp.stack([(m - s) / c for m, s, c in zip(moved, state, scale, strict=True)])
+
+        start = jnp.concatenate([jnp.stack([guess.sine, guess.cosine]) / push, internal / inner])
+
+        def improve(_: int, unknown: Array) -> Array:
+            step = jnp.linalg.solve(jax.jacfwd(gap)(unknown), gap(unknown))
+            # Far from the balance of one harmonic a full step may leave the basin.
+            return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
+
+        found = jax.lax.fori_loop(0, _NEWTON, improve, start)
+        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < 1e-6)
+        unknown = jnp.where(good, found, start)
+        drive, state = unpack(unknown)
+        path = trajectory(model, integrator, drive, state, turns=turns)
+        low, high = jnp.min(path[0]), jnp.max(path[0])
+        swing = (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / a
+        stiffness = jnp.stack([drive.sine, jnp.asarray(drive.cosine)]) / a
+        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _CROSSINGS)
+        return stiffness, unknown[2:] * inner / a, swing, crossings
+
+    return jax.vmap(node)(amplitude, frequency)
+
+
+@eqx.filter_jit
+def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:
+    rest = rest_displacement(model)
+    return rest, response_amplitudes(model, frequencies, amplitudes, rest)
+
+
+def _window(
+    model: Isolator, least: float, most: float, frequencies: Float[np.ndarray, " frequency"], reach: float
+) -> tuple[float, float, float]:
+    """Give rest and the displacement amplitudes, least and largest, that a range of forces can hold."""
+    band = jnp.asarray(np.linspace(frequencies[0], frequencies[-1], 60 if len(frequencies) > 1 else 1))
+    tiny = 1e-9
+    _, slope = _forces(model, band, jnp.array([tiny]))
+    soft = float(jnp.min(slope)) / tiny
+    grid = most / soft * np.logspace(-9.0, 4.0, 1500)
+    rest, needed = (np.asarray(value) for value in _forces(model, band, jnp.asarray(grid)))
+    # Connected with rest: from small motion up to the first that needs more than the largest force.
+    beyond = np.maximum.accumulate(needed >= most, axis=0)
+    reached = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(grid) - 1)
+    below = np.minimum.accumulate(needed < least, axis=0).sum(axis=0)
+    low = grid[max(int(below.min()) - 1, 0)]
+    return float(rest), 0.5 * low, reach * float(grid[int(reached.max())])
+
+
+def find_surface(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    forces: Float[np.ndarray, " force"],
+    frequencies: Float[np.ndarray, " frequency"],
+    reach: float,
+) -> Surface:
+    """Find the orbits over displacement and frequency that a window of force and frequency can hold.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period.
+        half: whether to seek symmetric orbits by the half-period map.
+        forces: drive amplitudes of the window [N, or m/s^2 for base excitation].
+        frequencies: of the window, ascending [Hz].
+        reach: largest displacement sought, over the largest that grows from rest without a jump.
+
+    Returns:
+        The surface at the frequencies given.
+    """
+    rest, low, high = _window(model, float(forces.min()), float(forces.max()), frequencies, reach)
+    displacements, columns = _NODES
+    single = len(frequencies) == 1
+    band = (
+        frequencies if len(frequencies) <= columns else _chebyshev(frequencies[0], frequencies[-1], columns)
+    )
+    coarse = np.geomspace(low, high, displacements)
+    frequency, amplitude = np.meshgrid(band, coarse, indexing="ij")
+    found = _nodes(
+        model,
+        integrator,
+        half,
+        jnp.asarray(rest),
+        jnp.asarray(amplitude.ravel()),
+        jnp.asarray(frequency.ravel()),
+    )
+    shape = (len(band), displacements)
+    stiffness, internal, swing = (np.asarray(table).reshape(*shape, -1) for table in found[:3])
+    phases, sides = _common_crossings(found[3], math.pi if half else 2.0 * math.pi)
+    tables = np.concatenate([stiffness, internal, swing, phases.reshape(*shape, -1)], axis=-1)
+    if not single and len(frequencies) > columns:
+        tables = make_interp_spline(band, tables, k=_SPLINE, axis=0)(frequencies)
+    fine = np.geomspace(low, high, _FINE)
+    tables = make_interp_spline(np.log(coarse), tables, k=_SPLINE, axis=1)(np.log(fine))
+    tables = np.ascontiguousarray(np.moveaxis(tables, -1, 0))
+    last = 2 + model.internal_states
+    return Surface(
+        rest, fine, frequencies, tables[:2], tables[2:last], tables[last], tables[last + 1 :], sides
+    )
+
+
+def _common_crossings(
+    crossings: Crossings, end: float
+) -> tuple[Float[np.ndarray, "node crossing"], Float[np.ndarray, "piece kink"] | None]:
+    """Give the kinks that all orbits pass in the same order, but for those at the ends of the motion."""
+    phases, kinks, sides = (np.asarray(value) for value in crossings[:3])
+    # The motion begins and, if symmetric, ends at an extreme, where the velocity passes zero.
+    inner = (kinks >= 0) & (phases > _EDGE * end) & (phases < (1.0 - _EDGE) * end)
+    count = int(inner[0].sum())
+    order = np.argsort(~inner, axis=1, kind="stable")
+    first = np.take_along_axis(np.where(inner, kinks, -1), order, axis=1)
+    if not bool(np.all(crossings.complete)) or np.any(first != first[0]):
+        return np.zeros((len(phases), 0)), None
+    if len({sides_of.tobytes() for sides_of in sides[:, :1]}) > 1:
+        return np.zeros((len(phases), 0)), None
+    phases = np.take_along_axis(phases, order, axis=1)[:, :count]
+    # The sides of a piece are those in its middle, beyond every crossing at the edge before.
+    before = int(np.sum((kinks[0] >= 0) & (np.asarray(crossings.phases)[0] <= _EDGE * end)))
+    return phases, sides[0][before : before + count + 1]
+
+
+def _chebyshev(start: float, stop: float, count: int) -> Float[np.ndarray, " node"]:
+    """Give nodes that are denser at the ends, where a spline has fewest neighbours."""
+    return 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(np.pi * np.arange(count) / (count - 1))
