@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..models import Integrator
 from ._family import Family
-from ._split import find_split, split_image, split_jacobian
+from ._split import Split, find_split, split_image, split_jacobian
 
 Kind = Literal["fold", "period_doubling", "neimark_sacker", "symmetry_breaking"]
 
@@ -31,6 +31,8 @@ class Polished(NamedTuple):
         matrix: derivative of the state after the turns by the one before, SI units.
         direction: critical direction of the state, scaled to unit length; of a pair its real part.
         scale: size of each state.
+        bend: quadratic coefficient of the motion in the critical direction, `w D^2 P [W, W]` with `w W = 1`,
+            on a curve of folds; zero at a cusp, NaN where it was not asked for.
         mismatch: what is left of the equations.
         found: whether the search converged.
         complete: whether every kink was split at.
@@ -41,6 +43,7 @@ class Polished(NamedTuple):
     matrix: Float[Array, "state state"]
     direction: Float[Array, " state"]
     scale: Float[Array, " state"]
+    bend: Float[Array, ""]
     mismatch: Float[Array, ""]
     found: Bool[Array, ""]
     complete: Bool[Array, ""]
@@ -182,6 +185,9 @@ def polish(
     where = final[-shares.shape[0] :]
     transition, _ = split_jacobian(family.at(where), integrator, turns, split, final[:whole])
     mismatch = jax.lax.stop_gradient(mismatch)
+    bend = jnp.array(jnp.nan)
+    if kind == "fold" and plane is not None:
+        bend = _bend(frozen, integrator, turns, split, *jax.lax.stop_gradient((final, where)))
     # Newton may have gone to another bifurcation: the start was located, so the point is close by.
     near = jnp.max(jnp.abs(jax.lax.stop_gradient(where) - shares)) < 0.02
     return Polished(
@@ -190,10 +196,37 @@ def polish(
         split.scale[:, None] * transition / split.scale[None],
         final[whole : whole + states],
         split.scale,
+        bend,
         mismatch,
         jnp.isfinite(mismatch) & (mismatch < 1e3 * goal) & near,
         split.complete,
     )
+
+
+def _bend(
+    family: Family,
+    integrator: Integrator,
+    turns: float,
+    split: Split,
+    final: Float[Array, " extended"],
+    shares: Float[Array, " parameter"],
+) -> Float[Array, ""]:
+    """Give the quadratic coefficient at a fold."""
+    whole = split.scale.shape[0] + split.crossings.phases.shape[0]
+    states = split.scale.shape[0]
+    place, along = final[:whole], final[whole : 2 * whole]
+    setting = family.at(shares)
+
+    def left(u: Array) -> Array:
+        moved, missed = split_image(setting, integrator, turns, split, u)
+        return jnp.concatenate([moved - u[:states], missed])
+
+    def slope(u: Array) -> Array:
+        return jax.jvp(left, (u,), (along,))[1]
+
+    twice = jax.jvp(slope, (place,), (along,))[1]
+    functional = null_vector(jax.jacfwd(left)(place).T)
+    return jnp.dot(functional, twice) / jnp.dot(functional[:states], along[:states])
 
 
 polish_jitted = eqx.filter_jit(polish)
