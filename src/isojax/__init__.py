@@ -75,5 +75,13 @@ from .reporting import plot_where as plot_where
 from .reporting import ranking_table as ranking_table
 from .reporting import render_text as render_text
 from .reporting import write_report as write_report
+from .stability import Branch as Branch
+from .stability import FoldCurve as FoldCurve
+from .stability import PeriodDoublingCurve as PeriodDoublingCurve
+from .stability import SpecialPoint as SpecialPoint
+from .stability import continue_branch as continue_branch
+from .stability import fold_curve as fold_curve
+from .stability import period_doubling_curve as period_doubling_curve
+from .stability import switch_branch as switch_branch
 
 __version__ = _version("isojax")

@@ -4,10 +4,10 @@ from ._branch import Branch as Branch
 from ._branch import BranchPoints as BranchPoints
 from ._branch import SpecialPoint as SpecialPoint
 from ._continuation import continue_branch as continue_branch
+from ._curves import Cusp as Cusp
+from ._curves import FoldCurve as FoldCurve
+from ._curves import PeriodDoublingCurve as PeriodDoublingCurve
 from ._floquet import Floquet as Floquet
-from ._locus import Cusp as Cusp
-from ._locus import FoldCurve as FoldCurve
-from ._locus import PeriodDoublingCurve as PeriodDoublingCurve
 from ._locus import fold_curve as fold_curve
 from ._locus import period_doubling_curve as period_doubling_curve
 from ._map import StabilityMap as StabilityMap

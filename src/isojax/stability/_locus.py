@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float
+from jaxtyping import Array, Float
 
 from .._results import RESULTS, is_successful
 from .._types import check_float64
@@ -16,6 +16,7 @@ from ._arc_length import CLOSED, REACHED_BOUND, Followed, follow
 from ._branch import SpecialPoint
 from ._closure import state_scale
 from ._continuation import continue_branch, refuse_traced, tracing_steps
+from ._curves import Cusp, FoldCurve, PeriodDoublingCurve
 from ._extended import CRITICAL, Kind, Polished, first_places, null_vector, polish
 from ._family import Family
 from ._floquet import multipliers
@@ -32,70 +33,6 @@ _SECTIONS = 3
 """Times the step with a cusp is cut into as many parts as there are lanes."""
 
 
-class Cusp(eqx.Module):
-    """Where two folds meet and end.
-
-    Attributes:
-        amplitude: F0 [N, or m/s^2 for base excitation].
-        frequency: f [Hz].
-        y0: state at t = 0, SI units.
-    """
-
-    amplitude: Float[Array, ""]
-    frequency: Float[Array, ""]
-    y0: Float[Array, " state"]
-
-
-class FoldCurve(eqx.Module):
-    """Folds over the plane of the drive: where an orbit meets a saddle and both vanish.
-
-    Attributes:
-        amplitude: F0 along the curve [N, or m/s^2 for base excitation].
-        frequency: f [Hz].
-        y0: state at t = 0, SI units.
-        multipliers: in falling modulus; one is +1.
-        cusps: where two folds meet. Derivatives of their amplitude and frequency by the model hold; the state
-            moves along the critical direction as well, which its derivative leaves out.
-        closed: whether the last point is the first.
-        periods: drive periods after which the orbits repeat.
-        symmetric: whether they were closed with the half-period map.
-        result: whether the curve was followed until it closed or left the window, every point to the
-            tolerance of a single orbit; points that were not are NaN.
-    """
-
-    amplitude: Float[Array, " point"]
-    frequency: Float[Array, " point"]
-    y0: Float[Array, "point state"]
-    multipliers: Complex[Array, "point multiplier"]
-    cusps: tuple[Cusp, ...]
-    closed: Bool[Array, ""]
-    periods: int = eqx.field(static=True)
-    symmetric: bool = eqx.field(static=True)
-    result: RESULTS
-
-
-class PeriodDoublingCurve(eqx.Module):
-    """Period doublings over the plane of the drive.
-
-    Attributes:
-        amplitude: F0 along the curve [N, or m/s^2 for base excitation].
-        frequency: f [Hz].
-        y0: state at t = 0 of the orbit that doubles, SI units.
-        multipliers: in falling modulus; one is -1.
-        closed: whether the last point is the first.
-        periods: drive periods after which the orbits that double repeat.
-        result: see `FoldCurve`.
-    """
-
-    amplitude: Float[Array, " point"]
-    frequency: Float[Array, " point"]
-    y0: Float[Array, "point state"]
-    multipliers: Complex[Array, "point multiplier"]
-    closed: Bool[Array, ""]
-    periods: int = eqx.field(static=True)
-    result: RESULTS
-
-
 def fold_curve(
     model: Isolator,
     *,
@@ -110,8 +47,8 @@ def fold_curve(
     """Follow the folds over the plane of the drive's amplitude and frequency.
 
     The map's fixed point, its critical direction and both parameters are followed together; each point is
-    then found anew with the motion split at its kinks. Where the quadratic coefficient `w D^2 P [v, v]` changes
-    sign the curve has a cusp. `jax.jacfwd` over the model works: points move across the curve.
+    then found anew with the motion split at its kinks. Where the quadratic coefficient `w D^2 P [v, v]`
+    changes sign the curve has a cusp. `jax.jacfwd` over the model works: points move across the curve.
 
     Args:
         model: the isolator.
