@@ -14,6 +14,9 @@ from ..models import write_whole
 from ._pass import CellSolver, Found
 from ._starts import Candidates
 
+FEWEST = 1024
+"""Lanes of the smallest pass: below it a pass costs no less."""
+
 
 def fingerprint(*parts: object) -> str:
     """Give a short word that tells one map from another.
@@ -38,7 +41,7 @@ def run_chunks(
     candidates: Candidates,
     chunk: int,
     folder: Path | None,
-    identity: str,
+    name: str,
     progress: Callable[[str], None] | None,
 ) -> Found:
     """Find the orbits of all candidates, chunk by chunk.
@@ -50,32 +53,28 @@ def run_chunks(
         candidates: all of them.
         chunk: orbits a chunk.
         folder: where finished chunks are kept, or None.
-        identity: word for this very map; a folder that holds another's chunks is refused.
+        name: first word of the files' names.
         progress: called with a line now and then.
 
     Returns:
         The orbits, in the order of the candidates.
-
-    Raises:
-        ValueError: if `folder` belongs to another map.
     """
     total = candidates.force.size
     # No wider than need be: small maps compile and run a small pass. At least one lane for each device.
-    lanes = min(chunk, max(1 << max(total - 1, 0).bit_length(), 1024))
+    lanes = min(chunk, max(1 << max(total - 1, 0).bit_length(), FEWEST))
     begins = list(range(0, total, lanes))
-    if folder is not None:
-        _claim(folder, identity)
-    states, kinks = 2 + solver.model.internal_states, solver.kinks
+    states = 2 + solver.model.internal_states
+    kinks = solver.tables[0].shape[0] - states - 1
     processes, own = jax.process_count(), jax.process_index()
     parts: list[Found] = []
     for place, begin in enumerate(begins):
         if place % processes != own:
             parts.append(_blank(min(lanes, total - begin), states, kinks))
             continue
-        path = None if folder is None else folder / f"chunk-{place:05d}.npz"
+        path = None if folder is None else folder / f"{name}-{place:05d}.npz"
         if path is not None and path.exists():
             with np.load(path) as kept:
-                parts.append(Found(*(kept[name] for name in Found._fields)))
+                parts.append(Found(*(kept[field] for field in Found._fields)))
             continue
         part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
         if path is not None:
@@ -109,12 +108,20 @@ def _blank(count: int, states: int, kinks: int) -> Found:
     )
 
 
-def _claim(folder: Path, identity: str) -> None:
-    """Mark a folder as this map's, or refuse it."""
+def claim_folder(folder: Path, identity: str) -> None:
+    """Mark a folder as this map's, or refuse it.
+
+    Args:
+        folder: to keep chunks in.
+        identity: word for this very map.
+
+    Raises:
+        ValueError: if it belongs to another map.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     label = folder / "map.json"
     if not label.exists():
-        if any(folder.glob("chunk-*.npz")):
+        if any(folder.glob("*.npz")):
             raise ValueError(f"Argument `checkpoint` names {folder}, which holds chunks of no known map.")
         write_whole(label, json.dumps({"identity": identity}) + "\n")
         return

@@ -15,7 +15,7 @@ from jaxtyping import Array, Complex, Float, Int
 from .._results import RESULTS
 from .._types import check_float64
 from ..models import Integrator, Isolator
-from ._chunks import fingerprint, run_chunks
+from ._chunks import claim_folder, fingerprint, run_chunks
 from ._drive import Sine
 from ._pass import (
     FOUND,
@@ -24,7 +24,7 @@ from ._pass import (
     Found,
     Lane,
     Method,
-    cell_solver,
+    cell_solvers,
     sampled_error,
     states_at_zero,
 )
@@ -36,8 +36,8 @@ from ._symmetry import is_odd
 class StabilityMap(eqx.Module):
     """Periodic orbits and their multipliers over drive amplitude and frequency.
 
-    With `coexisting` every array of a cell has an axis `orbit` in front, by rising displacement; places that a
-    cell does not fill are NaN.
+    With `coexisting` every array of a cell has an axis `orbit` in front, by rising displacement; places that
+    a cell does not fill are NaN.
 
     Attributes:
         model: the isolator.
@@ -103,9 +103,10 @@ def stability_map(
 ) -> StabilityMap:
     """Find the periodic orbits over a grid of drive amplitude and frequency, and their Floquet multipliers.
 
-    The orbits are found first on a coarse grid of displacement amplitude and frequency, over which they do not
-    fold; from there each cell gets a start so good that one step of Newton's method on the period map, with its
-    derivative by `jax.jacfwd` under `vmap`, finishes nearly all. Odd models use the half-period map.
+    The orbits are found first on a coarse grid of displacement amplitude and frequency, over which they do
+    not fold; from there each cell gets a start so good that one step of Newton's method on the period map,
+    with its derivative by `jax.jacfwd` under `vmap`, finishes nearly all. Odd models use the half-period map.
+    Orbits are split at kinks.
 
     Args:
         model: the isolator.
@@ -113,12 +114,12 @@ def stability_map(
         frequencies: ascending and positive [Hz].
         coexisting: whether to give every orbit of a cell; else the one of the smallest motion, to which rest
             leads as the drive grows.
-        reach: displacement up to which orbits are sought, over the largest that grows from rest without a jump
-            anywhere in the window.
+        reach: displacement up to which orbits are sought, over the largest that grows from rest without a
+            jump anywhere in the window.
         integrator: steps a period; 128 steps of RK4 if omitted.
         chunk: orbits computed at once; bounds the memory.
-        checkpoint: folder in which finished chunks are kept; a run that was killed goes on from there and gives
-            the same numbers.
+        checkpoint: folder in which finished chunks are kept; a run that was killed goes on from there and
+            gives the same numbers.
         progress: called with a line now and then.
         devices: devices to spread each chunk over; all of this process if omitted.
 
@@ -146,11 +147,24 @@ def stability_map(
     candidates = find_candidates(surface, forces)
     if not coexisting:
         candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
-    solver = cell_solver(model, integrator, half, surface, forces, devices)
+    # Orbits that pass kinks in another order than most are not split, and computed apart with finer steps.
+    shared = surface.shared[candidates.frequency, candidates.interval]
+    candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
+    groups = np.split(np.arange(shared.size), [int(shared.sum())])
     folder = None if checkpoint is None else Path(checkpoint)
-    identity = fingerprint(model, integrator, forces, band, coexisting, reach, chunk)
-    found = run_chunks(solver, candidates, chunk, folder, identity, progress)
-    error = sampled_error(solver, candidates, found, forces, band)
+    if folder is not None:
+        claim_folder(folder, fingerprint(model, integrator, forces, band, coexisting, reach, chunk))
+    parts, errors = [], []
+    solvers = cell_solvers(model, integrator, half, surface, forces, devices)
+    for name, solver, group in zip(("split", "whole"), solvers, groups, strict=True):
+        if group.size:
+            own = Candidates(*(values[group] for values in candidates))
+            parts.append(run_chunks(solver, own, chunk, folder, name, progress))
+            errors.append(sampled_error(solver, own, parts[-1], forces, band))
+    if not parts:
+        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
+    found = Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    error = float(np.nanmax(errors))
     arrays = _gridded(candidates, found, len(forces), len(band), coexisting)
     code = arrays.pop("code")
     ending = _ending

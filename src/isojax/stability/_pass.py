@@ -176,11 +176,6 @@ class CellSolver(eqx.Module):
     tables: tuple[Any, ...]
     sharding: NamedSharding = eqx.field(static=True)
 
-    @property
-    def kinks(self) -> int:
-        """Count of kinks at which each orbit is split."""
-        return 0 if self.method.sides is None else self.method.sides.shape[0] - 1
-
     def __call__(self, candidates: Candidates, size: int) -> Found:
         """Find the orbits of candidates.
 
@@ -226,7 +221,7 @@ class CellSolver(eqx.Module):
         push = np.hypot(lanes.drive.sine, lanes.drive.cosine)
         direction = np.stack([lanes.drive.sine / push, lanes.drive.cosine / push], axis=-1)
         phases = np.stack(lanes.phases, axis=-1) if lanes.phases else np.zeros((count, 0))
-        swing = lanes.swing
+        swing = np.array(lanes.swing)
         for values in (states, roots, radius, swing):
             values[code != FOUND] = np.nan
         return Found(states, direction, phases, roots, radius, swing, code)
@@ -237,15 +232,15 @@ def _padded(values: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([values, np.repeat(values[-1:], size - values.shape[0], axis=0)])
 
 
-def cell_solver(
+def cell_solvers(
     model: Isolator,
     integrator: Integrator,
     half: bool,
     surface: Surface,
     forces: Float[np.ndarray, " force"],
     devices: Any,
-) -> CellSolver:
-    """Give the solver of a map's cells.
+) -> tuple[CellSolver, CellSolver]:
+    """Give the solvers of a map's cells.
 
     Args:
         model: the isolator.
@@ -256,15 +251,17 @@ def cell_solver(
         devices: to spread chunks over; all local ones if None.
 
     Returns:
-        The solver.
+        That of the orbits which share the order of kinks, and that of the others, which are not split and
+        take four times the steps instead.
     """
     mesh = Mesh(np.asarray(jax.local_devices() if devices is None else devices), ("cell",))
     everywhere = NamedSharding(mesh, PartitionSpec())
     tables = (surface.tables, surface.amplitudes, surface.rest, forces, surface.frequencies)
     placed = tuple(jax.device_put(jnp.asarray(table), everywhere) for table in tables)
-    sides = None if surface.sides is None else jnp.asarray(surface.sides)
-    method = Method(integrator, half, sides)
-    return CellSolver(model, method, placed, NamedSharding(mesh, PartitionSpec("cell")))
+    cells = NamedSharding(mesh, PartitionSpec("cell"))
+    split = Method(integrator, half, jnp.asarray(surface.sides))
+    whole = Method(integrator.with_steps(4 * integrator.steps_per_period), half, None)
+    return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
 
 
 def sampled_error(
@@ -316,12 +313,13 @@ def lanes_of(
         picked: which of them.
 
     Returns:
-        Lanes, on the host.
+        Lanes.
     """
     push = forces[candidates.force[picked]]
-    sine, cosine = (push * part for part in found.direction[picked].T)
-    drive = Sine(sine, cosine, frequencies[candidates.frequency[picked]])
-    return Lane(tuple(found.states[picked].T), drive, tuple(found.phases[picked].T), found.swing[picked])
+    sine, cosine = (jnp.asarray(push * part) for part in found.direction[picked].T)
+    drive = Sine(sine, cosine, jnp.asarray(frequencies[candidates.frequency[picked]]))
+    state, phases = (tuple(jnp.asarray(values[picked].T)) for values in (found.states, found.phases))
+    return Lane(state, drive, phases, jnp.asarray(found.swing[picked]))
 
 
 @eqx.filter_jit

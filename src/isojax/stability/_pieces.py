@@ -98,11 +98,12 @@ def advance_in_pieces(
         beside = None if sides is None else tuple(sides)
         turn = jnp.sin(0.5 * length), jnp.cos(0.5 * length)
 
-        def step(_: Array, here: tuple[State, tuple[Array, Array]]) -> tuple[State, tuple[Array, Array]]:
-            state, angle = here
+        def step(index: Array, here: tuple[State, tuple[Array, Array]]) -> tuple[State, tuple[Array, Array]]:
+            state, begin = here
             # Turned from stage to stage: a sine a stage and lane would cost as much as the law.
-            angles = [angle, angle := _turned(angle, turn), angle := _turned(angle, turn)]
-            at = [drive.at(*pair) for pair in angles]
+            middle = _turned(begin, turn)
+            finish = _turned(middle, turn)
+            at = [drive.at(*angle) for angle in (begin, middle, finish)]
 
             def field(t: float, y: State, args: None) -> State:
                 u, u_rate = at[round(2.0 * t)]
@@ -110,7 +111,7 @@ def advance_in_pieces(
 
             term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
             moved, *_ = integrator.solver.step(term, 0.0, 1.0, state, None, None, False)
-            return moved, angle
+            return moved, finish
 
         last, _ = jax.lax.fori_loop(0, steps, step, (carry, (jnp.sin(start), jnp.cos(start))))
         kinks = model.kinks(last)

@@ -130,7 +130,8 @@ def candidate_starts(
     size = jnp.exp(logarithm + share * spacing)
 
     def at(table: int) -> Lanes:
-        return sum(w * tables[table, column, base + n] for n, w in enumerate(weights))
+        terms = (w * tables[table, column, base + n] for n, w in enumerate(weights))
+        return sum(terms, start=0.0 * size)
 
     sine, cosine = at(0), at(1)
     push = jnp.hypot(sine, cosine)

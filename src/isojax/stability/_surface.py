@@ -1,7 +1,8 @@
-"""The surface of periodic orbits over displacement amplitude and frequency, where it has one sheet.
+"""The surface of periodic orbits over displacement and frequency, where it has one sheet.
 
-Over force and frequency the orbits fold: one force belongs to several of them. Over displacement and frequency
-each point belongs to one force. So the orbits are found there, on a coarse grid, and read off for any force.
+Over force and frequency the orbits fold: one force belongs to several of them. Over displacement and
+frequency each point belongs to one force. So the orbits are found there, on a coarse grid, and read off for
+any force.
 """
 
 import math
@@ -11,7 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 from scipy.interpolate import make_interp_spline
 
 from .._types import Lanes
@@ -20,6 +21,7 @@ from ._describing import imposed_balance, response_amplitudes, rest_displacement
 from ._drive import Sine
 from ._period_map import period_map, trajectory
 from ._pieces import Crossings, find_crossings
+from ._shared_kinks import shared_kinks
 
 _NEWTON = 6
 """Steps of Newton's method on the coarse grid."""
@@ -32,9 +34,6 @@ _FINE = 1024
 
 _CROSSINGS = 16
 """Kinks an orbit to make room for."""
-
-_EDGE = 1e-4
-"""Share of the motion at either end within which a kink counts as lying at the end."""
 
 _SPLINE = 5
 """Degree of the splines between the nodes."""
@@ -50,9 +49,9 @@ class Surface(NamedTuple):
         stiffness: drive in phase (sine) and in quadrature (cosine) over a [N/m].
         internal: internal states at the largest displacement, over a.
         swing: half the peak-to-peak displacement over a.
-        phases: phase of each orbit at which it passes each kink [rad], where all pass the same ones in the
-            same order; else empty.
-        sides: signs of the kinks between these; None where the orbits differ.
+        phases: phase at which each orbit passes each kink [rad], of the kinks that most pass in this order.
+        sides: signs of the kinks between these.
+        shared: whether the orbits of an interval of displacements pass the kinks in this order.
     """
 
     rest: float
@@ -62,7 +61,8 @@ class Surface(NamedTuple):
     internal: Float[np.ndarray, "internal frequency displacement"]
     swing: Float[np.ndarray, "frequency displacement"]
     phases: Float[np.ndarray, "crossing frequency displacement"]
-    sides: Float[np.ndarray, "piece kink"] | None
+    sides: Float[np.ndarray, "piece kink"]
+    shared: Bool[np.ndarray, "frequency interval"]
 
     @property
     def tables(self) -> Float[np.ndarray, "table frequency displacement"]:
@@ -187,37 +187,21 @@ def find_surface(
     )
     shape = (len(band), displacements)
     stiffness, internal, swing = (np.asarray(table).reshape(*shape, -1) for table in found[:3])
-    phases, sides = _common_crossings(found[3], math.pi if half else 2.0 * math.pi)
-    tables = np.concatenate([stiffness, internal, swing, phases.reshape(*shape, -1)], axis=-1)
+    kinks = shared_kinks(found[3], shape, math.pi if half else 2.0 * math.pi)
+    tables = np.concatenate([stiffness, internal, swing, kinks.phases], axis=-1)
     if not single and len(frequencies) > columns:
         tables = make_interp_spline(band, tables, k=_SPLINE, axis=0)(frequencies)
     fine = np.geomspace(low, high, _FINE)
     tables = make_interp_spline(np.log(coarse), tables, k=_SPLINE, axis=1)(np.log(fine))
     tables = np.ascontiguousarray(np.moveaxis(tables, -1, 0))
     last = 2 + model.internal_states
+    rows = np.searchsorted(band, frequencies).clip(0, len(band) - 1)
+    middles = np.sqrt(fine[:-1] * fine[1:])
+    shared = kinks.shared[rows][:, np.searchsorted(coarse, middles).clip(0, displacements - 1)]
+    phases = tables[last + 1 :]
     return Surface(
-        rest, fine, frequencies, tables[:2], tables[2:last], tables[last], tables[last + 1 :], sides
+        rest, fine, frequencies, tables[:2], tables[2:last], tables[last], phases, kinks.sides, shared
     )
-
-
-def _common_crossings(
-    crossings: Crossings, end: float
-) -> tuple[Float[np.ndarray, "node crossing"], Float[np.ndarray, "piece kink"] | None]:
-    """Give the kinks that all orbits pass in the same order, but for those at the ends of the motion."""
-    phases, kinks, sides = (np.asarray(value) for value in crossings[:3])
-    # The motion begins and, if symmetric, ends at an extreme, where the velocity passes zero.
-    inner = (kinks >= 0) & (phases > _EDGE * end) & (phases < (1.0 - _EDGE) * end)
-    count = int(inner[0].sum())
-    order = np.argsort(~inner, axis=1, kind="stable")
-    first = np.take_along_axis(np.where(inner, kinks, -1), order, axis=1)
-    if not bool(np.all(crossings.complete)) or np.any(first != first[0]):
-        return np.zeros((len(phases), 0)), None
-    if len({sides_of.tobytes() for sides_of in sides[:, :1]}) > 1:
-        return np.zeros((len(phases), 0)), None
-    phases = np.take_along_axis(phases, order, axis=1)[:, :count]
-    # The sides of a piece are those in its middle, beyond every crossing at the edge before.
-    before = int(np.sum((kinks[0] >= 0) & (np.asarray(crossings.phases)[0] <= _EDGE * end)))
-    return phases, sides[0][before : before + count + 1]
 
 
 def _chebyshev(start: float, stop: float, count: int) -> Float[np.ndarray, " node"]:
