@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from .._parameters import list_parameters
 from ..models import Isolator
-from ..records import Record
+from ..records import Record, ringing_frequency
 from ._elimination import Nuisances, step_nuisances
 from ._problem import Bench, Point, Problem
 from ._segments import Segment
@@ -13,7 +13,7 @@ from ._segments import Segment
 ROUNDS = 3
 """Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
 
-RELEASED_ROUNDS = 12
+RELEASED_ROUNDS = 30
 """The same where a record begins with a release: its first states are poorly known, its motion is large."""
 
 HALVINGS = 5
@@ -24,6 +24,9 @@ HELD = 1e-9
 
 SETTLED = 1e-2
 """Change of chi2, per max(chi2/dof, 1), below which the nuisances stand."""
+
+FIRST_SWINGS = 1.0
+"""Periods after a release over which its state is sought first."""
 
 SMALL_STEP = 1e-4
 """Step of a state, over its range, that no longer counts."""
@@ -41,11 +44,38 @@ def best_nuisances(bench: Bench, model: Isolator, spread: float, known: Nuisance
     Returns:
         The point; no coefficient has a column.
     """
+    released = any(record.kind == "free_decay" for record in bench.problem.records)
+    begin = bench.settle(known, model, len(model.elements), spread)
+    if released and known is None:
+        begin = _first_swings(bench, model, begin)
+    return _settle_from(bench, model, begin, released)
+
+
+def _first_swings(bench: Bench, model: Isolator, begin: Nuisances) -> Nuisances:
+    """Find the states from which the first swings of each segment follow: over them no phase can run off."""
+    problem, carried = bench.problem, len(model.elements)
+
+    def first(segment: Segment) -> Segment:
+        record = problem.records[segment.record]
+        length = round(FIRST_SWINGS * record.rate / ringing_frequency(record.output, record.rate))
+        return segment._replace(stop=min(segment.stop, max(segment.start, segment.counted) + max(length, 8)))
+
+    short = Bench(problem._replace(segments=tuple(map(first, problem.segments)), heads=()), bench.at_rest)
+    found = _settle_from(short, model, short.settle(None, model, carried, begin.stiffness_spread), True)
+    if not found.is_finite:
+        return begin
+    own, scales = short.starts(model, short.prepared(model, carried))
+    starts, units = bench.starts(model, bench.prepared(model, carried))
+    states = own + scales * found.nuisances.states.T
+    return begin._replace(states=((states - starts) / units).T)
+
+
+def _settle_from(bench: Bench, model: Isolator, begin: Nuisances, released: bool) -> Point:
+    """Take Gauss-Newton steps of the nuisances until they stand."""
     nothing = np.zeros((len(list_parameters(model)), 0))
     carried = len(model.elements)
-    point = bench.evaluate(model, nothing, bench.settle(known, model, carried, spread))
+    point = bench.evaluate(model, nothing, begin)
     owner = bench.prepared(model, carried).record
-    released = any(record.kind == "free_decay" for record in bench.problem.records)
     for _ in range(RELEASED_ROUNDS if released else ROUNDS):
         if not point.is_finite:
             break
