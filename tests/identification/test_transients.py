@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from isojax import close_loop, read_campaign, rig
@@ -42,6 +43,10 @@ def test_the_loop_comes_to_none_where_the_model_is_complete(kind, tmp_path):
         # Standard errors know nothing of the drift of the stiffness from record to record, 5e-4 of it.
         assert abs(float(loop.after.model[name]) - truth) < 4.0 * errors[name] + 1e-3 * truth
     assert loop.after.errors["holdout"].chi2_per_dof == pytest.approx(1.0, abs=0.15)
+    # Free runs and restarts alike leave the noise of the sensor and nothing else.
+    assert loop.after.errors["fit"].rmse == pytest.approx(NOISE, rel=0.05)
+    for run in (*loop.after.free_runs, *loop.after.restarts.runs):
+        assert np.std(run.residual) == pytest.approx(NOISE, rel=0.08)
     loop.report(tmp_path / "out")
     result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert result["schema"] == 1

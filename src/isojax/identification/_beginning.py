@@ -13,8 +13,11 @@ from ._segments import Segment
 ROUNDS = 3
 """Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
 
-RELEASED_ROUNDS = 30
+RELEASED_ROUNDS = 12
 """The same where a record begins with a release: its first states are poorly known, its motion is large."""
+
+WORSE = 1.1
+"""Factor on the error of a record up to which a step stands: chi2 is that at the end of the next one."""
 
 HALVINGS = 5
 """How often the step of a record is halved before it is given up."""
@@ -61,7 +64,7 @@ def _first_swings(bench: Bench, model: Isolator, begin: Nuisances) -> Nuisances:
         return segment._replace(stop=min(segment.stop, max(segment.start, segment.counted) + max(length, 8)))
 
     short = Bench(problem._replace(segments=tuple(map(first, problem.segments)), heads=()), bench.at_rest)
-    found = _settle_from(short, model, short.settle(None, model, carried, begin.stiffness_spread), True)
+    found = _settle_from(short, model, short.settle(None, model, carried, HELD), True)
     if not found.is_finite:
         return begin
     own, scales = short.starts(model, short.prepared(model, carried))
@@ -99,7 +102,7 @@ def _shortened(bench: Bench, before: Point, after: Point, owner: Int[np.ndarray,
     known, share = before.reduced.by_record[:, -1, -1], np.ones(before.samples.size)
     old, new, found = before.nuisances, after.nuisances, after
     for halving in range(HALVINGS + 1):
-        worse = ~(found.reduced.by_record[:, -1, -1] <= known * (1.0 + 1e-9))
+        worse = ~(found.reduced.by_record[:, -1, -1] <= WORSE * known + 1.0)
         if not np.any(worse):
             break
         share = np.where(worse, 0.5 * share if halving < HALVINGS else 0.0, share)
