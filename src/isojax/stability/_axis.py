@@ -1,0 +1,36 @@
+"""Checking the values over which something is worked out."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+
+def ascending(name: str, values: Any, *, positive: bool = True) -> Float[np.ndarray, " axis"]:
+    """Give a list of ascending numbers.
+
+    Args:
+        name: of the argument.
+        values: the numbers.
+        positive: whether each must be above zero.
+
+    Returns:
+        The numbers.
+
+    Raises:
+        ValueError: if the list is empty, does not ascend, or a number is not finite or not positive.
+    """
+    axis = np.asarray(values, dtype=float)
+    if axis.ndim != 1 or not axis.size:
+        raise ValueError(f"Argument `{name}` must be a list of numbers, but has shape {axis.shape}.")
+    bad = np.flatnonzero(~(np.isfinite(axis) & ((axis > 0.0) | (not positive))))
+    if bad.size:
+        wanted = "positive" if positive else "finite"
+        raise ValueError(f"Argument `{name}` must be {wanted}, but {name}[{bad[0]}] = {axis[bad[0]]}.")
+    bad = np.flatnonzero(np.diff(axis) <= 0.0)
+    if bad.size:
+        place = bad[0] + 1
+        raise ValueError(
+            f"Argument `{name}` must ascend, but {name}[{place}] = {axis[place]} follows {axis[place - 1]}."
+        )
+    return axis
