@@ -89,9 +89,9 @@ def close_motion(
         moved = period_map(there, integrator, push, tuple(scaled * scale), turns=turns)
         return jnp.stack(moved) / scale - scaled
 
-    rough = optx.root_find(open_end, solver, start / scale, (model, drive), max_steps=50, throw=False)
-    near = jax.lax.stop_gradient(rough.value)
     frozen, held = jax.lax.stop_gradient((model, drive))
+    begin = jax.lax.stop_gradient(start / scale)
+    near = optx.root_find(open_end, solver, begin, (frozen, held), max_steps=50, throw=False).value
     path = trajectory(frozen, integrator, held, tuple(near * scale), turns=turns)
     crossings = find_crossings(frozen, path, end, places)
     kink_scale = _kink_scale(frozen, path, crossings)
@@ -107,34 +107,36 @@ def close_motion(
         shut = sign * jnp.stack(moved) / scale - scaled
         return jnp.concatenate([shut, jnp.where(crossings.kinks >= 0, reached / kink_scale, phases - end)])
 
-    def matrix(unknown: Array, args: tuple[Isolator, Sine, Int[Array, ""]]) -> Array:
-        jacobian = jax.jacfwd(apart)(unknown, args)
-        upper, lower = jacobian[:states], jacobian[states:]
-        own = upper[:, :states] + jnp.eye(states)
-        return own - upper[:, states:] @ jnp.linalg.solve(lower[:, states:], lower[:, :states])
+    def matrices(
+        unknown: Array, there: Isolator, push: Sine, steps: Int[Array, " trial"]
+    ) -> tuple[Float[Array, "trial state state"], Float[Array, " trial"]]:
+        """Give the derivative of the map, and what is left open, for several counts of steps."""
 
-    def closed(unknown: Array, steps: Int[Array, ""]) -> Array:
-        args = (frozen, held, steps)
-        return jax.lax.stop_gradient(
-            optx.root_find(apart, solver, unknown, args, max_steps=20, throw=False).value
-        )
+        def matrix(count: Int[Array, ""]) -> tuple[Array, Array]:
+            def twice(unknown: Array) -> tuple[Array, Array]:
+                left = apart(unknown, (there, push, count))
+                return left, left
 
-    pieces = places + 1
-    least = max(_FEWEST_STEPS, integrator.steps_a_period(model) // pieces)
-    coarse = jnp.asarray(least)
-    first = closed(jnp.concatenate([near, crossings.phases]), coarse)
-    apart_by = jnp.max(
-        jnp.abs(matrix(first, (frozen, held, coarse)) - matrix(first, (frozen, held, 2 * coarse)))
-    )
+            jacobian, left = jax.jacfwd(twice, has_aux=True)(unknown)
+            upper, lower = jacobian[:states], jacobian[states:]
+            own = upper[:, :states] + jnp.eye(states)
+            bent = upper[:, states:] @ jnp.linalg.solve(lower[:, states:], lower[:, :states])
+            return own - bent, jnp.max(jnp.abs(left))
+
+        # One after the other, so that the motion is compiled once for all of them.
+        return jax.lax.map(matrix, steps)
+
+    least = max(_FEWEST_STEPS, integrator.steps_a_period(model) // (places + 1))
+    first = jnp.concatenate([near, crossings.phases])
+    trials, _ = matrices(first, frozen, held, jnp.array([least, 2 * least]))
     # Fourth order: sixteen times less a doubling.
+    apart_by = jnp.max(jnp.abs(trials[0] - trials[1]))
     doublings = jnp.ceil(jnp.log2(apart_by / integrator.multiplier_tolerance) / 4.0) + 1.0
     wanted = least * 2.0 ** jnp.clip(jnp.where(jnp.isfinite(doublings), doublings, 0.0), 1.0, 20.0)
-    steps = jnp.minimum(wanted, _MOST_STEPS).astype(int)
+    steps = jax.lax.stop_gradient(jnp.minimum(wanted, _MOST_STEPS).astype(int))
     final = optx.root_find(apart, solver, first, (model, drive, steps), max_steps=20, throw=False)
-    transition = matrix(final.value, (model, drive, steps))
-    error = jnp.max(jnp.abs(transition - matrix(final.value, (model, drive, steps // 2)))) / 15.0
-    left = apart(final.value, (model, drive, steps))
-    mismatch = jnp.max(jnp.abs(left))
+    (transition, coarser), (mismatch, _) = matrices(final.value, model, drive, jnp.stack([steps, steps // 2]))
+    error = jnp.max(jnp.abs(transition - coarser)) / 15.0
     found = jnp.isfinite(mismatch) & (mismatch < 1e3 * integrator.orbit_tolerance)
     return Closed(
         final.value[:states] * scale,
