@@ -31,22 +31,22 @@ class BranchPoints(eqx.Module):
         tangent: unit vector along the branch, of the scaled state and the share of the parameter's range.
     """
 
-    value: Float[Array, "*branch point"]
-    amplitude: Float[Array, "*branch point"]
-    frequency: Float[Array, "*branch point"]
-    y0: Float[Array, "*branch point state"]
-    response: Float[Array, "*branch point"]
-    multipliers: Complex[Array, "*branch point multiplier"]
-    half_period_multipliers: Complex[Array, "*branch point multiplier"]
-    tangent: Float[Array, "*branch point unknown"]
+    value: Float[Array, "*points"]
+    amplitude: Float[Array, "*points"]
+    frequency: Float[Array, "*points"]
+    y0: Float[Array, "*points state"]
+    response: Float[Array, "*points"]
+    multipliers: Complex[Array, "*points multiplier"]
+    half_period_multipliers: Complex[Array, "*points multiplier"]
+    tangent: Float[Array, "*points unknown"]
 
     @property
-    def spectral_radius(self) -> Float[Array, "*branch point"]:
+    def spectral_radius(self) -> Float[Array, "*points"]:
         """Largest modulus of the multipliers."""
         return modulus(self.multipliers[..., 0])
 
     @property
-    def stable(self) -> Bool[Array, "*branch point"]:
+    def stable(self) -> Bool[Array, "*points"]:
         """Whether every disturbance dies out."""
         return self.spectral_radius < 1.0
 

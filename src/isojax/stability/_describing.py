@@ -35,7 +35,7 @@ def rest_displacement(model: Isolator) -> Float[Array, ""]:
         state = (x, 0.0 * x, *(0.0 * x,) * model.internal_states)
         return model.acceleration(state, jnp.zeros_like(x))
 
-    def improve(_: int, x: Array) -> Array:
+    def improve(_: Array | int, x: Array) -> Array:
         value, slope = jax.jvp(balance, (x,), (jnp.ones_like(x),))
         moved = x - value / jnp.where(slope == 0.0, 1.0, slope)
         return jnp.where(jnp.isfinite(moved) & (slope != 0.0), moved, x)
@@ -101,15 +101,15 @@ def imposed_balance(
 
     Source: the paper, eqs. (7) and (8).
     """
-    omega = 2.0 * math.pi * frequency
+    size, omega = jnp.asarray(amplitude)[None], 2.0 * math.pi * jnp.asarray(frequency)[None]
     phase = (2.0 * np.pi / _SAMPLES * np.arange(_SAMPLES)).reshape(
         -1, *(1,) * jnp.ndim(amplitude * frequency)
     )
     cosine, sine = np.cos(phase), np.sin(phase)
-    x, v = rest + amplitude * cosine, -amplitude * omega * sine
+    x, v = rest + size * cosine, -size * omega * sine
     internal = imposed_internal(model, x, v, frequency)
     # Without a drive the acceleration is -force / inertia; what is missing for the imposed one is the drive.
-    missing = -amplitude * omega**2 * cosine - model.acceleration((x, v, *internal), 0.0 * x)
+    missing = -size * omega**2 * cosine - model.acceleration((x, v, *internal), 0.0 * x)
     unit = model.acceleration((x, v, *internal), 0.0 * x + 1.0) - model.acceleration(
         (x, v, *internal), 0.0 * x
     )

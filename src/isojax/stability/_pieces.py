@@ -56,8 +56,8 @@ def find_crossings(model: Isolator, path: State, end: float, places: int) -> Cro
     phases = jnp.where(used, (row + share) * (end / (samples - 1)), end)
     order = jnp.argsort(phases)
     phases, kink = phases[order], jnp.where(used, column, -1)[order]
-    turns = jnp.where(kink[:, None] == jnp.arange(kinks), -1.0, 1.0)
-    sides = jnp.concatenate([signs[:1], signs[0] * jnp.cumprod(turns, axis=0)])
+    turns = jnp.where(kink[:, None] == jnp.arange(kinks)[None], -1.0, 1.0)
+    sides = jnp.concatenate([signs[:1], signs[:1] * jnp.cumprod(turns, axis=0)])
     return Crossings(phases, kink, sides, jnp.sum(crossed) <= places)
 
 

@@ -1,7 +1,5 @@
 """Bifurcations along a branch: test function, change of sign, bisection, and then the extended equations."""
 
-from typing import Any
-
 import diffrax
 import equinox as eqx
 import jax
@@ -220,12 +218,12 @@ def find_special_points(
 
 
 def _judge(
-    which: int,
+    which: int | np.integer,
     periods: int,
     half: bool,
     odd: bool,
-    matrix: np.ndarray[Any, Any],
-    repeats: np.ndarray[Any, Any],
+    matrix: np.ndarray,
+    repeats: np.ndarray,
 ) -> tuple[Kind | None, int, bool]:
     """Say which bifurcation a sign change is, of which orbit."""
     mirrored, repeated = repeats < _MIRRORED
