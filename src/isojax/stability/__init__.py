@@ -1,5 +1,7 @@
 """What the identified isolator does: periodic orbits, their multipliers, maps, branches, bifurcations."""
 
+from ._basins import BasinsOfAttraction as BasinsOfAttraction
+from ._basins import basins_of_attraction as basins_of_attraction
 from ._bifurcation_diagram import BifurcationDiagram as BifurcationDiagram
 from ._bifurcation_diagram import bifurcation_diagram as bifurcation_diagram
 from ._branch import Branch as Branch
@@ -22,4 +24,6 @@ from ._phase_portrait import PhasePortrait as PhasePortrait
 from ._phase_portrait import phase_portrait as phase_portrait
 from ._poincare import PoincareSection as PoincareSection
 from ._poincare import poincare_section as poincare_section
+from ._return_to_orbit import ReturnToOrbit as ReturnToOrbit
+from ._return_to_orbit import return_to_orbit as return_to_orbit
 from ._switching import switch_branch as switch_branch
