@@ -78,22 +78,29 @@ from .reporting import write_report as write_report
 from .stability import BasinsOfAttraction as BasinsOfAttraction
 from .stability import BifurcationDiagram as BifurcationDiagram
 from .stability import Branch as Branch
+from .stability import Floquet as Floquet
 from .stability import FoldCurve as FoldCurve
+from .stability import HarmonicBalance as HarmonicBalance
 from .stability import LyapunovExponent as LyapunovExponent
+from .stability import Orbit as Orbit
 from .stability import PeriodDoublingCurve as PeriodDoublingCurve
 from .stability import PhasePortrait as PhasePortrait
 from .stability import PoincareSection as PoincareSection
 from .stability import ReturnToOrbit as ReturnToOrbit
 from .stability import SpecialPoint as SpecialPoint
+from .stability import StabilityMap as StabilityMap
 from .stability import basins_of_attraction as basins_of_attraction
 from .stability import bifurcation_diagram as bifurcation_diagram
 from .stability import continue_branch as continue_branch
+from .stability import find_periodic_orbit as find_periodic_orbit
 from .stability import fold_curve as fold_curve
+from .stability import harmonic_balance as harmonic_balance
 from .stability import largest_lyapunov_exponent as largest_lyapunov_exponent
 from .stability import period_doubling_curve as period_doubling_curve
 from .stability import phase_portrait as phase_portrait
 from .stability import poincare_section as poincare_section
 from .stability import return_to_orbit as return_to_orbit
+from .stability import stability_map as stability_map
 from .stability import switch_branch as switch_branch
 
 __version__ = _version("isojax")

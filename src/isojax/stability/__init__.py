@@ -12,6 +12,8 @@ from ._curves import Cusp as Cusp
 from ._curves import FoldCurve as FoldCurve
 from ._curves import PeriodDoublingCurve as PeriodDoublingCurve
 from ._floquet import Floquet as Floquet
+from ._harmonic_balance import HarmonicBalance as HarmonicBalance
+from ._harmonic_balance import harmonic_balance as harmonic_balance
 from ._locus import fold_curve as fold_curve
 from ._locus import period_doubling_curve as period_doubling_curve
 from ._lyapunov import LyapunovExponent as LyapunovExponent

@@ -108,11 +108,19 @@ def close_motion(
         return jnp.concatenate([shut, jnp.where(crossings.kinks >= 0, reached / kink_scale, phases - end)])
 
     def matrices(
-        unknown: Array, there: Isolator, push: Sine, steps: Int[Array, " trial"]
-    ) -> tuple[Float[Array, "trial state state"], Float[Array, " trial"]]:
-        """Give the derivative of the map, and what is left open, for several counts of steps."""
+        unknown: Array,
+        there: Isolator,
+        push: Sine,
+        steps: Int[Array, " trial"],
+        polish: Bool[Array, " trial"],
+    ) -> tuple[Array, tuple[Float[Array, "trial state state"], Float[Array, " trial"]]]:
+        """Give the unknown, polished by a step of Newton where wanted, and before it the map's derivative
+        and what is left open, for one count of steps after the other.
+        """
 
-        def matrix(count: Int[Array, ""]) -> tuple[Array, Array]:
+        def body(unknown: Array, trial: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
+            count, wanted = trial
+
             def twice(unknown: Array) -> tuple[Array, Array]:
                 left = apart(unknown, (there, push, count))
                 return left, left
@@ -121,25 +129,31 @@ def close_motion(
             upper, lower = jacobian[:states], jacobian[states:]
             own = upper[:, :states] + jnp.eye(states)
             bent = upper[:, states:] @ jnp.linalg.solve(lower[:, states:], lower[:, :states])
-            return own - bent, jnp.max(jnp.abs(left))
+            step = jnp.linalg.solve(jax.lax.stop_gradient(jacobian), left)
+            return unknown - jnp.where(wanted, step, 0.0), (own - bent, jnp.max(jnp.abs(left)))
 
-        # One after the other, so that the motion is compiled once for all of them.
-        return jax.lax.map(matrix, steps)
+        # Looped over, so that the motion is compiled once for all of them.
+        return jax.lax.scan(body, unknown, (steps, polish))
 
     least = max(_FEWEST_STEPS, integrator.steps_a_period(model) // (places + 1))
     first = jnp.concatenate([near, crossings.phases])
-    trials, _ = matrices(first, frozen, held, jnp.array([least, 2 * least]))
+    _, (trials, _) = matrices(first, frozen, held, jnp.array([least, 2 * least]), jnp.zeros(2, bool))
     # Fourth order: sixteen times less a doubling.
     apart_by = jnp.max(jnp.abs(trials[0] - trials[1]))
     doublings = jnp.ceil(jnp.log2(apart_by / integrator.multiplier_tolerance) / 4.0) + 1.0
     wanted = least * 2.0 ** jnp.clip(jnp.where(jnp.isfinite(doublings), doublings, 0.0), 1.0, 20.0)
     steps = jax.lax.stop_gradient(jnp.minimum(wanted, _MOST_STEPS).astype(int))
-    final = optx.root_find(apart, solver, first, (model, drive, steps), max_steps=20, throw=False)
-    (transition, coarser), (mismatch, _) = matrices(final.value, model, drive, jnp.stack([steps, steps // 2]))
-    error = jnp.max(jnp.abs(transition - coarser)) / 15.0
+    root = optx.root_find(apart, solver, first, (frozen, held, steps), max_steps=20, throw=False).value
+    # The first two steps, with the live model and a frozen Jacobian, change nothing but derivatives, which
+    # become those of the implicit function: each step puts one order right. optimistix's own implicit
+    # derivative raises an error where the search failed, but a lane of a batch must not stop the others.
+    counts = jnp.stack([steps, steps, steps, steps // 2])
+    final, (transitions, left) = matrices(root, model, drive, counts, jnp.arange(4) < 2)
+    transition, mismatch = transitions[2], left[2]
+    error = jnp.max(jnp.abs(transition - transitions[3])) / 15.0
     found = jnp.isfinite(mismatch) & (mismatch < 1e3 * integrator.orbit_tolerance)
     return Closed(
-        final.value[:states] * scale,
+        final[:states] * scale,
         scale[:, None] * transition / scale,
         jax.lax.stop_gradient(error),
         jax.lax.stop_gradient(mismatch),

@@ -11,7 +11,8 @@ import optimistix as optx
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
-from .._results import RESULTS
+from .._parameters import list_parameters
+from .._results import RESULTS, is_successful
 from .._types import Lanes, as_float64, check_float64
 from ..excitations import Harmonic
 from ..models import Integrator, Isolator
@@ -19,6 +20,7 @@ from ._closure import Closed, close_motion
 from ._describing import response_start
 from ._drive import recorded_sine
 from ._floquet import Floquet, multipliers
+from ._harmonic_balance import harmonic_balance
 from ._period_map import trajectory
 from ._symmetry import is_odd
 
@@ -107,7 +109,8 @@ def find_periodic_orbit(
     Args:
         model: the isolator.
         excitation: the drive.
-        start: state at t = 0 to start from; the one-harmonic balance with the smallest motion if omitted.
+        start: state at t = 0 to start from; the one-harmonic balance with the smallest motion if omitted, and
+            where this leads nowhere (and is not inside `jax.jit` or `jax.vmap`) the balance of several.
         periods: drive periods after which the motion repeats (2 for an orbit of doubled period).
         symmetric: whether to close half a period on minus itself, at which only symmetric orbits of odd
             models close; if omitted, so for an odd model without a `start`.
@@ -137,7 +140,10 @@ def find_periodic_orbit(
     if not isinstance(frequency, Tracer) and not 0.0 < float(frequency) < math.inf:
         raise ValueError(f"Argument `excitation` must have a positive frequency, but it is {frequency} Hz.")
     odd = periods == 1 and (symmetric or (symmetric is None and start is None))
-    half = odd and is_odd(jax.lax.stop_gradient(model))
+    frozen = jax.lax.stop_gradient(model)
+    # Of a model that is being traced nothing can be said; whoever asks for symmetric orbits then knows.
+    traced = any(isinstance(entry.value, Tracer) for entry in list_parameters(frozen))
+    half = odd and (bool(symmetric) if traced else is_odd(frozen))
     if symmetric and not half:
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
     begin = None if start is None else jnp.stack([as_float64(value) for value in start])
@@ -148,6 +154,10 @@ def find_periodic_orbit(
     while not isinstance(closed[0].split, Tracer) and not closed[0].split and places < 64 * kinks:
         places *= 2
         closed = _solve(model, excitation, begin, integrator, solver, turns, places)
+    if begin is None and not isinstance(closed[0].found, Tracer) and not closed[0].found:
+        balance = harmonic_balance(*jax.lax.stop_gradient((model, excitation)), integrator=integrator)
+        if is_successful(balance.result):
+            closed = _solve(model, excitation, balance.y0, integrator, solver, turns, places)
     return _orbit(model, excitation, periods, half, integrator, *closed)
 
 
