@@ -87,6 +87,7 @@ from .stability import PeriodDoublingCurve as PeriodDoublingCurve
 from .stability import PhasePortrait as PhasePortrait
 from .stability import PoincareSection as PoincareSection
 from .stability import ReturnToOrbit as ReturnToOrbit
+from .stability import Sensitivity as Sensitivity
 from .stability import SpecialPoint as SpecialPoint
 from .stability import StabilityMap as StabilityMap
 from .stability import basins_of_attraction as basins_of_attraction
@@ -100,6 +101,7 @@ from .stability import period_doubling_curve as period_doubling_curve
 from .stability import phase_portrait as phase_portrait
 from .stability import poincare_section as poincare_section
 from .stability import return_to_orbit as return_to_orbit
+from .stability import sensitivity as sensitivity
 from .stability import stability_map as stability_map
 from .stability import switch_branch as switch_branch
 

@@ -75,9 +75,7 @@ class Integrator(eqx.Module):
         Returns:
             The integrator.
         """
-        return Integrator(
-            self.solver, self.substeps, self.rtol, self.atol, self.max_steps, steps_per_period
-        )
+        return Integrator(self.solver, self.substeps, self.rtol, self.atol, self.max_steps, steps_per_period)
 
     @property
     def orbit_tolerance(self) -> float:
@@ -88,6 +86,11 @@ class Integrator(eqx.Module):
     def multiplier_tolerance(self) -> float:
         """Integration error of the multipliers of a single orbit to which it is refined."""
         return 1e-11
+
+    @property
+    def map_error(self) -> float:
+        """Error of a map's multipliers to which its steps are chosen, where none are asked for."""
+        return 1e-5
 
     @property
     def map_tolerance(self) -> float:

@@ -28,4 +28,6 @@ from ._poincare import PoincareSection as PoincareSection
 from ._poincare import poincare_section as poincare_section
 from ._return_to_orbit import ReturnToOrbit as ReturnToOrbit
 from ._return_to_orbit import return_to_orbit as return_to_orbit
+from ._sensitivity import Sensitivity as Sensitivity
+from ._sensitivity import sensitivity as sensitivity
 from ._switching import switch_branch as switch_branch

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float, Int
+from jaxtyping import Array, Bool, Complex, Float, Int
 
 from .._results import RESULTS
 from .._types import check_float64
@@ -27,10 +27,14 @@ from ._pass import (
     cell_solvers,
     sampled_error,
     states_at_zero,
+    steps_needed,
 )
 from ._starts import Candidates, find_candidates
 from ._surface import find_surface
 from ._symmetry import is_odd
+
+_FEWEST = 64
+"""Steps a period that are tried first."""
 
 
 class StabilityMap(eqx.Module):
@@ -47,13 +51,15 @@ class StabilityMap(eqx.Module):
         multipliers: Floquet multipliers over one drive period.
         start: state of each orbit at the phase at which it is largest.
         direction: drive over its amplitude, sine and cosine part, with the phase counted from there.
-        phases: where each orbit passes kinks, counted from there; empty where orbits are not split.
+        phases: where each orbit passes kinks, counted from there.
+        sides: signs of the kinks on the pieces between, alike for all orbits that are split.
+        split: whether an orbit was split there; else it was integrated with four times the steps.
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
         result: how the search ended in each cell; beside NaN, why.
         error: largest integration error of a multiplier in a sample of cells, against steps four times finer.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
-        integrator: steps a period.
+        integrator: steps a period that were taken.
     """
 
     model: Isolator
@@ -64,6 +70,8 @@ class StabilityMap(eqx.Module):
     start: Float[Array, "*orbit amplitude frequency state"]
     direction: Float[Array, "*orbit amplitude frequency 2"]
     phases: Float[Array, "*orbit amplitude frequency crossing"]
+    sides: Float[Array, "piece kink"]
+    split: Bool[Array, "*orbit amplitude frequency"]
     response: Float[Array, "*orbit amplitude frequency"]
     count: Int[Array, "amplitude frequency"]
     result: RESULTS
@@ -116,7 +124,7 @@ def stability_map(
             leads as the drive grows.
         reach: displacement up to which orbits are sought, over the largest that grows from rest without a
             jump anywhere in the window.
-        integrator: steps a period; 128 steps of RK4 if omitted.
+        integrator: steps a period; RK4 with as many as a sample of orbits needs if omitted.
         chunk: orbits computed at once; bounds the memory.
         checkpoint: folder in which finished chunks are kept; a run that was killed goes on from there and
             gives the same numbers.
@@ -134,7 +142,7 @@ def stability_map(
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
     """
     check_float64()
-    integrator = Integrator() if integrator is None else integrator
+    asked, integrator = integrator, Integrator() if integrator is None else integrator
     forces, band = _axis("amplitudes", amplitudes), _axis("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:
         raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
@@ -147,10 +155,17 @@ def stability_map(
     candidates = find_candidates(surface, forces)
     if not coexisting:
         candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
+    if not candidates.force.size:
+        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
     # Orbits that pass kinks in another order than most are not split, and computed apart with finer steps.
     shared = surface.shared[candidates.frequency, candidates.interval]
     candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
     groups = np.split(np.arange(shared.size), [int(shared.sum())])
+    if asked is None:
+        trial = cell_solvers(model, integrator.with_steps(_FEWEST), half, surface, forces, devices)
+        first = 0 if shared.any() else 1
+        own = Candidates(*(values[groups[first]] for values in candidates))
+        integrator = integrator.with_steps(steps_needed(trial[first], own, forces, band))
     folder = None if checkpoint is None else Path(checkpoint)
     if folder is not None:
         claim_folder(folder, fingerprint(model, integrator, forces, band, coexisting, reach, chunk))
@@ -161,11 +176,10 @@ def stability_map(
             own = Candidates(*(values[group] for values in candidates))
             parts.append(run_chunks(solver, own, chunk, folder, name, progress))
             errors.append(sampled_error(solver, own, parts[-1], forces, band))
-    if not parts:
-        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
     found = Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     error = float(np.nanmax(errors))
-    arrays = _gridded(candidates, found, len(forces), len(band), coexisting)
+    split = np.sort(shared)[::-1]
+    arrays = _gridded(candidates, found, split, len(forces), len(band), coexisting)
     code = arrays.pop("code")
     ending = _ending
     for _ in range(code.ndim):
@@ -177,6 +191,7 @@ def stability_map(
         frequencies=jnp.asarray(band),
         result=result,
         error=error,
+        sides=jnp.asarray(surface.sides),
         symmetric=half,
         integrator=integrator,
         **{name: jnp.asarray(values) for name, values in arrays.items()},
@@ -190,7 +205,7 @@ def _ending(code: Array) -> RESULTS:
 
 
 def _gridded(
-    candidates: Candidates, found: Found, rows: int, columns: int, coexisting: bool
+    candidates: Candidates, found: Found, split: np.ndarray, rows: int, columns: int, coexisting: bool
 ) -> dict[str, np.ndarray]:
     """Put the orbits into their cells; a cell in which none was found says that nothing converged."""
     orbits = int(candidates.order.max()) + 1 if candidates.order.size else 1
@@ -203,6 +218,9 @@ def _gridded(
         grid = np.full((orbits, rows, columns, *values.shape[1:]), np.nan, dtype=values.dtype)
         grid[place] = values
         arrays[public] = grid if coexisting else grid[0]
+    together = np.zeros((orbits, rows, columns), dtype=bool)
+    together[place] = split
+    arrays["split"] = together if coexisting else together[0]
     code = np.full((orbits, rows, columns), NOT_CONVERGED, dtype=np.int8)
     code[place] = found.code
     arrays["code"] = code if coexisting else code[0]

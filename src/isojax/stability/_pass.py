@@ -25,6 +25,9 @@ _PASSES = 12
 _SAMPLED = 1024
 """Cells of which the integration error is found."""
 
+_FINER = 4
+"""Times the steps of a map with which its error is found."""
+
 _LEFTOVERS = 4096
 """Cells that share a further pass, where the first did not do."""
 
@@ -82,6 +85,17 @@ class Method(eqx.Module):
     integrator: Integrator
     half: bool = eqx.field(static=True)
     sides: Float[Array, "piece kink"] | None
+
+    def with_integrator(self, integrator: Integrator) -> "Method":
+        """Give the same way with other steps.
+
+        Args:
+            integrator: steps a period.
+
+        Returns:
+            The method.
+        """
+        return Method(integrator, self.half, self.sides)
 
     def moved(self, model: Isolator, lane: Lane) -> State:
         """Give the state one period later, or minus the state half a period later.
@@ -176,31 +190,34 @@ class CellSolver(eqx.Module):
     tables: tuple[Any, ...]
     sharding: NamedSharding = eqx.field(static=True)
 
-    def __call__(self, candidates: Candidates, size: int) -> Found:
+    def __call__(self, candidates: Candidates, size: int, limit: float | None = None) -> Found:
         """Find the orbits of candidates.
 
         Args:
             candidates: at most `size` of them.
             size: lanes of the compiled pass.
+            limit: see `improve`.
 
         Returns:
             Their orbits.
         """
         where = jax.device_put([_padded(values, size) for values in candidates[:3]], self.sharding)
-        return self.improve(self.method, _lanes(self.model, self.tables, where), candidates.force.size)
+        lanes = _lanes(self.model, self.tables, where)
+        return self.improve(self.method, lanes, candidates.force.size, limit)
 
-    def improve(self, method: Method, lanes: Lane, count: int) -> Found:
+    def improve(self, method: Method, lanes: Lane, count: int, limit: float | None = None) -> Found:
         """Improve starts until each has converged or failed.
 
         Args:
             method: how to integrate.
             lanes: the starts.
             count: how many of the lanes matter.
+            limit: largest relative step after which an orbit needs no other; that of maps if omitted.
 
         Returns:
             The orbits.
         """
-        limit = method.integrator.map_tolerance
+        limit = method.integrator.map_tolerance if limit is None else limit
         moved, *rest = _pass(self.model, method, lanes)
         lanes = lanes._replace(state=moved)
         lanes, step, roots, radius = jax.tree_util.tree_map(lambda it: np.array(it)[:count], (lanes, *rest))
@@ -287,17 +304,44 @@ def sampled_error(
     if not good.size:
         return float("nan")
     picked = good[np.unique(np.linspace(0, good.size - 1, _SAMPLED).astype(int))]
+    lanes = lanes_of(found, candidates, forces, frequencies, picked)
+    lanes = jax.tree_util.tree_map(lambda values: jnp.asarray(_padded(np.asarray(values), _SAMPLED)), lanes)
     coarse = solver.method.integrator
-    finely = coarse.with_steps(4 * coarse.steps_per_period)
-    method = eqx.tree_at(lambda it: it.integrator, solver.method, finely)
-    columns = lanes_of(found, candidates, forces, frequencies, picked)
-    lanes = jax.tree_util.tree_map(lambda values: jnp.asarray(_padded(values, _SAMPLED)), columns)
+    method = solver.method.with_integrator(coarse.with_steps(_FINER * coarse.steps_per_period))
     finer = solver.improve(method, lanes, picked.size)
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]
     ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), 0.1)
     return float(np.nanmax(nearest * ratio))
+
+
+def steps_needed(
+    solver: CellSolver, candidates: Candidates, forces: np.ndarray, frequencies: np.ndarray
+) -> int:
+    """Give the steps a period at which the multipliers of a map are as good as its integrator promises.
+
+    From a sample of orbits and the order of the integrator: the error falls with the fourth power.
+
+    Args:
+        solver: with the fewest steps that are tried.
+        candidates: of the map.
+        forces: drive amplitudes of the map.
+        frequencies: of the map [Hz].
+
+    Returns:
+        Steps a period, a multiple of those of the solver's by a power of the root of two, even.
+    """
+    integrator = solver.method.integrator
+    picked = np.unique(np.linspace(0, candidates.force.size - 1, _SAMPLED).astype(int))
+    some = Candidates(*(values[picked] for values in candidates))
+    # So far that what is left is the error of the integration alone.
+    found = solver(some, _SAMPLED, limit=1e-9)
+    error = sampled_error(solver, some, found, forces, frequencies)
+    if not error > integrator.map_error:
+        return integrator.steps_per_period
+    halves = math.ceil(2.0 * math.log2(error / integrator.map_error) / 4.0)
+    return 2 * round(integrator.steps_per_period * 2.0 ** (0.5 * min(halves, 14)) / 2.0)
 
 
 def lanes_of(

@@ -134,11 +134,11 @@ def _window(
     model: Isolator, least: float, most: float, frequencies: Float[np.ndarray, " frequency"], reach: float
 ) -> tuple[float, float, float]:
     """Give rest and the displacement amplitudes, least and largest, that a range of forces can hold."""
-    band = jnp.asarray(np.linspace(frequencies[0], frequencies[-1], 60 if len(frequencies) > 1 else 1))
+    band = jnp.asarray(np.linspace(frequencies[0], frequencies[-1], 24 if len(frequencies) > 1 else 1))
     tiny = 1e-9
     _, slope = _forces(model, band, jnp.array([tiny]))
     soft = float(jnp.min(slope)) / tiny
-    grid = most / soft * np.logspace(-9.0, 4.0, 1500)
+    grid = most / soft * np.logspace(-9.0, 4.0, 400)
     rest, needed = (np.asarray(value) for value in _forces(model, band, jnp.asarray(grid)))
     # Connected with rest: from small motion up to the first that needs more than the largest force.
     beyond = np.maximum.accumulate(needed >= most, axis=0)
@@ -190,10 +190,9 @@ def find_surface(
     kinks = shared_kinks(found[3], shape, math.pi if half else 2.0 * math.pi)
     tables = np.concatenate([stiffness, internal, swing, kinks.phases], axis=-1)
     if not single and len(frequencies) > columns:
-        tables = make_interp_spline(band, tables, k=_SPLINE, axis=0)(frequencies)
+        tables = np.tensordot(_spline_matrix(band, frequencies), tables, axes=(1, 0))
     fine = np.geomspace(low, high, _FINE)
-    tables = make_interp_spline(np.log(coarse), tables, k=_SPLINE, axis=1)(np.log(fine))
-    tables = np.ascontiguousarray(np.moveaxis(tables, -1, 0))
+    tables = np.moveaxis(tables, -1, 0) @ _spline_matrix(np.log(coarse), np.log(fine)).T
     last = 2 + model.internal_states
     rows = np.searchsorted(band, frequencies).clip(0, len(band) - 1)
     middles = np.sqrt(fine[:-1] * fine[1:])
@@ -202,6 +201,13 @@ def find_surface(
     return Surface(
         rest, fine, frequencies, tables[:2], tables[2:last], tables[last], phases, kinks.sides, shared
     )
+
+
+def _spline_matrix(
+    nodes: Float[np.ndarray, " node"], places: Float[np.ndarray, " place"]
+) -> Float[np.ndarray, "place node"]:
+    """Give what turns values at nodes into a spline's values: one product instead of a spline a table."""
+    return make_interp_spline(nodes, np.eye(nodes.size), k=_SPLINE)(places)
 
 
 def _chebyshev(start: float, stop: float, count: int) -> Float[np.ndarray, " node"]:
