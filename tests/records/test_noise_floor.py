@@ -7,18 +7,38 @@ import pytest
 import scipy.signal
 from jaxtyping import Float
 
-from isojax.records import Campaign, Filter, InputChannel, OutputChannel, Record, estimate_noise
+from isojax.records import (
+    Campaign,
+    Filter,
+    InputChannel,
+    OutputChannel,
+    Record,
+    brief_blows,
+    data_health,
+    estimate_noise,
+)
 from isojax.records._noise_band import NoiseBand
+from isojax.records._record import Kind
 
 RATE, SIGMA, SEEDS = 500.0, 0.013, 24
 LOW = Filter("butterworth", 4, 60.0, applied=True)
 
 
 def found_in(output: Float[np.ndarray, " time"], low: Filter | None = None) -> float:
-    drive = np.sin(np.arange(output.size) / RATE)
+    noise = estimate_noise(campaign_of(output, np.sin(np.arange(output.size) / RATE), "broadband", low))
+    assert noise.method == "high_frequency"
+    return noise.sigma
+
+
+def campaign_of(
+    output: Float[np.ndarray, " time"],
+    drive: Float[np.ndarray, " time"],
+    kind: Kind,
+    low: Filter | None = None,
+) -> Campaign:
     time = np.arange(output.size) / RATE
-    record = Record("a", Path("a.npz"), time, RATE, drive, output, drive, output)
-    campaign = Campaign(
+    record = Record("a", Path("a.npz"), time, RATE, drive, output, drive, output, kind=kind)
+    return Campaign(
         title="made",
         file=Path("campaign.toml"),
         mass=1.0,
@@ -32,9 +52,6 @@ def found_in(output: Float[np.ndarray, " time"], low: Filter | None = None) -> f
         elements=(),
         records=(record,),
     )
-    noise = estimate_noise(campaign)
-    assert noise.method == "high_frequency"
-    return noise.sigma
 
 
 def signal_of(kind: str, seed: int, size: int) -> Float[np.ndarray, " time"]:
@@ -94,3 +111,54 @@ def test_power_gain_is_that_of_the_filter(applied: bool) -> None:
     noise = np.random.default_rng(1).normal(size=400_000)
     left = (scipy.signal.sosfilt if applied else scipy.signal.sosfiltfilt)(sections, noise)
     assert band.share == pytest.approx(np.mean(left**2) / np.mean(noise**2), rel=0.01)
+
+
+def blow(width: int, size: int = 3000) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"]]:
+    """Acceleration and force of 40 kg at 6 Hz and 3 %, hit twice by half-sines of so many samples."""
+    force = np.zeros(size)
+    for start in (50, 200):
+        force[start : start + width + 1] = 700.0 * np.sin(np.pi * np.arange(width + 1) / width)
+    w = 2.0 * np.pi * 6.0
+    system = scipy.signal.StateSpace(
+        [[0, 1], [-w * w, -0.06 * w]], [[0], [1 / 40]], [[-w * w, -0.06 * w]], [[1 / 40]]
+    )
+    return scipy.signal.lsim(system, force, np.arange(size) / RATE)[1], force
+
+
+@pytest.mark.parametrize("width", [3, 6, 25])
+def test_a_blow_is_no_noise(width: int) -> None:
+    output, force = blow(width)
+    found = []
+    for seed in range(SEEDS):
+        noisy = output + SIGMA * np.random.default_rng(seed).normal(size=output.size)
+        noise = estimate_noise(campaign_of(noisy, force, "impulse"))
+        assert noise.method == "high_frequency"
+        found.append(noise.sigma)
+    assert np.mean(found) == pytest.approx(SIGMA, rel=0.01 + 2.0 * np.std(found) / SIGMA / np.sqrt(SEEDS))
+
+
+def test_the_jump_of_a_release_is_no_noise() -> None:
+    time = np.arange(3000) / RATE - 0.5
+    motion = np.where(time < 0.0, 0.0, 8.0 * np.exp(-np.maximum(time, 0.0)) * np.cos(2 * np.pi * 5.0 * time))
+    found = [
+        estimate_noise(
+            campaign_of(
+                motion + SIGMA * np.random.default_rng(seed).normal(size=time.size),
+                np.zeros(time.size),
+                "free_decay",
+            )
+        ).sigma
+        for seed in range(SEEDS)
+    ]
+    assert np.mean(found) == pytest.approx(SIGMA, rel=0.01 + 2.0 * np.std(found) / SIGMA / np.sqrt(SEEDS))
+
+
+@pytest.mark.parametrize(("width", "seen"), [(3, 2), (4, 3), (5, 4), (25, 24)])
+def test_a_blow_of_fewer_than_four_samples_is_named(width: int, seen: int) -> None:
+    output, force = blow(width)
+    noisy = force + np.random.default_rng(0).normal(size=force.size)
+    campaign = campaign_of(output, noisy, "impulse")
+    expected = [("a", seen)] if seen < 4 else []
+    assert [(one.record, one.samples) for one in brief_blows(campaign)] == expected
+    assert data_health(campaign).brief_blows == brief_blows(campaign)
+    assert brief_blows(campaign_of(output, noisy, "broadband")) == ()

@@ -6,6 +6,8 @@ import numpy as np
 
 from isojax import RESULTS
 from isojax.identification import uncertainty
+from isojax.records import data_health
+from isojax.reporting._sentences import health_words
 
 
 def with_uncertainty(fit, matrix):
@@ -76,3 +78,16 @@ def test_report_shows_integration_error_where_it_is_known(found):
     assert "0.012 of the noise when halved" in str(found.after._replace(stats=stats))
     quiet = dataclasses.replace(found.campaign, records=found.campaign.fit_records)
     assert "0 held out" in str(found.after._replace(campaign=quiet))
+
+
+def test_report_warns_of_a_blow_that_the_samples_hardly_see(found):
+    record = found.campaign.records[0]
+    drive = np.zeros(record.time.size)
+    drive[50:53] = (200.0, 400.0, 200.0)
+    hit = dataclasses.replace(record, raw_input=drive, kind="impulse")
+    fit = found.after._replace(campaign=dataclasses.replace(found.campaign, records=(hit,)))
+    assert f"The blow of {record.name} lasts 3 samples" in str(fit)
+    words = " ".join(health_words(data_health(fit.campaign), fit))
+    assert "Blows of fewer than four samples" in words
+    assert f"{record.name} (3)" in words
+    assert "blow" not in str(found.after)

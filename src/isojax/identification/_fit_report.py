@@ -6,6 +6,7 @@ import numpy as np
 
 from .._parameters import Parameter, list_parameters
 from .._results import RESULTS, is_successful
+from ..records import brief_blows
 from ._errors import Errors
 from ._fit import Fit
 from ._units import OUTPUT_UNITS, plain_unit
@@ -139,6 +140,11 @@ def warnings_of(fit: Fit) -> list[str]:
         One sentence each; none if there is nothing to warn of.
     """
     lines = [] if is_successful(fit.result) else [f"The search failed. {RESULTS[fit.result]}"]
+    lines += [
+        f"The blow of {blow.record} lasts {blow.samples} samples: its shape between them, and so the "
+        "momentum that it gave, is a guess. Sample faster or use a softer tip."
+        for blow in brief_blows(fit.campaign)
+    ]
     lines += _not_determined(fit)
     start = {entry.name: float(entry.value) for entry in list_parameters(fit.start)}
     errors = fit.standard_errors

@@ -14,6 +14,7 @@ from ._filter import zero_phase_butterworth as zero_phase_butterworth
 from ._harmonics import DwellHarmonics as DwellHarmonics
 from ._harmonics import dwell_harmonics as dwell_harmonics
 from ._health import DataHealth as DataHealth
+from ._health import brief_blows as brief_blows
 from ._health import data_health as data_health
 from ._integrate import integrate_acceleration as integrate_acceleration
 from ._integrate import measured_state as measured_state

@@ -1,10 +1,11 @@
-"""Data health: dwells that never settled, and how well repeats repeat."""
+"""Data health: dwells that never settled, blows too brief for the rate, and how well repeats repeat."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.stats
 
+from ._blow import blow_samples
 from ._campaign import Campaign
 from ._harmonics import dwell_harmonics, harmonic_basis
 from ._record import Dwell, Record
@@ -12,6 +13,9 @@ from ._repeats import repeat_groups
 
 _CYCLES = 6
 _ORDERS = 3
+
+_FEW_SAMPLES = 4
+"""Samples in a row below which the shape of a blow between them is a guess."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,19 @@ class RepeatDifference:
 
 
 @dataclass(frozen=True)
+class BriefBlow:
+    """A blow so brief that its samples do not show its shape, nor the momentum that it gave.
+
+    Attributes:
+        record: Name of the record.
+        samples: Samples in a row that stand above the noise.
+    """
+
+    record: str
+    samples: int
+
+
+@dataclass(frozen=True)
 class DataHealth:
     """What is to be known of the data before a model is blamed.
 
@@ -56,11 +73,13 @@ class DataHealth:
         dwells: Number of dwells looked at.
         unsettled: Those that never settled.
         repeats: Pairs of repeats.
+        brief_blows: Records whose blow lasts fewer than four samples.
     """
 
     dwells: int
     unsettled: tuple[UnsettledDwell, ...]
     repeats: tuple[RepeatDifference, ...]
+    brief_blows: tuple[BriefBlow, ...] = ()
 
     @property
     def repeatability(self) -> float:
@@ -69,7 +88,7 @@ class DataHealth:
 
 
 def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth:
-    """Gives the dwells that never settled and the differences between repeats.
+    """Gives the dwells that never settled, the blows that are too brief and the differences between repeats.
 
     A dwell is unsettled if the F-test on the scatter between its last six cycles is significant at 0.001 over
     all dwells, and if the change exceeds `smallest_change` of the output's rms.
@@ -89,7 +108,24 @@ def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth
     ]
     limit = 1e-3 / max(len(tested), 1)
     unsettled = tuple(one for one in tested if one.p_value < limit and one.change > smallest_change)
-    return DataHealth(len(tested), unsettled, _repeat_differences(campaign))
+    return DataHealth(len(tested), unsettled, _repeat_differences(campaign), brief_blows(campaign))
+
+
+def brief_blows(campaign: Campaign) -> tuple[BriefBlow, ...]:
+    """Gives the records whose blow lasts fewer than four samples, in the file as the reader found it.
+
+    Args:
+        campaign: The campaign.
+
+    Returns:
+        The records, in the campaign's order.
+    """
+    counted = [
+        BriefBlow(record.name, blow_samples(record.raw_input))
+        for record in campaign.records
+        if record.kind == "impulse"
+    ]
+    return tuple(blow for blow in counted if blow.samples < _FEW_SAMPLES)
 
 
 def cycle_change(record: Record, dwell: Dwell) -> tuple[float, float] | None:

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ._band import power_spectrum, ringing_frequency
+from ._blow import ABOVE_NOISE, BRIEF, drive_noise, driven_samples
 from ._record import Dwell, Kind
 from ._segment import rising_crossings, segment_dwells
 
@@ -12,12 +13,6 @@ _PARTS = 10
 
 _DIED_OUT = 0.7
 """A motion whose end is above this share of its largest part has not died out."""
-
-_BRIEF = 0.05
-"""Share of a record that a blow takes at most, and share of its peak below which the drive is off."""
-
-_ABOVE_NOISE = 5.0
-"""What exceeds so many standard deviations of the noise is no noise."""
 
 _IDLE = 0.1
 """A drive below this share of the inertia, within the band of the motion, did not make the motion ..."""
@@ -94,11 +89,9 @@ def _dies_out(response: Float[np.ndarray, " time"]) -> bool:
 
 def _is_brief(drive: Float[np.ndarray, " time"]) -> bool:
     """Whether the drive stands above its noise for a small share of the record only."""
-    centred = np.abs(drive - np.median(drive))
-    noise = 1.4826 * float(np.median(centred))
-    peak = float(np.max(centred))
-    on = centred > max(_BRIEF * peak, _ABOVE_NOISE * noise)
-    return bool(peak > 2.0 * _ABOVE_NOISE * noise and np.count_nonzero(on) < _BRIEF * drive.size)
+    peak = float(np.max(np.abs(drive - np.median(drive))))
+    share = np.count_nonzero(driven_samples(drive)) / drive.size
+    return bool(peak > 2.0 * ABOVE_NOISE * drive_noise(drive) and share < BRIEF)
 
 
 def _is_idle(

@@ -10,6 +10,7 @@ import scipy.stats
 from jaxtyping import Float
 
 from ._band import spectral_floor
+from ._blow import ring_down
 from ._campaign import Campaign
 from ._harmonics import harmonic_basis
 from ._noise_band import NoiseBand
@@ -219,7 +220,8 @@ def high_frequency_floor(record: Record, band: NoiseBand) -> float:
 
     The quietest of four parts alone would be low by the luck of the draw. Those that agree with it are
     therefore taken together; where the response fills the lower ones, the quietest stands alone, and no
-    choice between equals has been made.
+    choice between equals has been made. Of a record that rings down only what follows the release or the
+    blow counts: its own spectrum has no upper end.
 
     Args:
         record: The record.
@@ -228,18 +230,19 @@ def high_frequency_floor(record: Record, band: NoiseBand) -> float:
     Returns:
         rms per sample in the output's unit.
     """
+    output = ring_down(record)
     spans = [(low * band.highest, high * band.highest) for low, high in _FLOORS]
-    found = [(*spectral_floor(record.output, band, span), span) for span in spans]
+    found = [(*spectral_floor(output, band, span), span) for span in spans]
     known = sorted(one for one in found if np.isfinite(one[0]))
     if not known:  # a short record has too few lines for narrow parts
-        density, _ = spectral_floor(record.output, band, (0.4 * band.highest, 0.95 * band.highest))
+        density, _ = spectral_floor(output, band, (0.4 * band.highest, 0.95 * band.highest))
     else:
         density, error, quietest = known[0]
         alike = [quietest]
         for level, own, span in known[1:]:
             if level <= density * (1.0 + _AGREE * np.hypot(own, error)):
                 alike.append(span)
-                density, error = spectral_floor(record.output, band, *alike)
+                density, error = spectral_floor(output, band, *alike)
     return _rms(density, band)
 
 

@@ -150,7 +150,7 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
     """Give the state of the data, before a model is blamed.
 
     Args:
-        health: dwells and repeats.
+        health: dwells, blows and repeats.
         fit: the final fit.
 
     Returns:
@@ -169,6 +169,12 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
         lines.append(
             f"{len(health.unsettled)} of {health.dwells} dwells never settled"
             + (f"; the worst: {examples}." if worst else ".")
+        )
+    if health.brief_blows:
+        names = ", ".join(f"{blow.record} ({blow.samples})" for blow in health.brief_blows)
+        lines.append(
+            "Blows of fewer than four samples, whose shape between them, and so the momentum that they "
+            f"gave, is a guess: {names}."
         )
     if health.repeats:
         lines.append(
