@@ -154,7 +154,7 @@ def close_motion(
     found = jnp.isfinite(mismatch) & (mismatch < 1e3 * integrator.orbit_tolerance)
     return Closed(
         final[:states] * scale,
-        scale[:, None] * transition / scale,
+        scale[:, None] * transition / scale[None, :],
         jax.lax.stop_gradient(error),
         jax.lax.stop_gradient(mismatch),
         found,

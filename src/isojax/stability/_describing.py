@@ -135,10 +135,12 @@ def response_amplitudes(
     Returns:
         Drive amplitude [N, or m/s^2 for base excitation], amplitude first.
     """
-    shape = (-1, *(1,) * jnp.ndim(frequency))
-    grid = jnp.reshape(amplitudes, shape) + 0.0 * frequency
-    drive, _ = imposed_balance(model, grid, 0.0 * grid + frequency, rest)
-    return jnp.hypot(drive.sine, jnp.asarray(drive.cosine))
+
+    def needed(amplitude: Array) -> Array:
+        drive, _ = imposed_balance(model, amplitude + 0.0 * frequency, frequency, rest)
+        return jnp.hypot(drive.sine, jnp.asarray(drive.cosine))
+
+    return jax.vmap(needed)(amplitudes)
 
 
 def response_start(model: Isolator, amplitude: Scalar, frequency: Scalar) -> Float[Array, " state"]:

@@ -90,7 +90,7 @@ class StabilityMap(eqx.Module):
         force = jnp.broadcast_to(self.amplitudes[:, None], self.spectral_radius.shape).ravel()
         frequency = jnp.broadcast_to(self.frequencies, self.spectral_radius.shape).ravel()
         state = tuple(self.start.reshape(force.size, -1).T)
-        sine, cosine = self.direction.reshape(force.size, 2).T * force
+        sine, cosine = self.direction.reshape(force.size, 2).T * force[None]
         lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel())
         method = Method(self.integrator, self.symmetric, None)
         return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)

@@ -98,7 +98,9 @@ def advance_in_pieces(
         beside = None if sides is None else tuple(sides)
         turn = jnp.sin(0.5 * length), jnp.cos(0.5 * length)
 
-        def step(index: Array, here: tuple[State, tuple[Array, Array]]) -> tuple[State, tuple[Array, Array]]:
+        def step(
+            index: Array | int, here: tuple[State, tuple[Array, Array]]
+        ) -> tuple[State, tuple[Array, Array]]:
             state, begin = here
             # Turned from stage to stage: a sine a stage and lane would cost as much as the law.
             middle = _turned(begin, turn)

@@ -105,7 +105,7 @@ def _nodes(
 
         start = jnp.concatenate([jnp.stack([guess.sine, guess.cosine]) / push, internal / inner])
 
-        def improve(_: int, unknown: Array) -> Array:
+        def improve(_: Array | int, unknown: Array) -> Array:
             step = jnp.linalg.solve(jax.jacfwd(gap)(unknown), gap(unknown))
             # Far from the balance of one harmonic a full step may leave the basin.
             return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))

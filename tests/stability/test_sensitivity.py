@@ -1,0 +1,175 @@
+"""Derivatives against closed forms of the linear isolator, and against differences of the paper's model."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import isojax as ij
+
+MASS, STIFFNESS, DAMPING, FORCE, FREQUENCY = 800.0, 1.0e6, 8.0e3, 100.0, 4.0
+STATIC = ("linear_stiffness.coefficient", "linear_damping.coefficient", "mass")
+
+
+def linear() -> ij.Isolator:
+    return ij.Isolator(MASS, (ij.LinearStiffness(STIFFNESS), ij.LinearDamping(DAMPING)))
+
+
+def receptance(k=STIFFNESS, c=DAMPING, m=MASS, force=FORCE, f=FREQUENCY):
+    omega = 2 * np.pi * f
+    return force / np.abs(k - m * omega**2 + 1j * omega * c)
+
+
+def radius(k=STIFFNESS, c=DAMPING, m=MASS, f=FREQUENCY):
+    return np.exp(-c / (2 * m * f))
+
+
+def difference(function, name, value, share=1e-5):
+    return (function(**{name: value * (1 + share)}) - function(**{name: value * (1 - share)})) / (
+        2 * share * value
+    )
+
+
+@pytest.fixture(scope="module")
+def of_orbit() -> ij.Sensitivity:
+    orbit = ij.find_periodic_orbit(linear(), ij.Harmonic(FORCE, FREQUENCY))
+    covariance = np.diag([(0.01 * STIFFNESS) ** 2, (0.05 * DAMPING) ** 2])
+    return ij.sensitivity(orbit, covariance=covariance, covariance_of=STATIC[:2])
+
+
+LETTERS = {
+    "linear_stiffness.coefficient": ("k", STIFFNESS),
+    "linear_damping.coefficient": ("c", DAMPING),
+    "mass": ("m", MASS),
+    "drive.amplitude": ("force", FORCE),
+    "drive.frequency": ("f", FREQUENCY),
+}
+
+
+@pytest.mark.parametrize("name", LETTERS)
+def test_amplitude_of_the_linear_isolator_moves_as_its_receptance(of_orbit: ij.Sensitivity, name: str):
+    letter, value = LETTERS[name]
+    expected = difference(receptance, letter, value)
+    assert float(of_orbit.by("amplitude", name)) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("linear_stiffness.coefficient", 0.0),
+        ("linear_damping.coefficient", -radius() / (2 * MASS * FREQUENCY)),
+        ("mass", radius() * DAMPING / (2 * MASS**2 * FREQUENCY)),
+        ("drive.amplitude", 0.0),
+        ("drive.frequency", radius() * DAMPING / (2 * MASS * FREQUENCY**2)),
+    ],
+)
+def test_spectral_radius_of_the_linear_isolator_moves_as_its_decay(of_orbit, name: str, expected: float):
+    scale = radius() / LETTERS[name][1]
+    assert float(of_orbit.by("spectral_radius", name)) == pytest.approx(expected, abs=1e-8 * scale, rel=1e-8)
+
+
+def test_standard_error_is_that_of_first_order(of_orbit: ij.Sensitivity):
+    slopes = [difference(receptance, *LETTERS[name]) for name in STATIC[:2]]
+    expected = np.hypot(slopes[0] * 0.01 * STIFFNESS, slopes[1] * 0.05 * DAMPING)
+    assert of_orbit.standard_errors is not None
+    assert float(of_orbit.standard_errors["amplitude"]) == pytest.approx(expected, rel=1e-6)
+
+
+def test_relative_sensitivities_of_the_amplitude_keep_its_dimension(of_orbit: ij.Sensitivity):
+    # X = F / |k - m w^2 + i w c| is homogeneous: of degree 1 in F, -1 in (k, c, m) together.
+    shares = dict(zip(of_orbit.parameters, np.asarray(of_orbit.relative("amplitude")), strict=True))
+    assert shares["drive.amplitude"] == pytest.approx(1.0, rel=1e-7)
+    assert sum(shares[name] for name in STATIC) == pytest.approx(-1.0, rel=1e-6)
+
+
+def test_map_of_the_linear_isolator_moves_as_its_receptance_in_every_cell():
+    amplitudes, frequencies = np.linspace(50.0, 100.0, 3), np.linspace(3.0, 7.0, 5)
+    sens = ij.sensitivity(ij.stability_map(linear(), amplitudes, frequencies))
+    for name in ("linear_stiffness.coefficient", "linear_damping.coefficient", "mass"):
+        letter, value = LETTERS[name]
+        for row, force in enumerate(amplitudes):
+            for column, f in enumerate(frequencies):
+                expected = difference(lambda **kw: receptance(force=force, f=f, **kw), letter, value)  # noqa: B023
+                assert float(sens.by("response", name)[row, column]) == pytest.approx(expected, rel=1e-4)
+                decay = difference(lambda **kw: radius(f=f, **kw), letter, value)  # noqa: B023
+                found = float(sens.by("spectral_radius", name)[row, column])
+                assert found == pytest.approx(decay, rel=1e-4, abs=1e-4 / value)
+
+
+@pytest.fixture(scope="module")
+def paper() -> ij.Isolator:
+    return ij.paper.y_direction()
+
+
+@pytest.fixture(scope="module")
+def at_jump(paper: ij.Isolator) -> ij.Orbit:
+    return ij.find_periodic_orbit(paper, ij.Harmonic(150.0, 4.3))
+
+
+COEFFICIENTS = (
+    "linear_stiffness.coefficient",
+    "abs_quadratic_stiffness.coefficient",
+    "cubic_stiffness.coefficient",
+    "linear_damping.coefficient",
+    "abs_quadratic_damping.coefficient",
+    "cubic_damping.coefficient",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quantity", ["spectral_radius", "amplitude"])
+def test_derivatives_near_the_jump_are_those_of_differences(paper, at_jump: ij.Orbit, quantity: str):
+    sens = ij.sensitivity(at_jump, parameters=COEFFICIENTS)
+    for place, name in enumerate(COEFFICIENTS):
+        value = float(paper[name])
+
+        def there(share: float, name: str = name, value: float = value) -> float:
+            changed = paper.replace(**{name.replace(".", "__"): value * (1 + share)})
+            orbit = ij.find_periodic_orbit(changed, at_jump.excitation)
+            return float(orbit.floquet.spectral_radius if quantity == "spectral_radius" else orbit.amplitude)
+
+        step = 1e-4
+        # Fourth-order differences: their own error stays below a millionth.
+        slope = (8 * (there(step) - there(-step)) - (there(2 * step) - there(-2 * step))) / (
+            12 * step * value
+        )
+        assert float(sens.derivatives[quantity][place]) == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_derivatives_of_a_map_are_those_of_its_orbits(paper: ij.Isolator, at_jump: ij.Orbit):
+    smap = ij.stability_map(paper, np.array([100.0, 150.0]), np.array([4.3, 5.0]), coexisting=True)
+    sens = ij.sensitivity(smap, parameters=COEFFICIENTS)
+    single = ij.sensitivity(at_jump, parameters=COEFFICIENTS)
+    found = np.asarray(sens.derivatives["spectral_radius"])[:, 0, 1, 0]
+    np.testing.assert_allclose(found, single.derivatives["spectral_radius"], rtol=1e-4)
+
+
+def test_function_of_a_model_is_differentiated_by_name():
+    def static(model: ij.Isolator):
+        return {"softness": 1.0 / model["linear_stiffness.coefficient"]}
+
+    sens = ij.sensitivity(static, linear())
+    assert float(sens.by("softness", "linear_stiffness.coefficient")) == pytest.approx(-1.0 / STIFFNESS**2)
+    assert float(sens.by("softness", "mass")) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"parameters": ["stiffness"]}, "`parameters` must name some of mass, .* names 'stiff"),
+        ({"covariance": np.eye(2)}, "`covariance` and `covariance_of` must be given together"),
+        ({"covariance": np.eye(3), "covariance_of": STATIC[:2]}, "a row and a column for each of 2 names"),
+        (
+            {"parameters": ["mass"], "covariance": np.eye(2), "covariance_of": STATIC[:2]},
+            "lacks 'linear_stiff",
+        ),
+    ],
+)
+def test_what_does_not_fit_together_is_refused(given: dict, words: str):
+    with pytest.raises(ValueError, match=words):
+        ij.sensitivity(lambda model: jnp.asarray(model.mass), linear(), **given)
+
+
+def test_a_function_needs_its_model():
+    with pytest.raises(ValueError, match="`model` must be given where `subject` is a function"):
+        ij.sensitivity(lambda model: jnp.asarray(model.mass))
