@@ -196,14 +196,14 @@ def numba_peer(threads: int) -> Peer:
     set_num_threads(threads)
 
     def solve(task: Task, half: bool, steps: int) -> Answer:
-        shape = (task.forces.size, task.frequencies.size)
-        out = [np.empty(shape) for _ in range(3)]
-        passes = np.zeros(shape[1], dtype=np.int64)
-        sine = sine_table(steps, half)
+        forces, frequencies, sine = task.forces, task.frequencies, sine_table(steps, half)
+        radius, trace, product = (np.empty((forces.size, frequencies.size)) for _ in range(3))
+        passes = np.zeros(frequencies.size, dtype=np.int64)
         _sweep(
-            task.law, task.forces, task.frequencies, steps, half, sine, task.tolerance, DEGREE, *out, passes
-        )
-        return Answer(*out, passes.sum() / out[0].size)
+            task.law, forces, frequencies, steps, half, sine, task.tolerance, DEGREE,
+            radius, trace, product, passes,
+        )  # fmt: skip
+        return Answer(radius, trace, product, passes.sum() / radius.size)
 
     return solve
 
@@ -232,14 +232,14 @@ def c_peer(threads: int, lanes: int, flags: tuple[str, ...] = C_FLAGS) -> Peer |
 
     def solve(task: Task, half: bool, steps: int) -> Answer:
         shape = (task.forces.size, task.frequencies.size)
-        out = [np.empty(shape) for _ in range(3)]
+        radius, trace, product = (np.empty(shape) for _ in range(3))
         given = [numbers(values) for values in (task.forces, task.frequencies, task.law)]
         # The table must outlive the call.
         sine = sine_table(steps, half)
         passes = sweep(
             *shape, *given, steps, int(half), numbers(sine), ctypes.c_double(task.tolerance), DEGREE, threads,
-            *(numbers(values) for values in out),
+            *(numbers(values) for values in (radius, trace, product)),
         )  # fmt: skip
-        return Answer(*out, passes / out[0].size)
+        return Answer(radius, trace, product, passes / radius.size)
 
     return solve
