@@ -1,5 +1,13 @@
 """What people see: pictures, tables, the report. The only floor that imports matplotlib."""
 
+from ._attractors import plot_basins as plot_basins
+from ._attractors import plot_bifurcation_diagram as plot_bifurcation_diagram
+from ._attractors import plot_phase_portrait as plot_phase_portrait
+from ._attractors import plot_return as plot_return
+from ._branches import plot_backbone as plot_backbone
+from ._branches import plot_branch as plot_branch
+from ._branches import plot_frequency_response as plot_frequency_response
+from ._branches import plot_transmissibility as plot_transmissibility
 from ._classical import plot_equivalent as plot_equivalent
 from ._classical import plot_receptance as plot_receptance
 from ._closed_loop import ClosedLoop as ClosedLoop
@@ -7,6 +15,7 @@ from ._closed_loop import close_loop as close_loop
 from ._evidence import plot_errors as plot_errors
 from ._evidence import plot_ranking as plot_ranking
 from ._evidence import plot_stiffness_scatter as plot_stiffness_scatter
+from ._fold_curve import plot_fold_curve as plot_fold_curve
 from ._forces import plot_effect as plot_effect
 from ._forces import plot_restoring_force as plot_restoring_force
 from ._page import render_page as render_page
@@ -16,6 +25,9 @@ from ._residuals import plot_cycle_residual as plot_cycle_residual
 from ._residuals import plot_residual as plot_residual
 from ._residuals import plot_where as plot_where
 from ._result import result_dict as result_dict
+from ._sensitivity import plot_sensitivity as plot_sensitivity
+from ._stability_map import plot_response_map as plot_response_map
+from ._stability_map import plot_stability_map as plot_stability_map
 from ._summary import catalogue_table as catalogue_table
 from ._summary import error_table as error_table
 from ._summary import loop_summary as loop_summary
