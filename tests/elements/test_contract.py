@@ -16,6 +16,10 @@ from isojax._results import is_successful
 from isojax.elements import CATALOGUE, AbstractElement, Scales
 from isojax.excitations import Harmonic
 from isojax.models import Integrator, Isolator, load_model, save_model, simulate
+from isojax.stability._describing import response_start
+from isojax.stability._drive import recorded_sine
+from isojax.stability._floquet import multipliers
+from isojax.stability._period_map import period_map
 
 SCALES = Scales(
     mass=800.0,
@@ -246,6 +250,68 @@ def test_the_linearised_isolator_is_finite_at_rest(kind):
     assert matrix.shape == (size, size)
     assert np.all(np.isfinite(matrix))
     assert np.all(np.linalg.eigvals(matrix).real < 1e-9)
+
+
+@every_element
+def test_a_law_beside_its_kinks_is_the_law_where_it_lies_on_those_sides(kind):
+    element = with_strength(kind.guess(SCALES), 0.5)
+    for seed in range(8):
+        x, v, *_ = motion((16,), seed)
+        s = internal(element, rest=False, shape=(16,), seed=seed)
+        sides = tuple(jnp.where(kink >= 0.0, 1.0, -1.0) for kink in element.kinks(x, v, s))
+        force, rates = element.force(x, v, s), element.state_rate(x, v, s)
+        np.testing.assert_allclose(element.force_beside(x, v, s, sides), force, rtol=1e-12)
+        beside = element.state_rate_beside(x, v, s, sides)
+        for one, other in zip(beside, rates, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-15)
+
+
+@every_element
+def test_a_law_beside_a_kink_goes_on_smoothly_past_it(kind):
+    # With the sides held, the slope across the kinks, which all lie at rest, is that of central differences; of
+    # |s|s itself they differ by |s|s times the step.
+    element = with_strength(kind.guess(SCALES), 0.5)
+    x, v, *_ = motion((16,))
+    s = internal(element, rest=False, shape=(16,))
+    sides = tuple(jnp.where(kink >= 0.0, 1.0, -1.0) for kink in element.kinks(x, v, s))
+    if not sides:
+        return
+
+    def along(share):
+        state = share * x, share * v, tuple(share * value for value in s)
+        return jnp.stack([element.force_beside(*state, sides), *element.state_rate_beside(*state, sides)])
+
+    step = 1e-4
+    left, right = (along(sign * step) for sign in (-1.0, 1.0))
+    slopes = jax.jvp(along, (0.0,), (1.0,))[1]
+    np.testing.assert_allclose((right - left) / (2.0 * step), slopes, rtol=1e-3, atol=1e-9 * SCALES.force)
+
+
+@eqx.filter_jit
+def closed(model):
+    """Newton's method on the period map of fixed steps: multipliers, and what is left open of the motion."""
+    drive = recorded_sine(model, DRIVE.amplitude, DRIVE.frequency)
+    start = response_start(model, DRIVE.amplitude, DRIVE.frequency)
+
+    def moved(state):
+        return jnp.stack(period_map(model, Integrator(), drive, tuple(state)))
+
+    def improve(_, state):
+        return state - jnp.linalg.solve(jax.jacfwd(moved)(state) - jnp.eye(state.size), moved(state) - state)
+
+    state = jax.lax.fori_loop(0, 8, improve, start)
+    return multipliers(jax.jacfwd(moved)(state)), (moved(state) - state)[:2]
+
+
+@every_element
+def test_an_orbit_of_the_isolator_with_the_effect_has_finite_multipliers(kind):
+    # All other effects absent: one compilation serves all elements.
+    effects = {name: other.guess(SCALES) for name, other in CATALOGUE.items()}
+    effects[kind.name] = with_strength(effects[kind.name], 0.1)
+    roots, left = closed(paper.y_direction().with_elements(*effects.values()))
+    assert float(jnp.max(jnp.abs(left))) < 1e-8 * SCALES.velocity
+    assert roots.shape == (2 + sum(other.internal_states for other in CATALOGUE.values()),)
+    assert bool(jnp.all(jnp.isfinite(roots)))
 
 
 def test_the_catalogue_holds_every_element_file():
