@@ -1,5 +1,7 @@
 """What the identified isolator does: periodic orbits, their multipliers, maps, branches, bifurcations."""
 
+from ._backbone import BackboneCurve as BackboneCurve
+from ._backbone import backbone_curve as backbone_curve
 from ._basins import BasinsOfAttraction as BasinsOfAttraction
 from ._basins import basins_of_attraction as basins_of_attraction
 from ._bifurcation_diagram import BifurcationDiagram as BifurcationDiagram
@@ -12,6 +14,8 @@ from ._curves import Cusp as Cusp
 from ._curves import FoldCurve as FoldCurve
 from ._curves import PeriodDoublingCurve as PeriodDoublingCurve
 from ._floquet import Floquet as Floquet
+from ._frequency_response import FrequencyResponse as FrequencyResponse
+from ._frequency_response import frequency_response as frequency_response
 from ._harmonic_balance import HarmonicBalance as HarmonicBalance
 from ._harmonic_balance import harmonic_balance as harmonic_balance
 from ._locus import fold_curve as fold_curve
@@ -31,3 +35,5 @@ from ._return_to_orbit import return_to_orbit as return_to_orbit
 from ._sensitivity import Sensitivity as Sensitivity
 from ._sensitivity import sensitivity as sensitivity
 from ._switching import switch_branch as switch_branch
+from ._transmissibility import Transmissibility as Transmissibility
+from ._transmissibility import transmissibility as transmissibility

@@ -1,0 +1,231 @@
+"""Backbone, frequency response and transmissibility against closed forms and SciPy."""
+
+import math
+
+import jax
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipk
+
+import isojax as ij
+from isojax.stability import find_periodic_orbit
+
+TURN = 2.0 * math.pi
+LINEAR = ij.Isolator(2.0, (ij.LinearStiffness(50.0), ij.LinearDamping(0.8)))
+DUFFING = ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.CubicStiffness(0.7), ij.LinearDamping(0.05)))
+SIZES = np.array([0.01, 0.5, 1.0, 2.0, 5.0])
+
+
+def linear_ratio(frequency: np.ndarray) -> np.ndarray:
+    """(k + i omega c) / (k - m omega^2 + i omega c) of `LINEAR`."""
+    omega = TURN * frequency
+    return (50.0 + 0.8j * omega) / (50.0 - 2.0 * omega**2 + 0.8j * omega)
+
+
+def spring_y(x):
+    """Spring of the paper's y direction."""
+    return 1.0805e6 * x - 6.974e8 * np.abs(x) * x + 2.51667e11 * x**3
+
+
+def damper_y(v):
+    """Damper of the paper's y direction."""
+    return 1.027e4 * v - 3.6880e5 * np.abs(v) * v + 5.3753e6 * v**3
+
+
+def free_frequency(pull, mass: float, amplitude: float, guess: float) -> float:
+    """Frequency of free vibration by DOP853: from one largest displacement to the next."""
+
+    def stop(t, y):
+        return y[1]
+
+    stop.direction = -1.0
+    run = solve_ivp(
+        lambda t, y: [y[1], -pull(y[0]) / mass], (0.0, 2.5 / guess), [amplitude, -1e-30], method="DOP853",
+        events=stop, rtol=1e-12, atol=1e-16, max_step=0.01 / guess,
+    )  # fmt: skip
+    return 1.0 / run.t_events[0][run.t_events[0] > 0.4 / guess][0]
+
+
+def test_free_vibration_of_the_duffing_oscillator_is_the_elliptic_integral():
+    natural = ij.backbone_curve(DUFFING, SIZES).natural_frequency
+    stiff = 1.0 + 0.7 * SIZES**2
+    exact = math.pi * np.sqrt(stiff) / (2.0 * ellipk(0.7 * SIZES**2 / (2.0 * stiff))) / TURN
+    np.testing.assert_allclose(natural, exact, rtol=1e-12)
+
+
+def test_derivative_of_free_vibration_is_that_of_the_elliptic_integral():
+    slope = jax.jacfwd(lambda model: ij.backbone_curve(model, SIZES).natural_frequency)(DUFFING)
+
+    def exact(cubic):
+        stiff = 1.0 + cubic * SIZES**2
+        return math.pi * np.sqrt(stiff) / (2.0 * ellipk(cubic * SIZES**2 / (2.0 * stiff))) / TURN
+
+    h = 1e-4
+    numeric = (8 * (exact(0.7 + h) - exact(0.7 - h)) - exact(0.7 + 2 * h) + exact(0.7 - 2 * h)) / (12 * h)
+    np.testing.assert_allclose(slope.elements[1].coefficient, numeric, rtol=1e-8, atol=1e-12)
+
+
+def test_free_vibration_with_kinks_and_without_symmetry_is_that_of_scipy():
+    sizes = [3e-4, 1.2e-3]
+    kinked = ij.backbone_curve(ij.paper.y_direction(), sizes).natural_frequency
+    for size, found in zip(sizes, kinked, strict=True):
+        assert float(found) == pytest.approx(free_frequency(spring_y, 800.0, size, float(found)), rel=1e-9)
+    lopsided = ij.Isolator(2.0, (ij.LinearStiffness(50.0), ij.QuadraticStiffness(20.0)))
+    found = float(ij.backbone_curve(lopsided, [1.0]).natural_frequency[0])
+    reference = free_frequency(lambda x: 50.0 * x + 20.0 * x * x, 2.0, 1.0, found)
+    assert found == pytest.approx(reference, rel=1e-9)
+
+
+def test_free_vibration_is_nan_where_the_spring_does_not_hold():
+    softening = ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.CubicStiffness(-1.0), ij.LinearDamping(0.1)))
+    natural = ij.backbone_curve(softening, [0.5, 0.99, 1.01, 3.0]).natural_frequency
+    assert np.isfinite(natural).tolist() == [True, True, False, False]
+
+
+def test_phase_resonance_of_a_linear_isolator_is_at_its_natural_frequency():
+    curve = ij.backbone_curve(LINEAR, [0.01, 0.1, 1.0])
+    np.testing.assert_allclose(TURN * curve.frequency, 5.0, rtol=1e-7)
+    np.testing.assert_allclose(curve.force, 0.8 * 5.0 * curve.displacements, rtol=1e-6)
+
+
+def test_phase_resonance_with_relaxation_is_the_closed_form():
+    # K p, p' = v - p / tau adds K (w tau)^2 / (1 + (w tau)^2) to the stiffness, K tau / (1 + (w tau)^2) to
+    # the damping; the resonance is a quadratic in w^2.
+    tau, branch, stiffness, damping = 0.3, 20.0, 50.0, 0.8
+    model = ij.Isolator(
+        2.0, (ij.LinearStiffness(stiffness), ij.LinearDamping(damping), ij.MaxwellBranch(branch, tau))
+    )
+    curve = ij.backbone_curve(model, [0.2])
+    square = np.roots([-2.0 * tau**2, (stiffness + branch) * tau**2 - 2.0, stiffness]).max()
+    omega = math.sqrt(square)
+    assert TURN * float(curve.frequency[0]) == pytest.approx(omega, rel=1e-6)
+    force = 0.2 * omega * (damping + branch * tau / (1.0 + square * tau**2))
+    assert float(curve.force[0]) == pytest.approx(force, rel=1e-6)
+
+
+def test_phase_resonance_is_an_orbit_of_that_size_in_quadrature():
+    model = ij.paper.y_direction()
+    curve = ij.backbone_curve(model, [4e-4, 1.5e-3])
+    for place in range(2):
+        drive = ij.Harmonic(curve.force[place], curve.frequency[place])
+        orbit = find_periodic_orbit(model, drive, start=curve.y0[place])
+        assert float(orbit.amplitude) == pytest.approx(float(curve.displacements[place]), rel=1e-4)
+        # Behind a sine by a quarter of a period: minus a cosine.
+        assert math.cos(np.angle(orbit.harmonics[1])) == pytest.approx(-1.0, abs=1e-6)
+
+
+def test_linear_response_is_the_receptance():
+    response = ij.frequency_response(LINEAR, 1.0, (0.2, 2.0))
+    omega = TURN * np.asarray(response.frequency)
+    exact = 1.0 / (50.0 - 2.0 * omega**2 + 0.8j * omega)
+    np.testing.assert_allclose(response.receptance, exact, rtol=1e-6)
+    np.testing.assert_allclose(response.amplitude, np.abs(exact), rtol=1e-6)
+    np.testing.assert_allclose(response.phase, np.angle(exact), atol=1e-6)
+    assert np.all(response.stable)
+    assert response.special_points == ()
+
+
+@pytest.mark.slow
+def test_response_folds_where_the_force_is_a_fold_force():
+    # 144.52 N is the lower fold at 4.4 Hz and 150.66 N the upper, by an independent shooting code.
+    response = ij.frequency_response(ij.paper.y_direction(), [144.52, 150.66], np.linspace(4.2, 4.6, 5))
+    for place in range(2):
+        folds = [
+            float(point.frequency)
+            for point in response.special_points
+            if point.kind == "fold" and point.branch == place
+        ]
+        assert len(folds) == 2
+        assert min(abs(fold - 4.4) for fold in folds) < 2e-4
+        found = np.isfinite(response.frequency[place])
+        unstable = np.asarray(response.frequency[place])[found & ~np.asarray(response.stable[place])]
+        assert unstable.size
+        assert min(folds) - 1e-3 < unstable.min()
+        assert unstable.max() < max(folds) + 1e-3
+
+
+@pytest.mark.parametrize("excitation", ["force", "base_acceleration"])
+def test_transmissibility_of_a_linear_isolator_is_the_textbooks(excitation):
+    model = ij.Isolator(LINEAR.mass, LINEAR.elements, excitation)
+    band = np.linspace(0.2, 2.0, 7)
+    found = ij.transmissibility(model, 1.5, band)
+    exact = linear_ratio(band)
+    np.testing.assert_allclose(found.ratio, exact, rtol=3e-6)
+    np.testing.assert_allclose(found.magnitude, np.abs(exact), rtol=3e-6)
+    np.testing.assert_allclose(found.peak, np.abs(exact), rtol=3e-6)
+    assert np.all(found.stable)
+
+
+@pytest.mark.slow
+def test_derivative_of_transmissibility_is_the_textbooks():
+    band = np.array([0.5, 0.9, 1.6])
+    slope = jax.jacfwd(lambda model: ij.transmissibility(model, 1.5, band).magnitude)(LINEAR)
+    omega = TURN * band
+    ratio, below = linear_ratio(band), 50.0 - 2.0 * omega**2 + 0.8j * omega
+    by_damping = 1j * omega / below * (1.0 - ratio)
+    exact = np.real(np.conj(ratio) * by_damping) / np.abs(ratio)
+    np.testing.assert_allclose(slope.elements[1].coefficient, exact, rtol=1e-5)
+
+
+def steady_y(force: float, frequency: float, base: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One settled period of the y model by DOP853: phase, displacement, velocity."""
+    omega = TURN * frequency
+
+    def rates(t, y):
+        push = -force if base else force / 800.0
+        return [y[1], push * math.sin(omega * t) - (spring_y(y[0]) + damper_y(y[1])) / 800.0]
+
+    phase = TURN * np.arange(512) / 512
+    times = (40 * TURN + phase) / omega
+    run = solve_ivp(
+        rates, (0.0, times[-1]), [0.0, 0.0], method="DOP853", t_eval=times, rtol=1e-10, atol=1e-14
+    )
+    return phase, run.y[0], run.y[1]
+
+
+def half_range(values: np.ndarray) -> float:
+    return 0.5 * (values.max() - values.min())
+
+
+@pytest.mark.slow
+def test_force_on_the_ground_is_that_of_scipys_motion():
+    found = ij.transmissibility(ij.paper.y_direction(), 300.0, [3.0, 5.5])
+    for place, frequency in enumerate((3.0, 5.5)):
+        phase, x, v = steady_y(300.0, frequency, base=False)
+        passed = spring_y(x) + damper_y(v)
+        ratio = 2.0 * np.mean(passed * np.exp(-1j * phase)) / (-1j * 300.0)
+        assert complex(found.ratio[place]) == pytest.approx(ratio, rel=2e-5)
+        assert float(found.peak[place]) == pytest.approx(half_range(passed) / 300.0, rel=2e-4)
+
+
+@pytest.mark.slow
+def test_motion_over_the_bases_is_that_of_scipys_motion():
+    model = ij.Isolator(800.0, ij.paper.y_direction().elements, "base_acceleration")
+    found = ij.transmissibility(model, 0.3, [3.0, 6.0])
+    for place, frequency in enumerate((3.0, 6.0)):
+        omega = TURN * frequency
+        phase, x, _ = steady_y(0.3, frequency, base=True)
+        base = -0.3 / omega**2 * np.sin(phase)
+        ratio = np.mean((x + base) * np.exp(-1j * phase)) / np.mean(base * np.exp(-1j * phase))
+        assert complex(found.ratio[place]) == pytest.approx(ratio, rel=2e-5)
+        assert float(found.peak[place]) == pytest.approx(half_range(x + base) / half_range(base), rel=2e-4)
+
+
+def test_coexisting_orbits_each_have_their_transmissibility():
+    found = ij.transmissibility(ij.paper.y_direction(), 175.0, [4.2], coexisting=True)
+    assert found.ratio.shape == (3, 1)
+    assert np.asarray(found.stable)[:, 0].tolist() == [True, False, True]
+
+
+def test_bad_arguments_are_refused():
+    with pytest.raises(ValueError, match="one positive number"):
+        ij.transmissibility(LINEAR, -1.0, [1.0])
+    with pytest.raises(ValueError, match="must ascend"):
+        ij.transmissibility(LINEAR, 1.0, [1.0, 0.5])
+    with pytest.raises(ValueError, match="must be positive"):
+        ij.backbone_curve(LINEAR, [0.0])
+    with pytest.raises(ValueError, match="positive number or a list"):
+        ij.frequency_response(LINEAR, 0.0, (1.0, 2.0))
+    with pytest.raises(ValueError, match="end at another"):
+        ij.frequency_response(LINEAR, 1.0, (1.0, 1.0))
