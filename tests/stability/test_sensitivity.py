@@ -144,6 +144,23 @@ def test_derivatives_of_a_map_are_those_of_its_orbits(paper: ij.Isolator, at_jum
     np.testing.assert_allclose(found, single.derivatives["spectral_radius"], rtol=1e-4)
 
 
+@pytest.mark.slow
+def test_fold_force_moves_as_the_fold_that_differences_find(paper: ij.Isolator):
+    def fold(model: ij.Isolator) -> ij.SpecialPoint:
+        found = ij.continue_branch(model, parameter="amplitude", frequency=4.3, start=120.0, stop=200.0)
+        return found.special_points[0]
+
+    point = fold(paper)
+    assert point.kind == "fold"
+    names = ("cubic_stiffness.coefficient", "linear_damping.coefficient", "drive.frequency")
+    sens = ij.sensitivity(point, parameters=names)
+    for name in names[:2]:
+        value, step = float(paper[name]), 1e-4
+        changed = [paper.replace(**{name.replace(".", "__"): value * (1 + s * step)}) for s in (1, -1)]
+        above, below = (float(fold(model).amplitude) for model in changed)
+        assert float(sens.by("value", name)) == pytest.approx((above - below) / (2 * step * value), rel=1e-6)
+
+
 def test_function_of_a_model_is_differentiated_by_name():
     def static(model: ij.Isolator):
         return {"softness": 1.0 / model["linear_stiffness.coefficient"]}

@@ -67,6 +67,9 @@ class SpecialPoint(eqx.Module):
         direction: direction of the state in which the orbit loses its hold, SI units; of a pair
             its real part.
         result: whether it was found to the tolerance of a single orbit; if not, its numbers are NaN.
+        family: isolators and drives along the parameter.
+        integrator: steps and solver.
+        symmetric: whether it was closed with the half-period map.
     """
 
     kind: Kind = eqx.field(static=True)
@@ -80,6 +83,9 @@ class SpecialPoint(eqx.Module):
     half_period_multipliers: Complex[Array, " multiplier"]
     direction: Float[Array, " state"]
     result: RESULTS
+    family: Family
+    integrator: Integrator
+    symmetric: bool = eqx.field(static=True)
 
     @property
     def spectral_radius(self) -> Float[Array, ""]:

@@ -12,10 +12,13 @@ from .._parameters import list_parameters
 from .._types import check_float64
 from ..excitations import Harmonic
 from ..models import Isolator
+from ._branch import SpecialPoint
+from ._family import Family
 from ._map import StabilityMap
 from ._map_slopes import map_slopes
 from ._orbit import Orbit, find_periodic_orbit
 from ._parameter_values import DRIVE, with_values
+from ._special_points import special_point
 
 
 class Sensitivity(eqx.Module):
@@ -72,7 +75,7 @@ class Sensitivity(eqx.Module):
 
 
 def sensitivity(
-    subject: Orbit | StabilityMap | Callable[[Isolator], Mapping[str, Array] | Array],
+    subject: Orbit | StabilityMap | SpecialPoint | Callable[[Isolator], Mapping[str, Array] | Array],
     model: Isolator | None = None,
     *,
     parameters: Sequence[str] | None = None,
@@ -85,11 +88,12 @@ def sensitivity(
 
     Args:
         subject: an orbit (`y0`, `amplitude`, `multipliers`, `spectral_radius`); a map (`response`,
-            `multipliers`, `spectral_radius` in every cell); or a function of a model that gives one array or
-            several by name, such as `lambda m: ij.continue_branch(m, ...).special_points[0].amplitude`.
+            `multipliers`, `spectral_radius` in every cell); a special point of a branch, such as a fold
+            (`value` of the branch's parameter, `y0`); or a function of a model that gives one array or
+            several by name, such as `lambda m: ij.transmissibility(m, ...).force`.
         model: the isolator, where `subject` is a function.
-        parameters: names of the parameters to differentiate by; all of the model, and for an orbit or a map
-            the drive, if omitted.
+        parameters: names of the parameters to differentiate by; all of the model and, but for a
+            function, the drive, if omitted; at a special point without the branch's own parameter.
         covariance: of parameters, such as a fit's.
         covariance_of: their names, in its order, such as a fit's `free`.
 
@@ -104,17 +108,21 @@ def sensitivity(
     Source: implicit function theorem; first-order propagation of errors.
     """
     check_float64()
-    function = not isinstance(subject, Orbit | StabilityMap)
+    function = not isinstance(subject, Orbit | StabilityMap | SpecialPoint)
     if function == (model is None):
         raise ValueError(
             "Argument `model` must be given where `subject` is a function, and only there, but is "
             f"{'missing' if model is None else 'given'}."
         )
-    of = model if isinstance(model, Isolator) else subject.model  # type: ignore[union-attr]
+    of = model if isinstance(model, Isolator) else _model_of(subject)
     entries = {entry.name: (entry.spec.unit, entry.value) for entry in list_parameters(of)}
     if isinstance(subject, Orbit):
         entries[DRIVE[0]] = ("N", jnp.asarray(subject.excitation.amplitude))
         entries[DRIVE[1]] = ("Hz", jnp.asarray(subject.excitation.frequency))
+    elif isinstance(subject, SpecialPoint):
+        entries[DRIVE[0]], entries[DRIVE[1]] = ("N", subject.amplitude), ("Hz", subject.frequency)
+        for own in subject.family.names:
+            entries.pop(f"drive.{own}" if own in ("amplitude", "frequency") else own)
     elif isinstance(subject, StabilityMap):
         # Differentiated cell by cell, at each cell's own drive.
         nothing = jnp.asarray(jnp.nan)
@@ -131,12 +139,18 @@ def sensitivity(
         values, slopes = map_slopes(subject, names)
     elif isinstance(subject, Orbit):
         values, slopes = _orbit_slopes(subject, names, at)
+    elif isinstance(subject, SpecialPoint):
+        values, slopes = _point_slopes(subject, names, at)
     else:
         values, slopes = _slopes(_by_name(subject), of, names, at)
     errors = None
     if matrix is not None:
         errors = {name: _standard_error(slope, jnp.asarray(matrix)) for name, slope in slopes.items()}
     return Sensitivity(names, tuple(entries[name][0] for name in names), at, values, slopes, errors)
+
+
+def _model_of(subject: object) -> Isolator:
+    return subject.family.model if isinstance(subject, SpecialPoint) else subject.model  # type: ignore[attr-defined]
 
 
 def _by_name(
@@ -154,6 +168,34 @@ def _slopes(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     def of(numbers: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         given = function(with_values(model, names, numbers))
+        return given, given
+
+    slopes, values = jax.jacfwd(of, has_aux=True)(at)
+    return values, {name: jnp.moveaxis(slope, -1, 0) for name, slope in slopes.items()}
+
+
+def _point_slopes(
+    point: SpecialPoint, names: tuple[str, ...], at: Array
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    family = point.family
+    shares = (point.value[None] - family.start) / (family.stop - family.start)
+    fixed = (jnp.asarray(family.amplitude), jnp.asarray(family.frequency))
+
+    def of(numbers: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        drive = [numbers[names.index(n)] if n in names else v for n, v in zip(DRIVE, fixed, strict=True)]
+        model = with_values(family.model, names, numbers)
+        there = Family(model, drive[0], drive[1], family.start, family.stop, family.names)
+        found = special_point(
+            there,
+            point.integrator,
+            point.kind,
+            point.periods,
+            point.symmetric,
+            point.branch,
+            jax.lax.stop_gradient(point.y0),
+            shares,
+        )
+        given = {"value": found.value, "y0": found.y0}
         return given, given
 
     slopes, values = jax.jacfwd(of, has_aux=True)(at)

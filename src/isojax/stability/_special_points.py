@@ -291,4 +291,7 @@ def special_point(
         roots if half else jnp.full(roots.shape, jnp.nan + 0j),
         found.direction * found.scale,
         result,
+        family,
+        integrator,
+        half,
     )
