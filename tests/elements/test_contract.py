@@ -268,8 +268,8 @@ def test_a_law_beside_its_kinks_is_the_law_where_it_lies_on_those_sides(kind):
 
 @every_element
 def test_a_law_beside_a_kink_goes_on_smoothly_past_it(kind):
-    # With the sides held, the slope across the kinks, which all lie at rest, is that of central differences; of
-    # |s|s itself they differ by |s|s times the step.
+    # With the sides held, the slope across the kinks, which all lie at rest, is that of central differences;
+    # for |s|s itself the two differ by |s|s times the step.
     element = with_strength(kind.guess(SCALES), 0.5)
     x, v, *_ = motion((16,))
     s = internal(element, rest=False, shape=(16,))
