@@ -15,6 +15,7 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from .._results import RESULTS
 from .._types import check_float64
 from ..models import Integrator, Isolator
+from ._axis import ascending
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._drive import Sine
 from ._pass import (
@@ -143,7 +144,7 @@ def stability_map(
     """
     check_float64()
     asked, integrator = integrator, Integrator() if integrator is None else integrator
-    forces, band = _axis("amplitudes", amplitudes), _axis("frequencies", frequencies)
+    forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:
         raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
     if chunk < 1:
@@ -226,19 +227,3 @@ def _gridded(
     arrays["code"] = code if coexisting else code[0]
     arrays["count"] = (code == FOUND).sum(axis=0)
     return arrays
-
-
-def _axis(name: str, values: Any) -> Float[np.ndarray, " axis"]:
-    axis = np.asarray(values, dtype=float)
-    if axis.ndim != 1 or not axis.size:
-        raise ValueError(f"Argument `{name}` must be a list of numbers, but has shape {axis.shape}.")
-    bad = np.flatnonzero(~(np.isfinite(axis) & (axis > 0.0)))
-    if bad.size:
-        raise ValueError(f"Argument `{name}` must be positive, but {name}[{bad[0]}] = {axis[bad[0]]}.")
-    bad = np.flatnonzero(np.diff(axis) <= 0.0)
-    if bad.size:
-        place = bad[0] + 1
-        raise ValueError(
-            f"Argument `{name}` must ascend, but {name}[{place}] = {axis[place]} follows {axis[place - 1]}."
-        )
-    return axis
