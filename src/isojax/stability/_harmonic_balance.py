@@ -86,8 +86,8 @@ class HarmonicBalance(eqx.Module):
 def _at(row: Complex[Array, " harmonic"], phase: Lanes) -> Lanes:
     """Give the sum of harmonics at phases."""
     order = jnp.arange(row.size)
-    turned = jnp.exp(1j * order * jnp.asarray(phase)[..., None])
-    return jnp.real(jnp.sum(row * turned, axis=-1))
+    turned = jnp.exp(1j * jnp.multiply.outer(jnp.asarray(phase), order))
+    return jnp.real(turned @ row)
 
 
 def harmonic_balance(
@@ -162,7 +162,7 @@ def _balance(
     count, omega = 1 + model.internal_states, 2.0 * math.pi * held.frequency
     scale = jnp.max(jnp.abs(first), axis=1)
     scale = jnp.where(jnp.isfinite(scale) & (scale > 0.0), scale, 1.0)
-    order, kept = jnp.arange(harmonics + 1), min(harmonics + 1, first.shape[1])
+    order, kept = jnp.arange(harmonics + 1)[None], min(harmonics + 1, first.shape[1])
     phase = jnp.asarray(2.0 * np.pi / samples * np.arange(samples))
 
     def rows(unknown: Array) -> Array:
