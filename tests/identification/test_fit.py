@@ -12,7 +12,6 @@ from isojax._results import RESULTS, is_successful
 from isojax.elements import (
     CoulombFriction,
     CubicStiffness,
-    InputDelay,
     InputGain,
     LinearDamping,
     LinearStiffness,
@@ -320,14 +319,6 @@ def test_a_mass_and_a_gain_cannot_be_told_apart_and_it_is_said(simulated):
     assert np.isnan(found.standard_errors["mass"])
     assert np.isnan(found.standard_errors["input_gain.deviation"])
     assert any("not determined apart" in line for line in warnings_of(found))
-
-
-def test_a_held_drive_hides_a_delay_and_it_is_said(simulated):
-    campaign = simulated(LINEAR, BROAD, 4, input={"hold": "zero_order"})
-    found = fit(START.with_elements(InputDelay(0.0)), campaign, integrator=ONE_STEP)
-    assert np.isnan(found.standard_errors["input_delay.delay"])
-    assert np.isfinite(found.standard_errors["linear_stiffness.coefficient"])
-    assert any("input_delay.delay is not determined" in line for line in warnings_of(found))
 
 
 def test_progress_is_told_a_line_a_step(linear):
