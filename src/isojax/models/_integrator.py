@@ -90,7 +90,7 @@ class Integrator(eqx.Module):
     @property
     def map_error(self) -> float:
         """Error of a map's multipliers to which its steps are chosen, where none are asked for."""
-        return 1e-5
+        return 2e-5
 
     @property
     def map_tolerance(self) -> float:

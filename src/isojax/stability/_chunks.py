@@ -3,7 +3,9 @@
 import hashlib
 import io
 import json
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jax
@@ -66,24 +68,28 @@ def run_chunks(
     states = 2 + solver.model.internal_states
     kinks = solver.tables[0].shape[0] - states - 1
     processes, own = jax.process_count(), jax.process_index()
-    parts: list[Found] = []
-    for place, begin in enumerate(begins):
+
+    def one(place: int) -> Found:
+        begin = begins[place]
         if place % processes != own:
-            parts.append(_blank(min(lanes, total - begin), states, kinks))
-            continue
+            return _blank(min(lanes, total - begin), states, kinks)
         path = None if folder is None else folder / f"{name}-{place:05d}.npz"
         if path is not None and path.exists():
             with np.load(path) as kept:
-                parts.append(Found(*(kept[field] for field in Found._fields)))
-            continue
+                return Found(*(kept[field] for field in Found._fields))
         part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
         if path is not None:
             buffer = io.BytesIO()
             np.savez(buffer, **part._asdict())
             write_whole(path, buffer.getvalue())
-        parts.append(part)
         if progress is not None:
             progress(f"{min(begin + lanes, total)} of {total} orbits")
+        return part
+
+    # A pass keeps one core busy; each core runs its own. Chunks over several devices go one by one.
+    cores = 1 if solver.sharding.num_devices > 1 else (os.cpu_count() or 1)
+    with ThreadPoolExecutor(cores) as pool:
+        parts = list(pool.map(one, range(len(begins))))
     whole = (
         Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
         if parts

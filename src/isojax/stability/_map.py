@@ -93,7 +93,8 @@ class StabilityMap(eqx.Module):
         state = tuple(self.start.reshape(force.size, -1).T)
         sine, cosine = self.direction.reshape(force.size, 2).T * force[None]
         lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel())
-        method = Method(self.integrator, self.symmetric, None)
+        steps = jnp.asarray(self.integrator.steps_a_period(self.model))
+        method = Method(self.integrator, self.symmetric, None, steps)
         return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)
 
 
@@ -105,7 +106,7 @@ def stability_map(
     coexisting: bool = False,
     reach: float = 3.0,
     integrator: Integrator | None = None,
-    chunk: int = 65536,
+    chunk: int = 32768,
     checkpoint: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
     devices: Any = None,
@@ -126,7 +127,7 @@ def stability_map(
         reach: displacement up to which orbits are sought, over the largest that grows from rest without a
             jump anywhere in the window.
         integrator: steps a period; RK4 with as many as a sample of orbits needs if omitted.
-        chunk: orbits computed at once; bounds the memory.
+        chunk: orbits computed at once by each core; bounds the memory.
         checkpoint: folder in which finished chunks are kept; a run that was killed goes on from there and
             gives the same numbers.
         progress: called with a line now and then.
@@ -154,13 +155,14 @@ def stability_map(
     if progress is not None:
         progress("orbits over displacement and frequency found")
     candidates = find_candidates(surface, forces)
-    if not coexisting:
+    if not coexisting and candidates.order.any():
         candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
     if not candidates.force.size:
         raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
     # Orbits that pass kinks in another order than most are not split, and computed apart with finer steps.
     shared = surface.shared[candidates.frequency, candidates.interval]
-    candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
+    if not shared.all():
+        candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
     groups = np.split(np.arange(shared.size), [int(shared.sum())])
     if asked is None:
         trial = cell_solvers(model, integrator.with_steps(_FEWEST), half, surface, forces, devices)
@@ -174,7 +176,7 @@ def stability_map(
     solvers = cell_solvers(model, integrator, half, surface, forces, devices)
     for name, solver, group in zip(("split", "whole"), solvers, groups, strict=True):
         if group.size:
-            own = Candidates(*(values[group] for values in candidates))
+            own = Candidates(*(values[group[0] : group[-1] + 1] for values in candidates))
             parts.append(run_chunks(solver, own, chunk, folder, name, progress))
             errors.append(sampled_error(solver, own, parts[-1], forces, band))
     found = Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))

@@ -61,7 +61,8 @@ def map_slopes(smap: StabilityMap, names: Sequence[str]) -> tuple[dict[str, Arra
         "multipliers": np.full((count, cells, states), np.nan + 0j),
         "spectral_radius": np.full((count, cells), np.nan),
     }
-    method = Method(smap.integrator, smap.symmetric, smap.sides)
+    steps = jnp.asarray(smap.integrator.steps_a_period(smap.model))
+    method = Method(smap.integrator, smap.symmetric, smap.sides, steps)
     own = tuple(names)
     for block in _blocks(together, _CHUNK):
         some = jax.tree_util.tree_map(lambda values, block=block: values[block], lanes)

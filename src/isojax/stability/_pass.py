@@ -14,7 +14,6 @@ from .._types import Lanes
 from ..models import Integrator, Isolator, State
 from ._drive import Sine
 from ._floquet import modulus, multipliers
-from ._period_map import period_map
 from ._pieces import Crossings, advance_in_pieces
 from ._starts import Candidates, candidate_starts
 from ._surface import Surface
@@ -23,13 +22,13 @@ _PASSES = 12
 """Newton steps after which a cell counts as failed."""
 
 _SAMPLED = 1024
-"""Cells of which the integration error is found."""
+"""Cells of which the integration error is found, and that share a further pass where the first did not do."""
+
+_CLOSED = 1e-9
+"""Relative step after which an orbit is closed far better than it is integrated."""
 
 _FINER = 4
 """Times the steps of a map with which its error is found."""
-
-_LEFTOVERS = 4096
-"""Cells that share a further pass, where the first did not do."""
 
 FOUND, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
 """Codes of how the search in a cell ended."""
@@ -77,25 +76,27 @@ class Method(eqx.Module):
     """How a period is integrated over.
 
     Attributes:
-        integrator: steps a period.
+        integrator: the solver and the tolerances.
         half: whether the half-period map is used.
         sides: signs of the kinks on each piece; None where orbits are not split.
+        steps: a period; a number on the device, so that one compiled pass serves for all.
     """
 
     integrator: Integrator
     half: bool = eqx.field(static=True)
     sides: Float[Array, "piece kink"] | None
+    steps: Int[Array, ""]
 
-    def with_integrator(self, integrator: Integrator) -> "Method":
-        """Give the same way with other steps.
+    def finer(self, times: int) -> "Method":
+        """Give the same way with more steps.
 
         Args:
-            integrator: steps a period.
+            times: how many times as many.
 
         Returns:
             The method.
         """
-        return Method(integrator, self.half, self.sides)
+        return Method(self.integrator, self.half, self.sides, self.steps * times)
 
     def moved(self, model: Isolator, lane: Lane) -> State:
         """Give the state one period later, or minus the state half a period later.
@@ -107,18 +108,17 @@ class Method(eqx.Module):
         Returns:
             The state.
         """
-        turns = 0.5 if self.half else 1.0
-        if self.sides is None:
-            return period_map(model, self.integrator, lane.drive, lane.state, turns=turns)
-        pieces = len(lane.phases) + 1
-        steps = math.ceil(self.integrator.steps_a_period(model) * turns / pieces)
+        phases = () if self.sides is None else lane.phases
+        pieces = len(phases) + 1
+        parts = pieces * (2 if self.half else 1)
+        steps = (self.steps + parts - 1) // parts
         crossings = Crossings(
-            jnp.stack(lane.phases) if lane.phases else jnp.zeros(0),
+            jnp.stack(phases) if phases else jnp.zeros(0),
             jnp.full(pieces - 1, -1),
             self.sides,
             jnp.array(True),
         )
-        end = 2.0 * math.pi * turns
+        end = math.pi if self.half else 2.0 * math.pi
         after, _ = advance_in_pieces(model, self.integrator, lane.drive, lane.state, crossings, end, steps)
         return tuple(-value for value in after) if self.half else after
 
@@ -225,9 +225,9 @@ class CellSolver(eqx.Module):
             late = np.flatnonzero(~(step <= limit) & np.isfinite(radius))
             if not late.size:
                 break
-            for begin in range(0, late.size, _LEFTOVERS):
-                block = late[begin : begin + _LEFTOVERS]
-                some = jax.tree_util.tree_map(lambda it, block=block: _padded(it[block], _LEFTOVERS), lanes)
+            for begin in range(0, late.size, _SAMPLED):
+                block = late[begin : begin + _SAMPLED]
+                some = jax.tree_util.tree_map(lambda it, block=block: _padded(it[block], _SAMPLED), lanes)
                 again = _pass(self.model, method, jax.device_put(some, self.sharding))
                 targets = [*lanes.state, step, roots, radius]
                 for target, value in zip(targets, [*again[0], *again[1:]], strict=True):
@@ -276,8 +276,9 @@ def cell_solvers(
     tables = (surface.tables, surface.amplitudes, surface.rest, forces, surface.frequencies)
     placed = tuple(jax.device_put(jnp.asarray(table), everywhere) for table in tables)
     cells = NamedSharding(mesh, PartitionSpec("cell"))
-    split = Method(integrator, half, jnp.asarray(surface.sides))
-    whole = Method(integrator.with_steps(4 * integrator.steps_per_period), half, None)
+    steps = jnp.asarray(integrator.steps_a_period(model))
+    split = Method(integrator, half, jnp.asarray(surface.sides), steps)
+    whole = Method(integrator, half, None, 4 * steps)
     return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
 
 
@@ -306,9 +307,8 @@ def sampled_error(
     picked = good[np.unique(np.linspace(0, good.size - 1, _SAMPLED).astype(int))]
     lanes = lanes_of(found, candidates, forces, frequencies, picked)
     lanes = jax.tree_util.tree_map(lambda values: jnp.asarray(_padded(np.asarray(values), _SAMPLED)), lanes)
-    coarse = solver.method.integrator
-    method = solver.method.with_integrator(coarse.with_steps(_FINER * coarse.steps_per_period))
-    finer = solver.improve(method, lanes, picked.size)
+    # So far that what is left is the error of the integration alone.
+    finer = solver.improve(solver.method.finer(_FINER), lanes, picked.size, limit=_CLOSED)
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]
@@ -335,8 +335,7 @@ def steps_needed(
     integrator = solver.method.integrator
     picked = np.unique(np.linspace(0, candidates.force.size - 1, _SAMPLED).astype(int))
     some = Candidates(*(values[picked] for values in candidates))
-    # So far that what is left is the error of the integration alone.
-    found = solver(some, _SAMPLED, limit=1e-9)
+    found = solver(some, _SAMPLED, limit=_CLOSED)
     error = sampled_error(solver, some, found, forces, frequencies)
     if not error > integrator.map_error:
         return integrator.steps_per_period
@@ -387,7 +386,7 @@ def states_at_zero(model: Isolator, method: Method, lanes: Lane) -> State:
         turned = method.half & (target >= math.pi)
         target = jnp.where(turned, target - math.pi, target)
         nothing = Crossings(jnp.zeros(0), jnp.zeros(0, int), None, jnp.array(True))
-        steps = 4 * method.integrator.steps_a_period(model)
+        steps = 4 * method.steps
         state, _ = advance_in_pieces(model, method.integrator, drive, lane.state, nothing, target, steps)
         return tuple(jnp.where(turned, -value, value) for value in state)
 

@@ -53,17 +53,20 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"]) -> Ca
         One candidate for each passage of the surface through a force.
     """
     # The count of forces below the surface; between two nodes it changes by the forces that are passed.
-    rank = np.searchsorted(forces, surface.force)
+    rank = np.searchsorted(forces, surface.force).astype(np.int32)
     low, high = np.minimum(rank[:, :-1], rank[:, 1:]), np.maximum(rank[:, :-1], rank[:, 1:])
     passed = high - low
     column, interval = np.nonzero(passed)
     counts = passed[column, interval]
     first = np.repeat(np.cumsum(counts) - counts, counts)
     force = np.repeat(low[column, interval], counts) + np.arange(counts.sum()) - first
-    column, interval = np.repeat(column, counts), np.repeat(interval, counts)
-    sequence = np.lexsort((interval, force, column))
-    force, column, interval = force[sequence], column[sequence], interval[sequence]
-    cell = column * len(forces) + force
+    column, interval = (np.repeat(part.astype(np.int32), counts) for part in (column, interval))
+    cell = column.astype(np.int64) * len(forces) + force
+    # By cell, and within one by displacement, in which order they come.
+    sequence = np.argsort(cell, kind="stable")
+    force, column, interval, cell = (
+        part[sequence] for part in (force.astype(np.int32), column, interval, cell)
+    )
     new = np.r_[True, cell[1:] != cell[:-1]] if cell.size else np.zeros(0, bool)
     begin = np.maximum.accumulate(np.where(new, np.arange(cell.size), 0))
     return Candidates(force, column, interval, np.arange(cell.size) - begin)
