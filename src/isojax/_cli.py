@@ -1,6 +1,8 @@
-"""The command line: close-loop, fit, effects, demo."""
+"""The command line: close-loop, fit, map, effects, demo."""
 
 import argparse
+import contextlib
+import math
 import os
 import sys
 import time
@@ -9,21 +11,38 @@ from importlib.metadata import version
 from pathlib import Path
 
 import jax
+import numpy as np
 from rich.console import Console
 from rich.text import Text
 
 from ._results import is_successful
 from .demo import campaign_folder
 from .identification import Fit, classical_guess, fit, read_campaign
-from .reporting import catalogue_table, check_folder, close_loop, loop_summary, model_text, write_texts
+from .models import load_model
+from .reporting import (
+    catalogue_table,
+    check_folder,
+    close_loop,
+    compile_seconds,
+    folds_around,
+    loop_summary,
+    map_summary,
+    model_text,
+    write_map,
+    write_texts,
+)
+from .stability import stability_map
 
 _WIDTH = 120
 
 _NOT_CONVERGED = 1
 
+_CELLS = 200
+"""Values along each side of a map, if not told."""
+
 _EXIT_CODES = (
-    "Exit codes: 0 done; 1 the fit did not converge, which its report says; 2 an argument or a file is bad, "
-    "and nothing is written."
+    "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
+    "argument or a file is bad, and nothing is written."
 )
 
 
@@ -34,8 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: words after the command's name; those of the process if omitted.
 
     Returns:
-        Exit code: 0, 1 where the fit did not converge (its report is written all the same), or 2 where an
-        argument or a file is bad.
+        Exit code: 0, 1 where the fit or every cell of the map did not converge (what was found is written all
+        the same), or 2 where an argument or a file is bad.
     """
     jax.config.update("jax_enable_x64", True)
     cache = os.environ.get("ISOJAX_CACHE")
@@ -52,7 +71,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="isojax",
-        description="Identify a nonlinear vibration isolator from time histories; name what its model lacks.",
+        description="Identify a nonlinear vibration isolator from time histories; name what its model lacks; "
+        "map the stability of its periodic response.",
         epilog=f"{_EXIT_CODES} ISOJAX_CACHE names a folder in which compiled code is kept between runs.",
     )
     parser.add_argument("--version", action="version", version=f"isojax {version('isojax')}")
@@ -72,6 +92,29 @@ def _parser() -> argparse.ArgumentParser:
     _quiet(single)
     single.set_defaults(run=lambda asked: _fit(asked.campaign, asked.out, asked.quiet))
 
+    plane = commands.add_parser(
+        "map",
+        help="find the periodic orbits over drive amplitude and frequency, and whether they are stable",
+        description="Find the periodic orbits of a model over a grid of drive amplitude and frequency, and "
+        "their Floquet multipliers. Writes map.npz (all arrays, SI units), map.png (largest multiplier), "
+        "response.png and, where orbits coexist, folds.png; prints a summary.",
+        epilog=_EXIT_CODES,
+    )
+    plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
+    _axis(plane, "amplitudes", "drive amplitudes [N, or m/s^2 for base excitation]")
+    _axis(plane, "frequencies", "drive frequencies [Hz]")
+    plane.add_argument(
+        "--coexisting", action="store_true", help="all orbits of a cell, not only that of the smallest motion"
+    )
+    plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
+    plane.add_argument(
+        "--checkpoint",
+        metavar="DIR",
+        help="keep finished chunks here; a run that was killed goes on from them",
+    )
+    _quiet(plane)
+    plane.set_defaults(run=_map)
+
     effects = commands.add_parser("effects", help="list the effects that can be named")
     effects.set_defaults(run=lambda asked: _effects())
 
@@ -88,6 +131,16 @@ def _campaign(parser: argparse.ArgumentParser) -> None:
 
 def _quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no lines of progress")
+
+
+def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
+    parser.add_argument(
+        f"--{name}",
+        required=True,
+        nargs="+",
+        metavar=("START STOP", "COUNT"),
+        help=f"{words}; COUNT equal steps apart, {_CELLS} if not told",
+    )
 
 
 def _progress(quiet: bool) -> Callable[[str], None]:
@@ -134,6 +187,61 @@ def _fit(campaign: str | Path, out: str | None, quiet: bool) -> int:
     print(report)
     print(f"{time.perf_counter() - begin:.1f} s with compiling")
     return _exit_code(fitted)
+
+
+def _map(asked: argparse.Namespace) -> int:
+    folder, model = check_folder(asked.out), load_model(asked.model)
+    amplitudes = _values("--amplitudes", asked.amplitudes)
+    frequencies = _values("--frequencies", asked.frequencies)
+    progress = _progress(asked.quiet)
+    seconds, watch = {}, _stopwatch()
+    smap = stability_map(
+        model,
+        amplitudes,
+        frequencies,
+        coexisting=asked.coexisting,
+        checkpoint=asked.checkpoint,
+        progress=progress,
+    )
+    seconds["map"] = watch()
+    folds = None
+    if np.any(np.asarray(smap.count) > 1):
+        progress("following the folds around cells with several orbits")
+        folds = folds_around(smap)
+        seconds["folds"] = watch()
+    progress("drawing")
+    written = write_map(smap, folder, folds=folds)
+    seconds["pictures"] = watch()
+    print(map_summary(smap, folds=folds, seconds=seconds))
+    print(f"see {', '.join(str(folder / name) for name in written)}")
+    return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
+
+
+def _values(option: str, words: Sequence[str]) -> np.ndarray:
+    """Give the values along one side of a map."""
+    start, stop, count = math.nan, math.nan, 0
+    if 2 <= len(words) <= 3:
+        with contextlib.suppress(ValueError):
+            start, stop, count = float(words[0]), float(words[1]), int((*words, _CELLS)[2])
+    if count < 2 or not 0.0 < start < stop < math.inf:
+        raise ValueError(
+            f"{option} must be START STOP [COUNT], two ascending positive numbers and a count of at least 2, "
+            f"but is {' '.join(words)}."
+        )
+    return np.linspace(start, stop, count)
+
+
+def _stopwatch() -> Callable[[], tuple[float, float]]:
+    """Give what tells the seconds since it was last asked: compiling, and everything else."""
+    last = [compile_seconds(), time.perf_counter()]
+
+    def watch() -> tuple[float, float]:
+        now = [compile_seconds(), time.perf_counter()]
+        compiling, wall = (later - earlier for later, earlier in zip(now, last, strict=True))
+        last[:] = now
+        return compiling, max(0.0, wall - compiling)
+
+    return watch
 
 
 def _exit_code(fitted: Fit) -> int:

@@ -12,12 +12,17 @@ from ._classical import plot_equivalent as plot_equivalent
 from ._classical import plot_receptance as plot_receptance
 from ._closed_loop import ClosedLoop as ClosedLoop
 from ._closed_loop import close_loop as close_loop
+from ._compile_seconds import compile_seconds as compile_seconds
 from ._evidence import plot_errors as plot_errors
 from ._evidence import plot_ranking as plot_ranking
 from ._evidence import plot_stiffness_scatter as plot_stiffness_scatter
 from ._fold_curve import plot_fold_curve as plot_fold_curve
 from ._forces import plot_effect as plot_effect
 from ._forces import plot_restoring_force as plot_restoring_force
+from ._map_files import folds_around as folds_around
+from ._map_files import map_arrays as map_arrays
+from ._map_files import write_map as write_map
+from ._map_summary import map_summary as map_summary
 from ._page import render_page as render_page
 from ._record import plot_record as plot_record
 from ._residuals import plot_correlation as plot_correlation

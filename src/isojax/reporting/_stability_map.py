@@ -137,9 +137,7 @@ def _caption(smap: StabilityMap) -> str:
 
 
 def _colormap(colours: tuple[str, ...]) -> Colormap:
-    made = LinearSegmentedColormap.from_list("isojax", colours, _TONES)
-    made.set_bad(alpha=0.0)
-    return made
+    return LinearSegmentedColormap.from_list("isojax", colours, _TONES)
 
 
 def _about_one(radius: Float[np.ndarray, "amplitude frequency"]) -> tuple[Colormap, Normalize]:
@@ -152,7 +150,6 @@ def _about_one(radius: Float[np.ndarray, "amplitude frequency"]) -> tuple[Colorm
     below = LinearSegmentedColormap.from_list("below", _STABLE, _TONES)(np.linspace(0.0, 1.0, _TONES))
     above = LinearSegmentedColormap.from_list("above", _UNSTABLE, _TONES)(np.linspace(0.0, 1.0, _TONES))
     both = LinearSegmentedColormap.from_list("isojax", np.concatenate([below, above]), 2 * _TONES)
-    both.set_bad(alpha=0.0)
     return both, TwoSlopeNorm(1.0, low, max(high, 1.0 + _ROOM))
 
 
