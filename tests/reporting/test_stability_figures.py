@@ -273,3 +273,67 @@ def test_compile_seconds_grow_with_a_compilation_and_not_with_a_run():
     assert after > begin
     fresh(jnp.ones(7)).block_until_ready()
     assert compile_seconds() - after < 0.1 * (after - begin) + 1e-3
+
+
+def successful(*shape):
+    return jnp.zeros(shape), ij.RESULTS.promote(diffrax.RESULTS.successful)
+
+
+def test_backbone_of_a_linear_spring_stands_upright():
+    displacements = np.linspace(1e-3, 3e-3, 4)
+    blank, result = successful(4)
+    curve = ij.BackboneCurve(
+        jnp.asarray(displacements),
+        blank + 5.0,
+        (blank + 5.0).at[0].set(jnp.nan),
+        blank,
+        jnp.zeros((4, 2)),
+        result,
+    )
+    figure = ij.plot_backbone(curve)
+    free, forced = figure.axes[0].lines
+    np.testing.assert_array_equal(free.get_xdata(), 5.0)
+    np.testing.assert_allclose(forced.get_ydata(), 1e3 * displacements)
+    assert entries(figure) == ["free vibration, no damping", "phase resonance"]
+    assert "not found at 1 of 4" in figure.axes[0].get_title(loc="left")
+
+
+def test_transmissibility_goes_on_into_the_nearest_stable_orbit_and_closes_its_fold():
+    # One orbit at 1 and 4 Hz; at 2 and 3 Hz two stable ones with a saddle between.
+    nan = np.nan
+    size = np.array([[1.0, 1.1, 1.2, 5.0], [nan, 3.0, 2.0, nan], [nan, 4.0, 4.5, nan]])
+    radius = np.where(np.arange(3)[:, None] == 1, 1.1, 0.5) * np.where(np.isnan(size), nan, 1.0)
+    found = ij.Transmissibility(
+        jnp.array(10.0),
+        jnp.array([1.0, 2.0, 3.0, 4.0]),
+        jnp.asarray(size) + 0j,
+        jnp.asarray(size),
+        jnp.asarray(radius),
+        successful()[1],
+    )
+    figure = ij.plot_transmissibility(found)
+    pieces = set()
+    for line in figure.axes[0].lines:
+        x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        if len(x) == 2 and np.isfinite(y).all():
+            ends = sorted(zip(x.tolist(), y.round(6).tolist(), strict=True))
+            pieces.add((*ends, bool(line.is_dashed())))
+    assert ((1.0, 1.0), (2.0, 1.1), False) in pieces
+    assert ((3.0, 4.5), (4.0, 5.0), False) in pieces
+    assert ((2.0, 3.0), (2.0, 4.0), True) in pieces
+    assert ((3.0, 1.2), (3.0, 2.0), True) in pieces
+    assert ((2.0, 3.0), (3.0, 2.0), True) in pieces
+    assert entries(figure) == ["stable", "unstable"]
+
+
+@pytest.mark.slow
+def test_frequency_response_marks_its_folds_where_the_curve_turns(model):
+    response = ij.frequency_response(model, 150.66, (4.2, 4.6))
+    figure = ij.plot_frequency_response(response)
+    (marks,) = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
+    # At 4.4 Hz the upper fold force is 150.66 N, so one of the two folds over frequency lies there.
+    assert np.min(np.abs(marks.get_xdata() - 4.4)) < 1e-3
+    assert entries(figure) == ["150.7 N", "stable", "unstable", "fold"]
+    phase = ij.plot_frequency_response(response, what="phase").axes[0].lines[0].get_ydata()
+    assert np.nanmax(phase) < 0.0
+    assert np.nanmin(phase) > -180.0
