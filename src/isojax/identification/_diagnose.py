@@ -233,20 +233,25 @@ def _judge(
         if enough and clear and share > 0.0:
             usable[0] = best._replace(estimate=polish(best.estimate, scales, solver, progress))
             return _found(fit, test, usable, ranking, first_excess, share, inflation)
-        reason = (
-            f"adding {best.score.element.name} gains {gain / fitted.dof:.2g} of chi2/dof for {extra} more "
-            "coefficients"
-            + (
-                ""
-                if share > 0.0 or not (enough and clear)
-                else ", but it does not carry over to data left out of its refit"
-            )
+        reason = _too_little(best, gain, fitted, extra, good) + (
+            ", but it does not carry over to data left out of its refit" if enough and clear else ""
         )
     else:
         reason = "no absent effect is both significant and physical"
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
+
+
+def _too_little(best: Refit, gain: float, fitted: Estimate, extra: int, good: bool) -> str:
+    """Word what the best effect would gain: of chi2/dof where the fit is good, else of the excess."""
+    gained = (
+        f"takes {gain / fitted.dof:.2g} off chi2/dof"
+        if good
+        else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of the excess"
+    )
+    more = "1 more coefficient" if extra == 1 else f"{extra} more coefficients"
+    return f"adding {best.score.element.name} {gained} with {more}"
 
 
 def _needed_share(fitted: Estimate, good: bool) -> float:
