@@ -1,0 +1,97 @@
+"""Motion split at kinks: instants and states against the closed form of a piecewise solution."""
+
+import itertools
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy_orbits import Y_DIRECTION, flow, polynomial
+
+from isojax import Harmonic, Integrator, find_periodic_orbit, paper
+from isojax.stability._drive import recorded_sine
+from isojax.stability._period_map import period_map, trajectory
+from isojax.stability._pieces import advance_in_pieces, find_crossings
+
+
+def crossings_of(model, drive, state, steps=512):
+    path = trajectory(model, Integrator(steps_per_period=steps), drive, state)
+    return find_crossings(model, path, 2.0 * math.pi, 8)
+
+
+def test_crossings_are_those_of_the_sampled_sine():
+    model = paper.y_direction()
+    phase = jnp.linspace(0.0, 2.0 * math.pi, 400)
+    path = (jnp.sin(phase + 0.3), jnp.cos(phase + 0.3))
+    crossings = find_crossings(model, path, 2.0 * math.pi, 6)
+    # v = cos passes zero at pi/2 - 0.3 and 3 pi/2 - 0.3, x = sin at pi - 0.3 and 2 pi - 0.3.
+    expected = np.array([0.5, 1.0, 1.5, 2.0]) * math.pi - 0.3
+    np.testing.assert_allclose(crossings.phases[:4], expected, atol=1e-5)
+    np.testing.assert_array_equal(crossings.phases[4:], 2.0 * math.pi)
+    np.testing.assert_array_equal(crossings.kinks, [1, 0, 1, 0, -1, -1])
+    expected_sides = [[1, 1], [1, -1], [-1, -1], [-1, 1], [1, 1], [1, 1], [1, 1]]
+    np.testing.assert_array_equal(crossings.sides, expected_sides)
+    assert bool(crossings.complete)
+    assert not bool(find_crossings(model, path, 2.0 * math.pi, 3).complete)
+
+
+def test_split_at_its_kinks_a_motion_converges_with_fourth_order_to_that_of_scipy():
+    model = paper.y_direction()
+    drive = recorded_sine(model, 150.0, 4.3)
+    start = (jnp.asarray(2e-4), jnp.asarray(5e-3))
+    end, matrix, pieces = flow(polynomial(**Y_DIRECTION), 150.0, 4.3, np.array([2e-4, 5e-3]), 1.0 / 4.3)
+    instants = [piece.t[-1] for piece in pieces[:-1]]
+    crossings = crossings_of(model, drive, start)
+    found = crossings.phases[crossings.kinks >= 0] / (2.0 * math.pi * 4.3)
+    np.testing.assert_allclose(found, instants, atol=1e-4 / 4.3)
+    exact = crossings._replace(
+        phases=jnp.full(8, 2.0 * math.pi).at[: len(instants)].set(2.0 * math.pi * 4.3 * jnp.asarray(instants))
+    )
+
+    def moved(state, steps):
+        there, reached = advance_in_pieces(model, Integrator(), drive, state, exact, 2.0 * math.pi, steps)
+        return jnp.stack(there), reached
+
+    scale = np.abs(end)
+    errors = []
+    for steps in (16, 32, 64, 128):
+        after, reached = moved(start, steps)
+        errors.append(float(np.max(np.abs(np.asarray(after) - end) / scale)))
+    assert errors[3] < 1e-8
+    assert min(a / b for a, b in itertools.pairwise(errors)) > 11.0
+    assert float(jnp.max(jnp.abs(reached[: len(instants)]))) < 1e-8
+    # The law is continuous at its kinks, so the derivative needs no jump there.
+    slopes = jnp.stack(
+        [jnp.stack(row) for row in jax.jacfwd(lambda *s: tuple(moved(s, 512)[0]), (0, 1))(*start)]
+    )
+    np.testing.assert_allclose(slopes, matrix, rtol=1e-8)
+
+
+def test_unsplit_steps_lose_their_order_which_is_why_single_orbits_are_split():
+    model = paper.y_direction()
+    drive = recorded_sine(model, 150.0, 4.3)
+    start = (jnp.asarray(2e-4), jnp.asarray(5e-3))
+    _, matrix, _ = flow(polynomial(**Y_DIRECTION), 150.0, 4.3, np.array([2e-4, 5e-3]), 1.0 / 4.3)
+
+    def error(steps):
+        def moved(*state):
+            return period_map(model, Integrator(steps_per_period=steps), drive, state)
+
+        slopes = jnp.stack([jnp.stack(row) for row in jax.jacfwd(moved, (0, 1))(*start)])
+        return float(np.max(np.abs(np.asarray(slopes) / matrix - 1.0)))
+
+    # Four doublings would divide the error of a smooth law by 65 536.
+    assert error(128) / error(2048) < 3000.0
+    assert error(2048) > 1e-9
+
+
+@pytest.mark.slow
+def test_an_orbit_that_passes_more_kinks_than_there_was_room_for_is_split_at_all():
+    # A third harmonic as strong as the first makes the velocity turn six times a period.
+    model = paper.y_direction().replace(linear_damping__coefficient=300.0)
+    frequency = math.sqrt(1.0805e6 / 800.0) / (2.0 * math.pi) / 3.0
+    orbit = find_periodic_orbit(model, Harmonic(60.0, frequency))
+    finer = find_periodic_orbit(model, Harmonic(60.0, frequency), integrator=Integrator(steps_per_period=256))
+    np.testing.assert_allclose(orbit.floquet.multipliers, finer.floquet.multipliers, atol=1e-9)
+    assert float(orbit.error) < 1e-9

@@ -1,0 +1,187 @@
+"""Maps against single orbits and the table of folds; cut, killed, resumed and spread they stay the same."""
+
+import os
+import socket
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from isojax import Harmonic, find_periodic_orbit, paper, stability_map
+from isojax._results import RESULTS
+
+FORCES, BAND = np.linspace(20.0, 120.0, 9), np.linspace(4.0, 8.0, 7)
+
+
+def same(one, other, *, tolerance):
+    """Whether two maps hold the same orbits."""
+    for name in ("spectral_radius", "multipliers", "start", "response"):
+        a, b = np.asarray(getattr(one, name)), np.asarray(getattr(other, name))
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance, err_msg=name, equal_nan=True)
+    np.testing.assert_array_equal(one.count, other.count)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """One orbit a cell."""
+    return stability_map(paper.y_direction(), FORCES, BAND)
+
+
+def test_cells_are_the_single_orbits_within_the_error_that_the_map_reports(small):
+    assert small.error < 5e-5
+    assert bool(jnp.all(small.count == 1))
+    assert bool(jnp.all(jax.vmap(jax.vmap(lambda code: code == RESULTS.successful))(small.result)))
+    y0 = small.y0
+    for row, column in ((0, 0), (8, 0), (4, 3), (8, 6), (2, 5)):
+        force, frequency = float(FORCES[row]), float(BAND[column])
+        orbit = find_periodic_orbit(small.model, Harmonic(force, frequency))
+        ours, single = small.multipliers[row, column], orbit.floquet.multipliers
+        sums = jnp.array([ours.sum() - single.sum(), ours.prod() - single.prod()])
+        assert float(jnp.max(jnp.abs(sums))) < 5e-5
+        assert abs(float(small.response[row, column] / orbit.amplitude) - 1.0) < 1e-4
+        swing = np.array([1.0, 2.0 * np.pi * frequency]) * float(orbit.amplitude)
+        np.testing.assert_array_less(np.abs(np.asarray(y0[row, column] - orbit.y0)) / swing, 5e-5)
+
+
+def test_inside_the_lens_of_folds_there_are_three_orbits_and_outside_one(lens_map):
+    # facts.md: at 4.1 Hz 190.62 to 194.01 N, at 4.2 Hz 171.89 to 178.12 N, at 4.4 Hz 144.52 to 150.66 N;
+    # rows 120, 148, 150, 160, 175, 192.5, 210 N, columns 4.1, 4.2, 4.4, 4.8 Hz.
+    expected = np.ones((7, 4), int)
+    for cell in ((1, 2), (2, 2), (4, 1), (5, 0)):
+        expected[cell] = 3
+    np.testing.assert_array_equal(lens_map.count, expected)
+    inside = lens_map.spectral_radius[:, 4, 1]
+    assert float(inside[1]) > 1.0 > max(float(inside[0]), float(inside[2]))
+    assert bool(jnp.all(jnp.diff(lens_map.response[:, 4, 1]) > 0.0))
+    assert bool(jnp.all(jnp.isnan(lens_map.spectral_radius[1:, 0, 0])))
+    assert not bool(lens_map.stable[1, 0, 0])
+
+
+def test_without_coexisting_the_smallest_motion_is_given(lens_map):
+    plain = stability_map(lens_map.model, lens_map.amplitudes, lens_map.frequencies)
+    np.testing.assert_allclose(plain.spectral_radius, lens_map.spectral_radius[0], atol=1e-12)
+
+
+def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
+    class Killed(Exception):
+        """Stands for the end of the process."""
+
+    many = np.linspace(20.0, 120.0, 1500)
+    arguments = {"chunk": 1024}
+    whole = stability_map(paper.y_direction(), many, BAND, **arguments)
+
+    def stop(line):
+        if line.startswith("2048 of"):
+            raise Killed
+
+    with pytest.raises(Killed):
+        stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, progress=stop, **arguments)
+    stamps = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.npz")}
+    resumed = stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
+    after = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.npz")}
+    # Some chunks were done when it was killed, others not; the former were not done again.
+    assert 2 <= len(stamps) < len(after)
+    assert {name: after[name] for name in stamps} == stamps
+    same(resumed, whole, tolerance=0.0)
+    with pytest.raises(ValueError, match="which holds the chunks of another map"):
+        stability_map(paper.y_direction(), 1.01 * many, BAND, checkpoint=tmp_path, **arguments)
+    other = paper.y_direction().replace(mass=801.0)
+    with pytest.raises(ValueError, match="which holds the chunks of another map"):
+        stability_map(other, many, BAND, checkpoint=tmp_path, **arguments)
+
+
+def test_the_size_of_the_chunks_changes_no_number():
+    many = np.linspace(20.0, 120.0, 300)
+    small, large = (stability_map(paper.y_direction(), many, BAND, chunk=chunk) for chunk in (1024, 4096))
+    same(small, large, tolerance=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"amplitudes": [1.0, -2.0]}, "Argument `amplitudes` must be positive, but amplitudes[1] = -2.0."),
+        ({"amplitudes": []}, "Argument `amplitudes` must be a list of numbers, but has shape (0,)."),
+        (
+            {"frequencies": [4.0, 4.0]},
+            "Argument `frequencies` must ascend, but frequencies[1] = 4.0 follows 4.0.",
+        ),
+        ({"frequencies": [np.nan]}, "Argument `frequencies` must be positive, but frequencies[0] = nan."),
+        ({"reach": 0.5}, "Argument `reach` must be at least 1, but is 0.5."),
+        ({"chunk": 0}, "Argument `chunk` must be a positive count, but is 0."),
+    ],
+)
+def test_bad_arguments_are_refused_with_what_was_expected(arguments, words):
+    default = {"amplitudes": [1.0, 2.0], "frequencies": [4.0, 5.0]}
+    with pytest.raises(ValueError, match="Argument") as caught:
+        stability_map(paper.y_direction(), **{**default, **arguments})
+    assert str(caught.value) == words
+
+
+SCRIPT = """
+import sys
+import jax
+jax.config.update("jax_enable_x64", True)
+if len(sys.argv) > 2:
+    jax.distributed.initialize(sys.argv[2], num_processes=2, process_id=int(sys.argv[3]))
+import numpy as np
+from isojax import paper, stability_map
+smap = stability_map(paper.y_direction(), np.linspace(20.0, 120.0, 300), np.linspace(4.0, 8.0, 7), chunk=1024)
+print(len(jax.local_devices()), jax.process_count())
+names = ("spectral_radius", "start", "response", "count")
+np.savez(sys.argv[1], **{name: np.asarray(getattr(smap, name)) for name in names})
+"""
+
+
+def elsewhere(arguments, flags=""):
+    """Start the map in an interpreter of its own."""
+    environment = {**os.environ, "JAX_PLATFORMS": "cpu", "XLA_FLAGS": flags}
+    return subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, *map(str, arguments)],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finished(process):
+    """Wait for it and give what it printed."""
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    # The last line; before it the transport between processes may have printed its own.
+    return out.splitlines()[-1].split()
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """The map on one device of one process."""
+    return stability_map(paper.y_direction(), np.linspace(20.0, 120.0, 300), BAND, chunk=1024)
+
+
+def assert_same_as(file, alone):
+    with np.load(file) as numbers:
+        for name in numbers.files:
+            np.testing.assert_allclose(
+                numbers[name], getattr(alone, name), rtol=0.0, atol=1e-12, err_msg=name
+            )
+
+
+@pytest.mark.slow
+def test_two_devices_give_the_numbers_of_one(tmp_path, alone):
+    process = elsewhere([tmp_path / "map.npz"], "--xla_force_host_platform_device_count=2")
+    assert finished(process) == ["2", "1"]
+    assert_same_as(tmp_path / "map.npz", alone)
+
+
+@pytest.mark.slow
+def test_two_processes_give_the_numbers_of_one(tmp_path, alone):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    processes = [elsewhere([tmp_path / f"map{own}.npz", address, own]) for own in range(2)]
+    for own, process in enumerate(processes):
+        assert finished(process) == ["1", "2"]
+        assert_same_as(tmp_path / f"map{own}.npz", alone)
