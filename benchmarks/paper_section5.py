@@ -359,7 +359,7 @@ def corrected_doubling() -> Claim:
 
 def main() -> None:
     """Print every claim."""
-    arguments = argparse.ArgumentParser(description="Check section 5 and Figs. 19-24 of the paper, claim by claim.")
+    arguments = argparse.ArgumentParser(description="Check section 5 of the paper, claim by claim.")
     arguments.add_argument(
         "--without-search", action="store_true", help="leave out the search for other coefficients"
     )
