@@ -197,20 +197,20 @@ def z_map() -> Claim:
     model, band = ij.paper.z_direction(), np.linspace(1.0, 4.0, 500)
     smap = ij.stability_map(model, 2.0 * FORCES, band, coexisting=True)
     radius = np.asarray(smap.spectral_radius)
-    lines = np.arange(1.0, 4.01, 0.25)
+    lines = np.arange(1.0, 4.01, 0.125)
     branch = ij.continue_branch(
         model, parameter="amplitude", frequency=jnp.asarray(lines), start=10.0, stop=8000.0
     )
     folds = [(float(p.amplitude), float(p.frequency)) for p in branch.special_points if p.kind == "fold"]
     least = min(folds, default=(math.nan, math.nan))
     sizes = np.asarray(branch.points.response)[np.arange(len(lines))]
-    edge = max(abs(float(r)) for r in np.roots([-4.289e6, -4.126e5, 1.414e5]) if r > 0)
+    edge = max(abs(float(r)) for r in np.roots([-3 * 4.289e6, -2 * 4.126e5, 1.414e5]) if r > 0)
     evidence = (
         f"up to 1 kN: at most {int(np.max(np.asarray(smap.count)))} orbit a cell, largest |mu| "
         f"{np.nanmax(radius):.4f}, "
-        f"every cell found: {bool(np.all(np.isfinite(radius[0])))}. Along 13 frequencies up to 8 kN "
+        f"every cell found: {bool(np.all(np.isfinite(radius[0])))}. Along 25 frequencies up to 8 kN "
         "the lowest fold lies "
-        f"at {least[0]:.0f} N, {least[1]:.2f} Hz; the spring is lost at {1e3 * edge:.0f} mm, "
+        f"at {least[0]:.0f} N, {least[1]:.2f} Hz; the tangent stiffness is lost at {1e3 * edge:.0f} mm, "
         f"the largest motion followed is {1e3 * np.nanmax(sizes):.0f} mm, and the data end near 10 mm"
     )
     held = bool(np.nanmax(radius) < 1.0 and np.max(np.asarray(smap.count)) == 1)
@@ -281,7 +281,7 @@ def printed_doubling() -> list[Claim]:
         ("Fig. 22 (ii)", "Fig. 24", 5.0, "period 2 at higher forces at 5 Hz"),
     ):
         both = np.asarray(
-            ij.bifurcation_diagram(model, forces, frequency, direction="both", settle=150).period
+            ij.bifurcation_diagram(model, forces, frequency, direction="both", settle=300).period
         )
         anew = ij.bifurcation_diagram(
             model, forces[4::5], frequency, direction="anew", starts=states, settle=100
@@ -292,13 +292,15 @@ def printed_doubling() -> list[Claim]:
         )
         broken = [float(p.amplitude) for p in branch.special_points if p.kind == "symmetry_breaking"]
         lost = f"breaks at {' and '.join(f'{f:.0f}' for f in broken)} N" if broken else "never breaks"
-        single = bool(np.all(periods == 1))
+        # Zero repeats nowhere yet: next to a bifurcation a motion settles slowly, which is no doubling.
+        wanted = (2, 4) if frequency == 3.0 else (2,)
+        doubled = all(bool(np.any(periods == period)) for period in wanted)
         evidence = (
             f"periods seen: {', '.join(map(str, np.unique(periods)))} (100 N to 9 kN, up and down, "
             "and 60 starts within 10 mm "
             f"and 300 mm/s at each 500 N); symmetry {lost}, and a symmetric orbit cannot double before"
         )
-        claims.append(Claim(f"{place}, {portraits}", words, yes(not single), evidence))
+        claims.append(Claim(f"{place}, {portraits}", words, yes(doubled), evidence))
     words, ever = [], False
     for factor in (5, 10, 20, 27.1):
         other = model.replace(abs_quadratic_damping__coefficient=-3.6880e3 * factor)
