@@ -120,7 +120,8 @@ def _resonance(
     lanes, good = jax.vmap(point)(amplitudes)
     blank = jnp.where(good, 1.0, jnp.nan)
     force = jnp.hypot(lanes.drive.sine, jnp.asarray(lanes.drive.cosine))
-    begin = jnp.stack(states_at_zero(model, Method(integrator, False, None), lanes), axis=-1)
+    method = Method(integrator, False, None, jnp.asarray(integrator.steps_a_period(model)))
+    begin = jnp.stack(states_at_zero(model, method, lanes), axis=-1)
 
     def ending(well: Array) -> RESULTS:
         return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
