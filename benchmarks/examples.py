@@ -5,17 +5,20 @@ Run `python benchmarks/examples.py [quiet friction relaxation asymmetry]`; the c
 verdict, finding and its indistinguishable set, strength with standard error beside the truth, held-out
 chi2/dof and nrmse before and after, seconds (compilation included), and PASS or FAIL:
 
-- quiet: nothing found, every coefficient within three standard errors of the truth, held-out chi2/dof at
-  most 1.05;
-- friction: `coulomb_friction` found;
-- relaxation: `maxwell_branch` found;
-- asymmetry: `quadratic_stiffness` found, its strength within 5 % or three standard errors of the truth,
-  held-out chi2/dof at most 1.05 afterwards.
+- quiet: nothing found, every coefficient within three standard errors of the truth;
+- friction, relaxation, asymmetry: `coulomb_friction`, `maxwell_branch`, `quadratic_stiffness` found and
+  nothing else, its strength within 5 % or three standard errors of the truth;
+- all: held-out chi2/dof at most 1.05 at the end.
+
+Where a coefficient is farther than three standard errors from the truth, all are printed once more after a
+gain of `1 + 7.4e-6 f^2` (f in Hz), which both channels of the examples share, is taken out of both: it leaves
+no trace in a residual, and no record shows it.
 
 The exit status is 1 if anything failed.
 """
 
 import argparse
+import dataclasses
 import json
 import os
 import sys
@@ -34,6 +37,11 @@ EXAMPLES = {
 NOISE_FLOOR = 1.05
 MOST_ERRORS = 3.0
 CLOSE = 0.05
+SHARED_GAIN = 7.4e-6
+"""Gain of both channels beyond 1, over the square of the frequency in Hz."""
+
+MOTION_HZ = 60.0
+"""Above it there is noise alone, which keeps its size."""
 
 
 def find_data() -> Path:
@@ -64,6 +72,25 @@ def print_coefficients(fit, base: list[float]) -> float:
     return float(np.max(np.abs(off)))
 
 
+def without_shared_gain(campaign):
+    """Give the campaign with the gain that both channels share taken out of both."""
+
+    def corrected(signal: np.ndarray, rate: float) -> np.ndarray:
+        # mirrored, so that the ends meet
+        spectrum = np.fft.rfft(np.concatenate([signal, signal[::-1]]))
+        frequency = np.fft.rfftfreq(2 * signal.size, 1.0 / rate)
+        gain = 1.0 + SHARED_GAIN * np.minimum(frequency, MOTION_HZ) ** 2
+        return np.fft.irfft(spectrum / gain, 2 * signal.size)[: signal.size]
+
+    records = tuple(
+        dataclasses.replace(
+            record, input=corrected(record.input, record.rate), output=corrected(record.output, record.rate)
+        )
+        for record in campaign.records
+    )
+    return dataclasses.replace(campaign, records=records)
+
+
 def print_finding(loop, finding, truth: list[float]) -> bool:
     """Print a finding and its strength beside the truth; say whether the strength is close to it."""
     print(
@@ -82,7 +109,7 @@ def print_finding(loop, finding, truth: list[float]) -> bool:
 
 def check_example(name: str, folder: Path, talk: bool) -> bool:
     """Run one example, print what came of it, and say whether it passed."""
-    from isojax.identification import close_loop
+    from isojax.identification import close_loop, fit
     from isojax.records import read_campaign
 
     print(f"\n{name}", flush=True)
@@ -100,6 +127,9 @@ def check_example(name: str, folder: Path, talk: bool) -> bool:
         else:
             print(f"  found {finding.effect}, which is not in the data")
     farthest = print_coefficients(loop.after, truth["base"])
+    if farthest > MOST_ERRORS:
+        print("  with the gain that both channels share taken out:")
+        print_coefficients(fit(loop.after.model, without_shared_gain(loop.campaign)), truth["base"])
     print_errors(loop)
     held_out = loop.after.errors["holdout"]
     at_floor = held_out is not None and held_out.chi2_per_dof <= NOISE_FLOOR
@@ -108,10 +138,9 @@ def check_example(name: str, folder: Path, talk: bool) -> bool:
     if name == "quiet":
         checks["verdict is none"] = loop.verdict == "none"
         checks[f"coefficients within {MOST_ERRORS:g} standard errors"] = farthest <= MOST_ERRORS
-    if name == "asymmetry":
+    else:
         checks[f"strength within {CLOSE:.0%} or {MOST_ERRORS:g} standard errors"] = close
-    if name in ("quiet", "asymmetry"):
-        checks[f"held-out chi2/dof at most {NOISE_FLOOR}"] = at_floor
+    checks[f"held-out chi2/dof at most {NOISE_FLOOR}"] = at_floor
     for words, passed in checks.items():
         print(f"  {'PASS' if passed else 'FAIL'}  {words}", flush=True)
     return all(checks.values())
