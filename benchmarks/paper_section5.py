@@ -345,7 +345,7 @@ def corrected_doubling() -> Claim:
     words = []
     bounded = True
     for frequency in (3.0, 5.0):
-        diagram = ij.bifurcation_diagram(model, forces, frequency, settle=200)
+        diagram = ij.bifurcation_diagram(model, forces, frequency, settle=600)
         bounded &= bool(np.all(np.isfinite(np.asarray(diagram.samples))))
         words.append(f"{frequency:.0f} Hz: period {paper_fig22.runs(np.asarray(diagram.period), forces)}")
     evidence = f"{found.ratios}; {'bounded' if bounded else 'runs away'} from 100 to 4500 N. " + ". ".join(
