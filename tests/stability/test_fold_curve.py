@@ -141,6 +141,7 @@ def test_bad_arguments_are_refused(follow, options, words):
         follow(MODEL, **{**WINDOW, **options})
 
 
+@pytest.mark.slow
 def test_a_window_without_folds_is_refused_with_what_was_searched():
     linear = ij.Isolator(2.0, (ij.LinearDamping(3.0), ij.LinearStiffness(800.0)))
     with pytest.raises(ValueError, match=r"`start` must be given .* meet no fold"):

@@ -193,7 +193,7 @@ def test_an_asymmetric_spring_doubles_without_breaking_a_symmetry():
 
 
 def test_derivatives_of_a_doubling_are_central_differences(broken):
-    start = np.asarray(broken.points.y0[-40])
+    start = broken.points.y0[-40]
     force = float(broken.points.value[-40])
 
     def doubling(model):
