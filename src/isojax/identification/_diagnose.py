@@ -233,7 +233,7 @@ def _judge(
         if enough and clear and share > 0.0:
             usable[0] = best._replace(estimate=polish(best.estimate, scales, solver, progress))
             return _found(fit, test, usable, ranking, first_excess, share, inflation)
-        reason = _too_little(best, gain, fitted, extra, good) + (
+        reason = _too_little(best, gain, fitted, extra) + (
             ", but it does not carry over to data left out of its refit" if enough and clear else ""
         )
     else:
@@ -243,12 +243,12 @@ def _judge(
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
 
 
-def _too_little(best: Refit, gain: float, fitted: Estimate, extra: int, good: bool) -> str:
-    """Word what the best effect would gain: of chi2/dof where the fit is good, else of the excess."""
+def _too_little(best: Refit, gain: float, fitted: Estimate, extra: int) -> str:
+    """Word what the best effect would gain: of chi2/dof where little but noise is left, else a share."""
     gained = (
         f"takes {gain / fitted.dof:.2g} off chi2/dof"
-        if good
-        else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of the excess"
+        if fitted.chi2 / fitted.dof <= GOOD
+        else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of what is left beyond the noise"
     )
     more = "1 more coefficient" if extra == 1 else f"{extra} more coefficients"
     return f"adding {best.score.element.name} {gained} with {more}"
