@@ -16,6 +16,9 @@ _PERIODS = 3.0
 _SHARE = 0.2
 """The ends never take more than this share of the record each."""
 
+_BROAD = 0.1
+"""Share of the highest excited frequency to which the lowest one to integrate is raised at most."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Motion:
@@ -75,6 +78,10 @@ def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> 
     band, margin = excited_band(own), 0
     if campaign.output.quantity != "displacement":
         lowest = min(_NEARER * band.lowest, 0.5 * band.highest)
+        if record.kind == "broadband":
+            # Of a drive that reaches down to nothing: below this the record is all ends.
+            whole = _PERIODS * record.rate / (_SHARE * record.time.size)
+            lowest = max(lowest, min(whole, _BROAD * band.highest))
         band = Band(lowest, band.highest)
         margin = round(min(_PERIODS * record.rate / lowest, _SHARE * record.time.size))
     x, v, a = measured_state(own, campaign.output.quantity, band.lowest, band.highest)

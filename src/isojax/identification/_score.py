@@ -119,7 +119,12 @@ def score_test(
     by_record, raw_square = point.reduced.by_record.copy(), point.reduced.raw.copy()
     # A probe whose memory ran away along the motion has no column: it is as good as hidden.
     lost = np.flatnonzero(~np.isfinite(np.diagonal(by_record, axis1=1, axis2=2).sum(axis=0)))
-    by_record[:, lost], by_record[:, :, lost], raw_square[lost] = 0.0, 0.0, 1.0
+    residual = by_record.shape[-1] - 1
+    if np.any(lost < count) or residual in lost:
+        # What ran away has spoilt the residual or the fitted columns as well: no score says anything then.
+        lost = np.arange(by_record.shape[-1])
+    by_record[:, lost], by_record[:, :, lost] = 0.0, 0.0
+    raw_square[lost[lost < raw_square.size]] = 1.0
     matrix = by_record.sum(axis=0)
     base, cross = matrix[:count, :count], matrix[:count, count:]
     absorbed = np.linalg.pinv(base, rcond=1e-12, hermitian=True) @ cross
