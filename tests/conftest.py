@@ -1,6 +1,8 @@
 """Shared fixtures: float64 before any array is made, shape checks, and the folder of third-party data."""
 
+import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import jax
@@ -10,6 +12,21 @@ from jaxtyping import install_import_hook
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 install_import_hook("isojax", "beartype.beartype")
+
+
+_MOST_MAPPINGS = 20_000
+"""Memory mappings of the process from which compiled code is let go; Linux allows 65530, and every compiled
+function takes several. Beyond that limit the compiler does not raise, it crashes."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _let_compiled_code_go() -> Iterator[None]:
+    """Forget compiled functions between modules, once they crowd the address space."""
+    yield
+    mappings = Path("/proc/self/maps")
+    if mappings.exists() and len(mappings.read_bytes().splitlines()) > _MOST_MAPPINGS:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture(scope="session")

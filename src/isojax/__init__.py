@@ -53,6 +53,7 @@ from .models import save_model as save_model
 from .models import simulate as simulate
 from .records import Campaign as Campaign
 from .records import Record as Record
+from .records import compare_filtered_receptance as compare_filtered_receptance
 from .records import data_health as data_health
 from .records import estimate_noise as estimate_noise
 from .reporting import ClosedLoop as ClosedLoop

@@ -1,5 +1,6 @@
 """Every mistake in campaign.toml gives one ValueError: file, field, what was found and what was expected."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -206,6 +207,15 @@ def test_held_out_samples_that_are_also_fitted_are_refused(
     more = f'role = "fit"\n{first}\n[[record]]\nfile = "run.csv"\nrole = "holdout"\n{second}\n'
     with pytest.raises(ValueError, match=r"number 1 and number 2 share samples .*held-out samples must not"):
         read_campaign(tiny((RECORD, more)))
+
+
+def test_a_copy_of_a_fitted_file_is_no_held_out_record(tiny: Callable[..., Path]) -> None:
+    more = 'role = "fit"\n[[record]]\nfile = "copy.csv"\nrole = "holdout"\n'
+    folder = tiny((RECORD, more))
+    home = folder if folder.is_dir() else folder.parent
+    shutil.copy(home / "run.csv", home / "copy.csv")
+    with pytest.raises(ValueError, match=r"number 1 and number 2 share samples .*held-out samples must not"):
+        read_campaign(folder)
 
 
 def test_a_fit_must_not_set_its_state_from_held_out_samples(tiny: Callable[..., Path]) -> None:
