@@ -99,7 +99,7 @@ class Integrator(eqx.Module):
         The multipliers belong to the state before the last step, so this is the size of their error; the
         error of the orbit itself is of the order of its square.
         """
-        return 3e-6
+        return 0.5 * self.map_error
 
     def controller(self, times: Float[Array, " time"]) -> diffrax.AbstractStepSizeController:
         """Give diffrax's step size controller.

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import diffrax
 import equinox as eqx
@@ -31,11 +31,14 @@ from ._pass import (
     steps_needed,
 )
 from ._starts import Candidates, find_candidates
-from ._surface import find_surface
+from ._surface import Surface, find_surface
 from ._symmetry import is_odd
 
-_FEWEST = 64
-"""Steps a period that are tried first."""
+_TRIED = 64
+"""Steps a period with which a sample of the orbits shows how many it takes."""
+
+_NEAR = 1.25
+"""Times those steps up to which orbits found with them are starts good enough."""
 
 
 class StabilityMap(eqx.Module):
@@ -144,44 +147,39 @@ def stability_map(
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
     """
     check_float64()
-    asked, integrator = integrator, Integrator() if integrator is None else integrator
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:
         raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
     if chunk < 1:
         raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
     half = is_odd(model)
-    surface = find_surface(model, integrator, half, forces, band, reach)
+    asked, integrator = integrator, Integrator().with_steps(_TRIED) if integrator is None else integrator
+    sought = _seek(model, integrator, half, forces, band, reach, coexisting)
+    if asked is None:
+        trial = cell_solvers(model, integrator, half, sought.surface, forces, devices)
+        own, first = sought.group(0), trial[0]
+        if not own.force.size:
+            own, first = sought.group(1), trial[1]
+        integrator = integrator.with_steps(steps_needed(first, own, forces, band))
+        if integrator.steps_per_period > _NEAR * _TRIED:
+            # Starts integrated much coarser than the map would cost each cell a second pass.
+            sought = _seek(model, integrator, half, forces, band, reach, coexisting)
     if progress is not None:
         progress("orbits over displacement and frequency found")
-    candidates = find_candidates(surface, forces)
-    if not coexisting and candidates.order.any():
-        candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
-    if not candidates.force.size:
-        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
-    # Orbits that pass kinks in another order than most are not split, and computed apart with finer steps.
-    shared = surface.shared[candidates.frequency, candidates.interval]
-    if not shared.all():
-        candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
-    groups = np.split(np.arange(shared.size), [int(shared.sum())])
-    if asked is None:
-        trial = cell_solvers(model, integrator.with_steps(_FEWEST), half, surface, forces, devices)
-        first = 0 if shared.any() else 1
-        own = Candidates(*(values[groups[first]] for values in candidates))
-        integrator = integrator.with_steps(steps_needed(trial[first], own, forces, band))
+    surface, candidates = sought.surface, sought.candidates
     folder = None if checkpoint is None else Path(checkpoint)
     if folder is not None:
         claim_folder(folder, fingerprint(model, integrator, forces, band, coexisting, reach, chunk))
     parts, errors = [], []
     solvers = cell_solvers(model, integrator, half, surface, forces, devices)
-    for name, solver, group in zip(("split", "whole"), solvers, groups, strict=True):
-        if group.size:
-            own = Candidates(*(values[group[0] : group[-1] + 1] for values in candidates))
+    for place, (name, solver) in enumerate(zip(("split", "whole"), solvers, strict=True)):
+        own = sought.group(place)
+        if own.force.size:
             parts.append(run_chunks(solver, own, chunk, folder, name, progress))
             errors.append(sampled_error(solver, own, parts[-1], forces, band))
     found = Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-    error = float(np.nanmax(errors))
-    split = np.sort(shared)[::-1]
+    error = max((value for value in errors if not math.isnan(value)), default=math.nan)
+    split = np.arange(candidates.force.size) < sought.split
     arrays = _gridded(candidates, found, split, len(forces), len(band), coexisting)
     code = arrays.pop("code")
     ending = _ending
@@ -201,6 +199,46 @@ def stability_map(
     )
 
 
+class _Sought(NamedTuple):
+    """What is to be found.
+
+    Attributes:
+        surface: from which the starts are read off.
+        candidates: the orbits, first those that share the order of kinks.
+        split: how many these are; the others are not split and take finer steps.
+    """
+
+    surface: Surface
+    candidates: Candidates
+    split: int
+
+    def group(self, place: int) -> Candidates:
+        """Give the orbits that are split (0) or the others (1)."""
+        part = slice(self.split) if place == 0 else slice(self.split, None)
+        return Candidates(*(values[part] for values in self.candidates))
+
+
+def _seek(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    forces: np.ndarray,
+    band: np.ndarray,
+    reach: float,
+    coexisting: bool,
+) -> _Sought:
+    surface = find_surface(model, integrator, half, forces, band, reach)
+    candidates = find_candidates(surface, forces)
+    if not coexisting and candidates.order.any():
+        candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
+    if not candidates.force.size:
+        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
+    shared = surface.shared[candidates.frequency, candidates.interval]
+    if not shared.all():
+        candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
+    return _Sought(surface, candidates, int(shared.sum()))
+
+
 def _ending(code: Array) -> RESULTS:
     """Give the outcome that a code of the search stands for."""
     failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
@@ -212,20 +250,26 @@ def _gridded(
 ) -> dict[str, np.ndarray]:
     """Put the orbits into their cells; a cell in which none was found says that nothing converged."""
     orbits = int(candidates.order.max()) + 1 if candidates.order.size else 1
-    place = (candidates.order, candidates.force, candidates.frequency)
+    place = np.ravel_multi_index(
+        (candidates.order, candidates.force, candidates.frequency), (orbits, rows, columns)
+    )
+    # The common case, one orbit in every cell and in the order of the cells, takes no copying.
+    whole = place.size == orbits * rows * columns and bool((np.diff(place) == 1).all())
     arrays: dict[str, np.ndarray] = {}
     names = {"states": "start", "radius": "spectral_radius", "swing": "response"}
     names |= {name: name for name in ("direction", "phases", "multipliers")}
+
+    def onto_grid(values: np.ndarray, missing: complex) -> np.ndarray:
+        grid = values
+        if not whole:
+            grid = np.full((orbits * rows * columns, *values.shape[1:]), missing, dtype=values.dtype)
+            grid[place] = values
+        grid = grid.reshape(orbits, rows, columns, *values.shape[1:])
+        return grid if coexisting else grid[0]
+
     for name, public in names.items():
-        values = getattr(found, name)
-        grid = np.full((orbits, rows, columns, *values.shape[1:]), np.nan, dtype=values.dtype)
-        grid[place] = values
-        arrays[public] = grid if coexisting else grid[0]
-    together = np.zeros((orbits, rows, columns), dtype=bool)
-    together[place] = split
-    arrays["split"] = together if coexisting else together[0]
-    code = np.full((orbits, rows, columns), NOT_CONVERGED, dtype=np.int8)
-    code[place] = found.code
-    arrays["code"] = code if coexisting else code[0]
-    arrays["count"] = (code == FOUND).sum(axis=0)
+        arrays[public] = onto_grid(getattr(found, name), np.nan)
+    arrays["split"] = onto_grid(split, False)
+    arrays["code"] = onto_grid(found.code, NOT_CONVERGED)
+    arrays["count"] = (arrays["code"] == FOUND).reshape(orbits, rows, columns).sum(axis=0)
     return arrays

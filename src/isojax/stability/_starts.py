@@ -27,7 +27,7 @@ class Starts(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Orbits to be found, sorted by frequency, then force, then displacement.
+    """Orbits to be found, sorted by force, then frequency, then displacement.
 
     Attributes:
         force: place of the drive amplitude in the window.
@@ -61,7 +61,7 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"]) -> Ca
     first = np.repeat(np.cumsum(counts) - counts, counts)
     force = np.repeat(low[column, interval], counts) + np.arange(counts.sum()) - first
     column, interval = (np.repeat(part.astype(np.int32), counts) for part in (column, interval))
-    cell = column.astype(np.int64) * len(forces) + force
+    cell = force.astype(np.int64) * len(surface.frequencies) + column
     # By cell, and within one by displacement, in which order they come.
     sequence = np.argsort(cell, kind="stable")
     force, column, interval, cell = (

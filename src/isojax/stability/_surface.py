@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.interpolate import make_interp_spline
+from scipy.ndimage import distance_transform_edt
 
 from .._types import Lanes
 from ..models import Integrator, Isolator
@@ -188,7 +189,7 @@ def find_surface(
     shape = (len(band), displacements)
     stiffness, internal, swing = (np.asarray(table).reshape(*shape, -1) for table in found[:3])
     kinks = shared_kinks(found[3], shape, math.pi if half else 2.0 * math.pi)
-    tables = np.concatenate([stiffness, internal, swing, kinks.phases], axis=-1)
+    tables = _filled(np.concatenate([stiffness, internal, swing, kinks.phases], axis=-1))
     if not single and len(frequencies) > columns:
         tables = np.tensordot(_spline_matrix(band, frequencies), tables, axes=(1, 0))
     fine = np.geomspace(low, high, _FINE)
@@ -201,6 +202,15 @@ def find_surface(
     return Surface(
         rest, fine, frequencies, tables[:2], tables[2:last], tables[last], phases, kinks.sides, shared
     )
+
+
+def _filled(tables: Float[np.ndarray, "frequency displacement table"]) -> np.ndarray:
+    """Give the nearest node's values where the motion ran away: one such would spoil all splines."""
+    lost = ~np.isfinite(tables).all(axis=-1)
+    if not lost.any() or lost.all():
+        return tables
+    nearest = distance_transform_edt(lost, return_distances=False, return_indices=True)
+    return tables[tuple(np.asarray(nearest))]
 
 
 def _spline_matrix(
