@@ -2,24 +2,41 @@
 
 from ._abs_quadratic_damping import AbsQuadraticDamping as AbsQuadraticDamping
 from ._abs_quadratic_stiffness import AbsQuadraticStiffness as AbsQuadraticStiffness
+from ._ac_coupling import AcCoupling as AcCoupling
 from ._added_mass import AddedMass as AddedMass
+from ._asymmetric_friction import AsymmetricFriction as AsymmetricFriction
 from ._base import AbstractElement as AbstractElement
+from ._base import Channels as Channels
 from ._base import Scales as Scales
 from ._bouc_wen import BoucWen as BoucWen
+from ._clipping import Clipping as Clipping
 from ._coulomb_friction import CoulombFriction as CoulombFriction
 from ._cubic_damping import CubicDamping as CubicDamping
 from ._cubic_stiffness import CubicStiffness as CubicStiffness
 from ._dahl_friction import DahlFriction as DahlFriction
+from ._drive_harmonics import DriveHarmonics as DriveHarmonics
+from ._dual_chamber import DualChamber as DualChamber
+from ._end_stop import EndStop as EndStop
+from ._fractional_damping import FractionalDamping as FractionalDamping
+from ._freeplay import Freeplay as Freeplay
 from ._input_delay import InputDelay as InputDelay
 from ._input_gain import InputGain as InputGain
+from ._input_hold import InputHold as InputHold
 from ._input_offset import InputOffset as InputOffset
 from ._linear_damping import LinearDamping as LinearDamping
 from ._linear_stiffness import LinearStiffness as LinearStiffness
+from ._lugre_friction import LugreFriction as LugreFriction
+from ._mains_hum import MainsHum as MainsHum
 from ._maxwell_branch import MaxwellBranch as MaxwellBranch
+from ._polytropic_gas import PolytropicGas as PolytropicGas
 from ._position_damping import PositionDamping as PositionDamping
 from ._quadratic_stiffness import QuadraticStiffness as QuadraticStiffness
+from ._quintic_stiffness import QuinticStiffness as QuinticStiffness
+from ._second_mode import SecondMode as SecondMode
 from ._sensor_gain import SensorGain as SensorGain
 from ._sensor_offset import SensorOffset as SensorOffset
+from ._stiffness_drift import StiffnessDrift as StiffnessDrift
+from ._stribeck_friction import StribeckFriction as StribeckFriction
 
 CATALOGUE: dict[str, type[AbstractElement]] = {
     member.name: member

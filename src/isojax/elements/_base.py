@@ -1,11 +1,15 @@
 """The contract of an element: one physical effect, in the force balance or on the instruments."""
 
 import abc
+from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
 
 from .._types import Internal, Lanes
+
+Channels = Mapping[str, Lanes]
+"""Signals made from a record beside its drive, by name."""
 
 
 class Scales(eqx.Module):
@@ -21,6 +25,7 @@ class Scales(eqx.Module):
         sample_time: time between samples [s].
         slowest_velocity: smallest velocity amplitude among the dwells or windows [m/s].
         reading: amplitude of the measured output [its SI unit].
+        largest_reading: largest measured output [its SI unit]; 0 where it is not known.
     """
 
     mass: float
@@ -32,6 +37,7 @@ class Scales(eqx.Module):
     sample_time: float
     slowest_velocity: float
     reading: float
+    largest_reading: float = 0.0
 
 
 class AbstractElement(eqx.Module):
@@ -47,6 +53,10 @@ class AbstractElement(eqx.Module):
         signed: whether a negative strength is physical.
         internal_states: how many internal states it carries.
         substeps: integration steps a sample that the law needs at least (sharp laws need more than one).
+        absorbs: catalogue names of effects that this one contains; it takes their place in a model.
+        channels: signals made from the record that the effect follows, such as the clock; without a record it
+            is absent.
+        phased: whether those signals carry a phase of each record's own, found in the record.
     """
 
     name: ClassVar[str]
@@ -55,6 +65,9 @@ class AbstractElement(eqx.Module):
     signed: ClassVar[bool] = False
     internal_states: ClassVar[int] = 0
     substeps: ClassVar[int] = 1
+    absorbs: ClassVar[tuple[str, ...]] = ()
+    channels: ClassVar[tuple[str, ...]] = ()
+    phased: ClassVar[bool] = False
 
     @classmethod
     @abc.abstractmethod
@@ -111,6 +124,21 @@ class AbstractElement(eqx.Module):
         Args:
             x: displacement [m].
             v: velocity [m/s].
+            s: internal states.
+
+        Returns:
+            One rate an internal state.
+        """
+        return tuple(0.0 * state for state in s)
+
+    def base_rate(self, a: Lanes, s: Internal) -> Internal:
+        """Give what the acceleration of the base adds to the rates of the internal states.
+
+        Under base excitation the coordinate moves with the base; a mass among the internal states, in that
+        coordinate, feels the base as the isolated mass does.
+
+        Args:
+            a: acceleration of the base [m/s^2].
             s: internal states.
 
         Returns:
@@ -207,6 +235,41 @@ class AbstractElement(eqx.Module):
             The reading.
         """
         return y
+
+    def channel_drive(self, channels: Channels) -> Lanes | float:
+        """Give what signals of the record add to the drive that acted.
+
+        Args:
+            channels: the signals, by name; those in `channels` are there.
+
+        Returns:
+            Drive [N, or m/s^2 for base excitation].
+        """
+        return 0.0
+
+    def channel_force(self, x: Lanes, v: Lanes, channels: Channels) -> Lanes | float:
+        """Give a force on the left-hand side of the balance that follows signals of the record [N].
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            channels: the signals, by name.
+
+        Returns:
+            Force [N].
+        """
+        return 0.0
+
+    def channel_reading(self, channels: Channels) -> Lanes | float:
+        """Give what signals of the record add to the reading.
+
+        Args:
+            channels: the signals, by name.
+
+        Returns:
+            Reading [its SI unit].
+        """
+        return 0.0
 
     def reading_rate(self, y: Lanes, s: Internal) -> Internal:
         """Give what the motion at the sensor adds to the rates of the internal states (a sensor with memory).

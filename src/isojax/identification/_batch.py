@@ -16,6 +16,7 @@ from jaxtyping import Array, Float, Int
 from ..excitations import Hold, tabulate
 from ..models import RK4, Isolator, Quantity
 from ..records import Record, measured_state
+from ._channels import channel_table
 from ._segments import Segment
 
 
@@ -27,12 +28,26 @@ class Batch(eqx.Module):
         drive_rate: its time derivative.
         measured: measured output [its SI unit].
         weight: 1 where a sample counts, 0 where it does not (padding, settling).
+        channels: signals of the records at the same times as the drive, by name.
     """
 
     drive: Float[Array, "time stage lanes"]
     drive_rate: Float[Array, "time stage lanes"]
     measured: Float[Array, "time lanes"]
     weight: Float[Array, "time lanes"]
+    channels: dict[str, Float[Array, "time stage lanes"]] = eqx.field(default_factory=dict)
+
+    def following(self, model: Isolator) -> "Batch":
+        """Give the batch with the channels that a model follows and no others: each is carried in the scan.
+
+        Args:
+            model: the isolator.
+
+        Returns:
+            The batch.
+        """
+        own = {name: self.channels[name] for name in model.channels}
+        return Batch(self.drive, self.drive_rate, self.measured, self.weight, own)
 
 
 class Prepared(NamedTuple):
@@ -120,6 +135,7 @@ def prepare(
     substeps: int,
     shift: float = 0.0,
     based: bool = False,
+    channels: tuple[str, ...] = (),
 ) -> Prepared:
     """Lay segments side by side.
 
@@ -131,6 +147,7 @@ def prepare(
         substeps: integration steps a sample.
         shift: time by which the drive acts later than it was recorded [s].
         based: whether the drive is the acceleration of the base.
+        channels: names of the signals of the records that are wanted beside the drive.
 
     Returns:
         The batches and what belongs to their lanes.
@@ -141,23 +158,27 @@ def prepare(
     stages = 2 * substeps + 1
     # Filled lane by lane, then turned: writing across the lanes would touch a cache line a sample.
     drive, rates = np.zeros((lanes, length, stages)), np.zeros((lanes, length, stages))
+    beside = {name: np.zeros((lanes, length, stages)) for name in channels}
     measured, weight = np.zeros((lanes, length)), np.zeros((lanes, length))
     starts, spread = np.zeros((2, lanes)), np.ones((2, lanes))
     owner = np.zeros(lanes, dtype=int)
 
-    def known(place: int) -> tuple[_Table, tuple[np.ndarray, ...]]:
+    def known(place: int) -> tuple[_Table, tuple[np.ndarray, ...], dict[str, np.ndarray]]:
         record = records[place]
-        return drive_table(record, hold, substeps, shift), coordinate_motion(record, quantity, based)
+        extra = {name: channel_table(name, record, hold, substeps, shift) for name in channels}
+        return drive_table(record, hold, substeps, shift), coordinate_motion(record, quantity, based), extra
 
     with ThreadPoolExecutor(workers()) as pool:
         used = sorted({segment.record for segment in segments})
         content = dict(zip(used, pool.map(known, used), strict=True))
     for lane, segment in enumerate(segments):
         record = records[segment.record]
-        (table, slopes), motion = content[segment.record]
+        (table, slopes), motion, extra = content[segment.record]
         window = slice(segment.start, segment.stop)
         size = segment.stop - segment.start
         drive[lane, :size], rates[lane, :size] = table[window], slopes[window]
+        for name, values in extra.items():
+            beside[name][lane, :size] = values[window]
         measured[lane, :size] = record.output[window]
         weight[lane, segment.counted - segment.start : size] = 1.0
         owner[lane] = segment.record
@@ -167,12 +188,14 @@ def prepare(
             size = np.ptp(motion[state][window]) if record.rings_down else np.std(motion[state][window])
             spread[state, lane] = max(size, 1e-300)
     share = lanes // threads
+
+    def turned(values: np.ndarray, first: int) -> Array:
+        return jnp.moveaxis(jnp.asarray(values[first : first + share]), 0, -1)
+
     batches = tuple(
         Batch(
-            *(
-                jnp.moveaxis(jnp.asarray(values[first : first + share]), 0, -1)
-                for values in (drive, rates, measured, weight)
-            )
+            *(turned(values, first) for values in (drive, rates, measured, weight)),
+            {name: turned(values, first) for name, values in beside.items()},
         )
         for first in range(0, lanes, share)
     )

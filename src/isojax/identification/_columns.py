@@ -32,14 +32,17 @@ def _nodes(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lane
 @eqx.filter_jit
 def _path(
     model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> tuple[State, Array, Array]:
-    """Simulate; give the states, the drive and its rate at the start of each integration step."""
+) -> tuple[State, Array, Array, dict[str, Array]]:
+    """Simulate; give states, drive, its rate and channels at the start of each integration step."""
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
     drive, rate = _nodes(batch.drive), _nodes(batch.drive_rate)
     step = sample_time * batch.drive.shape[0] / drive.shape[0]
-    _, path = scan_records(current, RK4(), quantity, step, states, drive, rate, lambda state, u, du: state)
-    return path, drive[:, 0], rate[:, 0]
+    channels = {name: _nodes(values) for name, values in batch.channels.items()}
+    _, path = scan_records(
+        current, RK4(), quantity, step, states, drive, rate, lambda state, u, du: state, channels
+    )
+    return path, drive[:, 0], rate[:, 0], {name: values[:, 0] for name, values in channels.items()}
 
 
 @eqx.filter_jit
@@ -51,6 +54,7 @@ def _partials(
     path: State,
     u: Array,
     du: Array,
+    channels: dict[str, Array],
     quantity: Quantity,
 ) -> tuple[Array, list[tuple[tuple[Array, ...], Array]], list[tuple[tuple[Array, ...], Array]]]:
     """Differentiate rates and reading along the path.
@@ -66,8 +70,8 @@ def _partials(
         current = scaled_model(model, values, scale)
         late = current.shift() - jax.lax.stop_gradient(current.shift())
         full = (*state, *path[carried_states:])
-        rates = current.rates(full, u - late * du, du, quantity)[1:carried_states]
-        return rates, current.reading(full, u - late * du, du, quantity)
+        rates = current.rates(full, u - late * du, du, quantity, channels=channels)[1:carried_states]
+        return rates, current.reading(full, u - late * du, du, quantity, channels)
 
     state = path[:carried_states]
     (_, reading) = both(values, scale, state)
@@ -161,14 +165,16 @@ def column_information(
         units.append(STIFFNESS_SCALE_UNIT)
 
     def one(part: int) -> np.ndarray:
-        batch = prepared.batches[part]
+        batch = prepared.batches[part].following(model)
         scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
         states = share_lanes(unknowns.states, part, parts)
-        path, u, du = _path(model, scale, states, batch, prepared.quantity, prepared.sample_time)
+        path, u, du, channels = _path(model, scale, states, batch, prepared.quantity, prepared.sample_time)
         lanes, nodes = scale.shape[0], u.shape[0]
         steps = nodes // batch.measured.shape[0]
         wide = jnp.broadcast_to(scale, u.shape)
-        reading, by_parameter, by_state = _partials(model, size, moving, wide, path, u, du, prepared.quantity)
+        reading, by_parameter, by_state = _partials(
+            model, size, moving, wide, path, u, du, channels, prepared.quantity
+        )
         rest = [jnp.zeros_like(u)] * size
         forcing = jnp.stack(
             [

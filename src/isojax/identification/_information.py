@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._parameters import list_parameters, replace_parameters
-from ..models import RK4, Isolator, Quantity, State, advance
+from ..elements import Channels
+from ..models import RK4, Isolator, Quantity, State, advance, at_stages
 from ._batch import Batch, Prepared, workers
 
 
@@ -77,15 +78,20 @@ def _sampler(model: Isolator, quantity: Quantity, sample_time: float) -> Callabl
     solver = RK4()
 
     def sample(
-        values: tuple[Array, ...], scale: Array, state: State, u: tuple[Array, ...], du: tuple[Array, ...]
+        values: tuple[Array, ...],
+        scale: Array,
+        state: State,
+        u: tuple[Array, ...],
+        du: tuple[Array, ...],
+        channels: tuple[Channels, ...],
     ) -> tuple[Array, State]:
         current = scaled_model(model, values, scale)
         # The table already holds the delayed drive; only the derivative with respect to the delay is still to
         # come.
         late = current.shift() - jax.lax.stop_gradient(current.shift())
         u = tuple(value - late * slope for value, slope in zip(u, du, strict=True))
-        reading = current.reading(state, u[0], du[0], quantity)
-        return reading, advance(current, solver, quantity, sample_time, state, u, du)
+        reading = current.reading(state, u[0], du[0], quantity, channels[0])
+        return reading, advance(current, solver, quantity, sample_time, state, u, du, channels)
 
     return sample
 
@@ -127,15 +133,16 @@ def _lane_information(
             numbers[place] = number
         return tuple(numbers)
 
-    def body(carry: tuple, table: tuple[Array, ...]) -> tuple[tuple, None]:
+    def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
         state, tangent, gram = carry
-        drive, rate, measured, weight = table
+        drive, rate, known, measured, weight = table
         u = tuple(drive[stage] for stage in range(stages))
         du = tuple(rate[stage] for stage in range(stages))
+        channels = at_stages(known, stages)
 
         def along(seed: tuple[Array, ...], scale_seed: Array, tangent: State) -> tuple:
             primal, change = jax.jvp(
-                lambda moved, scale, state: sample(with_moved(moved), scale, state, u, du),
+                lambda moved, scale, state: sample(with_moved(moved), scale, state, u, du, channels),
                 (tuple(values[place] for place in moving), scale, state),
                 (seed, scale_seed, tangent),
             )
@@ -146,7 +153,8 @@ def _lane_information(
         return (state, change[1], gram + rows[:, None] * rows[None]), None
 
     start = (states, tangents, jnp.zeros((total + 1, total + 1, lanes)))
-    carry, _ = jax.lax.scan(body, start, (batch.drive, batch.drive_rate, batch.measured, batch.weight))
+    tables = (batch.drive, batch.drive_rate, batch.channels, batch.measured, batch.weight)
+    carry, _ = jax.lax.scan(body, start, tables)
     return carry[2]
 
 
@@ -193,7 +201,7 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
             share_lanes(unknowns.stiffness_scale[None], part, parts)[0],
             share_lanes(unknowns.states, part, parts),
             share_lanes(unknowns.state_scales, part, parts),
-            prepared.batches[part],
+            prepared.batches[part].following(model),
             prepared.quantity,
             prepared.sample_time,
         )
@@ -212,13 +220,13 @@ def _lane_readings(
     sample = _sampler(model, quantity, sample_time)
     stages = batch.drive.shape[1]
 
-    def body(state: State, table: tuple[Array, ...]) -> tuple[State, Array]:
-        drive, rate = table
+    def body(state: State, table: tuple) -> tuple[State, Array]:
+        drive, rate, known = table
         u, du = tuple(drive[i] for i in range(stages)), tuple(rate[i] for i in range(stages))
-        reading, state = sample(values, scale, state, u, du)
+        reading, state = sample(values, scale, state, u, du, at_stages(known, stages))
         return state, reading
 
-    return jax.lax.scan(body, states, (batch.drive, batch.drive_rate))[1]
+    return jax.lax.scan(body, states, (batch.drive, batch.drive_rate, batch.channels))[1]
 
 
 def readings(
@@ -242,7 +250,7 @@ def readings(
 
     def one(part: int) -> np.ndarray:
         scale = share_lanes(stiffness_scale[None], part, parts)[0]
-        batch = prepared.batches[part]
+        batch = prepared.batches[part].following(model)
         own = share_lanes(states, part, parts)
         return np.asarray(_lane_readings(model, scale, own, batch, prepared.quantity, prepared.sample_time))
 

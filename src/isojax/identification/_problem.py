@@ -117,7 +117,7 @@ class Bench:
         self.problem = problem
         self.at_rest = at_rest
         self._heads = Bench(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
-        self._prepared: dict[tuple[int, float], Prepared] = {}
+        self._prepared: dict[tuple[int, float], tuple[set[str], Prepared]] = {}
         self._memories: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
         self._last: tuple[tuple[np.ndarray, ...], Float[np.ndarray, "lanes column column"]] | None = None
 
@@ -136,18 +136,26 @@ class Bench:
             Isolator(model.mass, model.elements[:carried], model.excitation)
         )
         key = (steps, float(model.shift()))
-        if key not in self._prepared:
+        channels = set(model.channels)
+        if key not in self._prepared or not channels <= self._prepared[key][0]:
+            # What is known already stays known: the tables serve models with and without their followers.
+            if key in self._prepared:
+                channels |= self._prepared[key][0]
             self._prepared.clear()
-            self._prepared[key] = prepare(
-                problem.records,
-                problem.segments,
-                quantity=problem.quantity,
-                hold=problem.hold,
-                substeps=steps,
-                shift=key[1],
-                based=model.excitation == "base_acceleration",
+            self._prepared[key] = (
+                channels,
+                prepare(
+                    problem.records,
+                    problem.segments,
+                    quantity=problem.quantity,
+                    hold=problem.hold,
+                    substeps=steps,
+                    shift=key[1],
+                    based=model.excitation == "base_acceleration",
+                    channels=tuple(sorted(channels)),
+                ),
             )
-        return self._prepared[key]
+        return self._prepared[key][1]
 
     def starts(
         self, model: Isolator, prepared: Prepared, carried: int | None = None

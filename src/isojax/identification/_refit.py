@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import numpy as np
+from jaxtyping import Float
 
 from .._parameters import list_parameters, own_parameters, replace_parameters
 from .._results import RESULTS
@@ -53,12 +55,11 @@ def refit_candidate(
     fitted, score = test.fitted, test.scores[index]
     element = score.element
     best: tuple[float, Isolator, Nuisances] | None = None
-    added = element.internal_states
     for share in (1.0, 0.3, 0.03):
         model = _extended(fitted, element, share * score.strength, share * test.steps[index])
         old, new = fitted.point.nuisances, test.nuisances[index]
         states = old.states + share * (new.states - old.states)
-        states = np.concatenate([states, np.zeros((states.shape[0], added))], axis=1)
+        states = _states_of(model, fitted.model, states)
         stiffness = old.stiffness + share * (new.stiffness - old.stiffness)
         nuisances = Nuisances(states, stiffness, old.stiffness_spread)
         nothing = np.zeros((len(list_parameters(model)), 0))
@@ -154,13 +155,27 @@ def bic(found: Estimate, inflation: float) -> float:
         inflation: chi2/dof of the best model known, at least 1: what model errors add to the noise.
 
     Returns:
-        chi2 / inflation + coefficients ln(samples).
+        chi2 / inflation + coefficients ln(samples). A phase found in each record counts as a coefficient.
     """
-    return found.chi2 / inflation + len(found.places) * float(np.log(found.point.samples.sum()))
+    phases = sum(element.phased for element in found.model.elements) * len(found.bench.problem.records)
+    samples = float(np.log(found.point.samples.sum()))
+    return found.chi2 / inflation + (len(found.places) + phases) * samples
 
 
 def _extended(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
     """Give the model with the effect at a strength, the fitted coefficients moved by a step."""
+    own = [name for name, _ in own_parameters(element)]
+    for old in fitted.model.elements:
+        if old.name in element.absorbs:
+            # What both have goes on; strengths of one unit are those of one law.
+            shared = {name for name, _ in own_parameters(old)} & set(own)
+            for name in shared - {element.strength}:
+                element = eqx.tree_at(lambda e, n=name: getattr(e, n), element, getattr(old, name))
+            if (
+                dict(own_parameters(old))[old.strength].unit
+                == dict(own_parameters(element))[element.strength].unit
+            ):
+                strength = max(strength, 0.0) + float(getattr(old, old.strength))
     model = fitted.model.with_elements(element)
     listed = list_parameters(model)
     numbers = [entry.value for entry in listed]
@@ -173,6 +188,18 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
     place = len(listed) - len(fields) + fields.index(element.strength)
     numbers[place] = numbers[place] * 0.0 + strength
     return replace_parameters(model, numbers)
+
+
+def _states_of(
+    model: Isolator, before: Isolator, states: Float[np.ndarray, "lanes state"]
+) -> Float[np.ndarray, "lanes state"]:
+    """Give the deviations of the initial states of an extended model: of what stayed; none of the rest."""
+    known, place = {}, 2
+    for element in before.elements:
+        known[id(element)] = states[:, place : place + element.internal_states]
+        place += element.internal_states
+    nothing = {id(e): np.zeros((states.shape[0], e.internal_states)) for e in model.elements}
+    return np.concatenate([states[:, :2], *({**nothing, **known}[id(e)] for e in model.elements)], axis=1)
 
 
 def polish(found: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]) -> Estimate:

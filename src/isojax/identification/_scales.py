@@ -102,4 +102,5 @@ def scales(campaign: Campaign) -> Scales:
         sample_time=1.0 / campaign.rate,
         slowest_velocity=min(_slowest(*pair, centre) for pair, centre in zip(pairs, centres, strict=True)),
         reading=reading,
+        largest_reading=max(float(np.max(np.abs(record.output))) for record in records),
     )

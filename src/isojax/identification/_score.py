@@ -1,5 +1,6 @@
 """The score test: absent effects ride along at zero strength; what a refit would absorb is projected out."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,10 @@ SMALLEST_VISIBILITY = 0.005
 """Share of a candidate's column that must be left after projection; less is numerical dust."""
 
 DRAWS = 20_000
+
+
+_RAYLEIGH = (math.sqrt(0.5 * math.pi), math.sqrt(2.0 - 0.5 * math.pi))
+"""Mean and standard deviation of the amplitude of a line of noise, each part of which has unit variance."""
 
 
 class Score(NamedTuple):
@@ -79,6 +84,7 @@ def absent_effects(
         Elements at zero strength.
     """
     present = {element.name for element in model.elements} | set(excluded)
+    present |= {name for element in model.elements for name in element.absorbs}
     return tuple(
         probe
         for name, kind in sorted(CATALOGUE.items())
@@ -107,7 +113,8 @@ def score_test(
 
     Source: Rao 1948; Davies 1977 for parameters that mean nothing under the null; Westfall & Young 1993.
     """
-    model = fitted.model.with_elements(*probes)
+    # Beside what they contain, not in its place: a probe that absorbs an effect shows what it adds to it.
+    model = Isolator(fitted.model.mass, (*fitted.model.elements, *probes), fitted.model.excitation)
     carried = len(fitted.model.elements)
     places = list(fitted.places)
     sizes = list(np.sqrt(1.0 / np.maximum(np.diag(fitted.point.reduced.matrix)[:-1], 1e-300)))
@@ -155,6 +162,9 @@ def score_test(
         if seen[column] and (probe.name not in best or weight[column] > weight[best[probe.name]]):
             best[probe.name] = column
     order = sorted(best.values(), key=lambda column: -abs(z[column]))
+    # A phase that each record chose for itself makes the sum of as many Rayleigh amplitudes of noise.
+    chosen = np.array([probe.phased for probe in probes], dtype=bool)
+    z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(by_record.shape[0])) / _RAYLEIGH[1], z)
     correlation = information / np.outer(safe, safe)
     inflation = np.sqrt(max(1.0, fitted.chi2 / fitted.dof))
     family = _family_wise(correlation[np.ix_(seen, seen)], np.abs(z[order]) / inflation, seed)

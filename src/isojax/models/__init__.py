@@ -6,6 +6,7 @@ from ._isolator import Quantity as Quantity
 from ._isolator import State as State
 from ._rk4 import RK4 as RK4
 from ._scan import advance as advance
+from ._scan import at_stages as at_stages
 from ._scan import scan_records as scan_records
 from ._simulate import Simulation as Simulation
 from ._simulate import simulate as simulate

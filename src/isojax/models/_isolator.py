@@ -10,12 +10,15 @@ from jaxtyping import Array, Float
 
 from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
 from .._types import Internal, Lanes, Scalar
-from ..elements import AbstractElement
+from ..elements import AbstractElement, Channels
 
 State = tuple[Lanes, ...]
 """Displacement [m], velocity [m/s], then the internal states of each element in turn."""
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
+
+NO_CHANNELS: Channels = {}
+"""No record, no signals of a record: the effects that follow them are absent."""
 
 
 class Isolator(eqx.Module):
@@ -70,6 +73,11 @@ class Isolator(eqx.Module):
         """Name, declaration and value of every physical number."""
         return list_parameters(self)
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the signals of a record that some element follows."""
+        return tuple(sorted({name for element in self.elements for name in element.channels}))
+
     def __getitem__(self, name: str) -> Float[Array, ""]:
         """Give a parameter by its name in reports.
 
@@ -114,7 +122,7 @@ class Isolator(eqx.Module):
         return next((element for element in self.elements if element.name == name), None)
 
     def with_elements(self, *added: AbstractElement) -> "Isolator":
-        """Give the isolator with further effects.
+        """Give the isolator with further effects, in place of those that they contain.
 
         Args:
             *added: elements to append.
@@ -122,7 +130,13 @@ class Isolator(eqx.Module):
         Returns:
             The new isolator.
         """
-        return Isolator(self.mass, (*self.elements, *added), self.excitation)
+        gone = {name for element in added for name in element.absorbs}
+        kept = tuple(element for element in self.elements if element.name not in gone)
+        return Isolator(self.mass, (*kept, *added), self.excitation)
+
+    def _following(self, channels: Channels) -> tuple[AbstractElement, ...]:
+        """List the elements that follow signals of the record, where there is one."""
+        return tuple(element for element in self.elements if element.channels) if channels else ()
 
     def _internal(self, state: State) -> list[Internal]:
         """Share the internal states out among the elements."""
@@ -136,17 +150,20 @@ class Isolator(eqx.Module):
         """Give the time by which the recorded drive leads the one that acted [s]."""
         return sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
 
-    def drive(self, u: Lanes, u_rate: Lanes | float) -> Lanes:
+    def drive(self, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS) -> Lanes:
         """Give the drive that acted.
 
         Args:
             u: recorded drive, already shifted [N, or m/s^2 for base excitation].
             u_rate: its time derivative.
+            channels: signals of the record, by name; none where there is no record.
 
         Returns:
             The drive that acted, in the same unit.
         """
         rate = jnp.asarray(u_rate, dtype=float)
+        for element in self._following(channels):
+            u = u + element.channel_drive(channels)
         for element in self.elements:
             u, rate = element.drive(u, rate)
         return u
@@ -196,7 +213,12 @@ class Isolator(eqx.Module):
         return total
 
     def acceleration(
-        self, state: State, u: Lanes, u_rate: Lanes | float = 0.0, sides: State | None = None
+        self,
+        state: State,
+        u: Lanes,
+        u_rate: Lanes | float = 0.0,
+        sides: State | None = None,
+        channels: Channels = NO_CHANNELS,
     ) -> Lanes:
         """Give the acceleration of the coordinate.
 
@@ -205,6 +227,7 @@ class Isolator(eqx.Module):
             u: recorded drive, already shifted.
             u_rate: its time derivative.
             sides: see `restoring_force`.
+            channels: see `drive`.
 
         Returns:
             Acceleration [m/s^2]; relative to the base under base excitation.
@@ -212,12 +235,22 @@ class Isolator(eqx.Module):
         inertia = self.mass
         for element in self.elements:
             inertia = inertia + element.inertia()
-        drive = self.drive(u, u_rate)
+        drive = self.drive(u, u_rate, channels)
+        force = self.restoring_force(state, sides)
+        for element in self._following(channels):
+            force = force + element.channel_force(state[0], state[1], channels)
         if self.excitation == "base_acceleration":
-            return -drive - self.restoring_force(state, sides) / inertia
-        return (drive - self.restoring_force(state, sides)) / inertia
+            return -drive - force / inertia
+        return (drive - force) / inertia
 
-    def motion(self, state: State, u: Lanes, u_rate: Lanes | float, quantity: Quantity) -> Lanes:
+    def motion(
+        self,
+        state: State,
+        u: Lanes,
+        u_rate: Lanes | float,
+        quantity: Quantity,
+        channels: Channels = NO_CHANNELS,
+    ) -> Lanes:
         """Give the motion at the sensor.
 
         Args:
@@ -225,6 +258,7 @@ class Isolator(eqx.Module):
             u: recorded drive, already shifted.
             u_rate: its time derivative.
             quantity: what the sensor measures.
+            channels: see `drive`.
 
         Returns:
             Acceleration [m/s^2] (absolute under base excitation), velocity [m/s] or displacement [m].
@@ -233,12 +267,19 @@ class Isolator(eqx.Module):
             return state[0]
         if quantity == "velocity":
             return state[1]
-        acceleration = self.acceleration(state, u, u_rate)
+        acceleration = self.acceleration(state, u, u_rate, channels=channels)
         if self.excitation == "base_acceleration":
-            return acceleration + self.drive(u, u_rate)
+            return acceleration + self.drive(u, u_rate, channels)
         return acceleration
 
-    def reading(self, state: State, u: Lanes, u_rate: Lanes | float, quantity: Quantity) -> Lanes:
+    def reading(
+        self,
+        state: State,
+        u: Lanes,
+        u_rate: Lanes | float,
+        quantity: Quantity,
+        channels: Channels = NO_CHANNELS,
+    ) -> Lanes:
         """Give what the sensor chain records.
 
         Args:
@@ -246,13 +287,16 @@ class Isolator(eqx.Module):
             u: recorded drive, already shifted.
             u_rate: its time derivative.
             quantity: what the sensor measures.
+            channels: see `drive`.
 
         Returns:
             The reading [SI unit of the quantity].
         """
-        y = self.motion(state, u, u_rate, quantity)
+        y = self.motion(state, u, u_rate, quantity, channels)
         for element, internal in zip(self.elements, self._internal(state), strict=True):
             y = element.reading(y, internal)
+        for element in self._following(channels):
+            y = y + element.channel_reading(channels)
         return y
 
     def rates(
@@ -262,6 +306,7 @@ class Isolator(eqx.Module):
         u_rate: Lanes | float,
         quantity: Quantity = "acceleration",
         sides: State | None = None,
+        channels: Channels = NO_CHANNELS,
     ) -> State:
         """Give the time derivative of the state.
 
@@ -272,6 +317,7 @@ class Isolator(eqx.Module):
             quantity: what the sensor measures; an instrument with memory follows it, as changed by the
                 instruments before.
             sides: see `restoring_force`.
+            channels: see `drive`.
 
         Returns:
             One rate a state.
@@ -279,14 +325,17 @@ class Isolator(eqx.Module):
         x, v = state[:2]
         internal_rates: list[Lanes] = []
         if self.internal_states:
-            y = self.motion(state, u, u_rate, quantity)
+            y = self.motion(state, u, u_rate, quantity, channels)
             beside = [None] * len(self.elements) if sides is None else self._sides(state, sides)
             for element, internal, own in zip(self.elements, self._internal(state), beside, strict=True):
                 if own is None:
                     law = element.state_rate(x, v, internal)
                 else:
                     law = element.state_rate_beside(x, v, internal, own)
+                if self.excitation == "base_acceleration":
+                    moved = element.base_rate(self.drive(u, u_rate, channels), internal)
+                    law = tuple(a + b for a, b in zip(law, moved, strict=True))
                 sensed = element.reading_rate(y, internal)
                 internal_rates.extend(a + b for a, b in zip(law, sensed, strict=True))
                 y = element.reading(y, internal)
-        return (v, self.acceleration(state, u, u_rate, sides), *internal_rates)
+        return (v, self.acceleration(state, u, u_rate, sides, channels), *internal_rates)

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._types import Lanes
-from ._isolator import Isolator, Quantity, State
+from ..elements import Channels
+from ._isolator import NO_CHANNELS, Isolator, Quantity, State
 
 
 def sampled_term(model: Isolator, quantity: Quantity, sample_time: Lanes | float) -> diffrax.ODETerm:
@@ -24,13 +25,14 @@ def sampled_term(model: Isolator, quantity: Quantity, sample_time: Lanes | float
         sample_time: time between samples [s].
 
     Returns:
-        A term whose `args` are the drive and its rate at `2 substeps + 1` equidistant times of the sample.
+        A term whose `args` are the drive, its rate and the channels at `2 substeps + 1` equidistant times of
+        the sample.
     """
 
-    def field(t: float, state: State, args: tuple[Any, Any]) -> State:
-        drive, drive_rate = args
+    def field(t: float, state: State, args: tuple[Any, Any, Any]) -> State:
+        drive, drive_rate, channels = args
         place = round(t * (len(drive) - 1))
-        rates = model.rates(state, drive[place], drive_rate[place], quantity)
+        rates = model.rates(state, drive[place], drive_rate[place], quantity, channels=channels[place])
         return tuple(sample_time * rate for rate in rates)
 
     return diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
@@ -48,6 +50,7 @@ def advance(
     state: State,
     drive: tuple[Array, ...],
     drive_rate: tuple[Array | float, ...],
+    channels: tuple[Channels, ...] = (),
 ) -> State:
     """Advance the state by one sample.
 
@@ -59,16 +62,18 @@ def advance(
         state: state at the sample, any leading shape.
         drive: recorded drive at `2 substeps + 1` equidistant times of the sample.
         drive_rate: its time derivative at the same times.
+        channels: signals of the record at the same times; none if omitted.
 
     Returns:
         State one sample later.
     """
+    channels = channels or (NO_CHANNELS,) * len(drive)
     substeps = (len(drive) - 1) // 2
     if substeps <= UNROLLED:
         term = sampled_term(model, quantity, sample_time)
         for substep in range(substeps):
             t0, t1 = substep / substeps, (substep + 1) / substeps
-            state, *_ = solver.step(term, t0, t1, state, (drive, drive_rate), None, False)
+            state, *_ = solver.step(term, t0, t1, state, (drive, drive_rate, channels), None, False)
         return state
     # Many substeps are looped over: unrolled they take long to compile and run no faster.
     term = sampled_term(model, quantity, sample_time / substeps)
@@ -76,12 +81,32 @@ def advance(
     def stages(values: tuple[Array | float, ...], offset: int) -> Array:
         return jnp.stack([jnp.asarray(value) for value in values[offset : len(values) - 2 + offset : 2]])
 
-    def body(carry: State, table: tuple[Array, ...]) -> tuple[State, None]:
-        moved, *_ = solver.step(term, 0.0, 1.0, carry, (table[:3], table[3:]), None, False)
+    def body(carry: State, table: tuple) -> tuple[State, None]:
+        moved, *_ = solver.step(term, 0.0, 1.0, carry, table, None, False)
         return moved, None
 
-    tables = tuple(stages(values, offset) for values in (drive, drive_rate) for offset in range(3))
+    def named(offset: int) -> dict[str, Array]:
+        return {name: stages(tuple(at[name] for at in channels), offset) for name in channels[0]}
+
+    tables = (
+        tuple(stages(drive, offset) for offset in range(3)),
+        tuple(stages(drive_rate, offset) for offset in range(3)),
+        tuple(named(offset) for offset in range(3)),
+    )
     return jax.lax.scan(body, state, tables)[0]
+
+
+def at_stages(channels: dict[str, Float[Array, "stage lanes"]], stages: int) -> tuple[Channels, ...]:
+    """Give signals stage by stage.
+
+    Args:
+        channels: signals over the stages of a sample, by name.
+        stages: how many these are.
+
+    Returns:
+        One set of signals a stage.
+    """
+    return tuple({name: values[stage] for name, values in channels.items()} for stage in range(stages))
 
 
 def scan_records(
@@ -93,6 +118,7 @@ def scan_records(
     drive: Float[Array, "time stage lanes"],
     drive_rate: Float[Array, "time stage lanes"] | None,
     observe: Callable[[State, Array, Array | float], Any],
+    channels: dict[str, Float[Array, "time stage lanes"]] | None = None,
 ) -> tuple[State, Any]:
     """Integrate records side by side and observe each sample before it is stepped over.
 
@@ -105,17 +131,18 @@ def scan_records(
         drive: recorded drive; stage runs over `2 substeps + 1` equidistant times of a sample.
         drive_rate: its time derivative, or None where the model has no use for it.
         observe: what to keep, from the state, drive and drive rate at a sample.
+        channels: signals of the records at the same times, by name.
 
     Returns:
         State after the last sample, and the observations, time first.
     """
     stages = drive.shape[1]
 
-    def body(carry: State, table: tuple[Array, Array | None]) -> tuple[State, Any]:
-        values, slopes = table
+    def body(carry: State, table: tuple[Array, Array | None, dict[str, Array]]) -> tuple[State, Any]:
+        values, slopes, beside = table
         u = tuple(values[stage] for stage in range(stages))
         du = (0.0,) * stages if slopes is None else tuple(slopes[stage] for stage in range(stages))
         kept = observe(carry, u[0], du[0])
-        return advance(model, solver, quantity, sample_time, carry, u, du), kept
+        return advance(model, solver, quantity, sample_time, carry, u, du, at_stages(beside, stages)), kept
 
-    return jax.lax.scan(body, state, (drive, drive_rate))
+    return jax.lax.scan(body, state, (drive, drive_rate, channels or {}))

@@ -2,6 +2,7 @@
 
 import filecmp
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ def read_campaign(path: str | Path) -> Campaign:
         stiffness=tuple(sections["model"]["stiffness"]),
         damping=tuple(sections["model"]["damping"]),
         elements=tuple(sections["model"]["elements"]),
-        records=records,
+        records=_clocked(records),
     )
 
 
@@ -100,6 +101,16 @@ def _record_names(declared: Declaration) -> list[str]:
         f"[{entry['start']}:{'' if entry['stop'] is None else entry['stop']}]" for entry in declared.records
     ]
     return [name + span if names.count(name) > 1 else name for name, span in zip(names, spans, strict=True)]
+
+
+def _clocked(records: tuple[Record, ...]) -> tuple[Record, ...]:
+    """Tell each record which share of the test it is; pauses between records are not known."""
+    ends = np.cumsum([0.0, *(record.input.size / record.rate for record in records)])
+    shares = (ends / ends[-1]).tolist()
+    return tuple(
+        replace(record, clock=(begin, end))
+        for record, begin, end in zip(records, shares[:-1], shares[1:], strict=True)
+    )
 
 
 def _read_record(

@@ -52,6 +52,7 @@ class Record:
         settle: Samples at the start that count in no error.
         dwells: Dwells of a stepped sine, else empty.
         kind: What the excitation is.
+        clock: Beginning and end of the record as shares of the whole test, 0 to 1.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Record:
     settle: int = 0
     dwells: tuple[Dwell, ...] = ()
     kind: Kind = "broadband"
+    clock: tuple[float, float] = (0.0, 1.0)
 
     @property
     def rings_down(self) -> bool:

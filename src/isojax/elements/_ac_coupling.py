@@ -1,0 +1,51 @@
+"""AC coupling of the response channel."""
+
+import math
+from typing import ClassVar
+
+from .._parameters import parameter
+from .._types import Internal, Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class AcCoupling(AbstractElement):
+    """The response channel passes no constant: a first-order high-pass of the reading.
+
+    `y -> y - wc s`, `s' = y - (wc + wl) s`, `wc = 2 pi fc`, `wl = 2 pi fl`: the response
+    `(i w + wl) / (i w + wc + wl)`, a high-pass `i w / (i w + wc)` but for the declared leak fl. Without it s
+    would be the plain integral of the reading where the effect is absent, and grow from any constant in it.
+    With fl a fiftieth of the excited frequency s forgets within some ten cycles, and the phase lead `wc / w`
+    in the excited band is `fl^2 / f^2`, 0.04 %, short.
+
+    Attributes:
+        corner: fc [Hz].
+        leak: fl, declared [Hz]; 0 for the plain high-pass.
+
+    Source: Horowitz & Hill 2015, The Art of Electronics, sec. 1.7.1.
+    """
+
+    name: ClassVar[str] = "ac_coupling"
+    words: ClassVar[str] = "AC coupling of the response channel"
+    strength: ClassVar[str] = "corner"
+    internal_states: ClassVar[int] = 1
+
+    corner: Scalar = parameter(symbol="fc", unit="Hz", lower=0.0)
+    leak: Scalar = parameter(symbol="fl", unit="Hz", lower=0.0, fitted=False)
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "AcCoupling":
+        """See `AbstractElement.guess`."""
+        return cls(0.0, 0.02 * scales.angular_frequency / (2.0 * math.pi))
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.angular_frequency / (2.0 * math.pi)
+
+    def reading(self, y: Lanes, s: Internal) -> Lanes:
+        """See `AbstractElement.reading`."""
+        return y - 2.0 * math.pi * self.corner * s[0]
+
+    def reading_rate(self, y: Lanes, s: Internal) -> Internal:
+        """See `AbstractElement.reading_rate`."""
+        return (y - 2.0 * math.pi * (self.corner + self.leak) * s[0],)

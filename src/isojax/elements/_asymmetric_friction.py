@@ -1,0 +1,50 @@
+"""Dry friction that differs between the two directions: the part beyond the symmetrical one."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from .._parameters import parameter
+from .._types import Internal, Lanes, Scalar
+from . import _coulomb_friction
+from ._base import AbstractElement, Scales
+
+
+class AsymmetricFriction(AbstractElement):
+    """Direction-dependent dry friction: half the difference between the two directions.
+
+    `dF tanh(v / vs)^2` [N]; meant beside `Fc tanh(v / vs)`, with which it is `Fc + dF` against positive
+    motion and `Fc - dF` against negative motion; |dF| <= Fc is what takes energy in both. vs is the declared
+    regularising width of dry friction. In a motion that never rests it is a constant force but for the
+    instants of reversal, and so all but exactly an offset of the drive.
+
+    Attributes:
+        difference: dF [N].
+        width: vs [m/s].
+
+    Source: Armstrong-Helouvry, Dupont & Canudas de Wit 1994, Automatica 30:1083; Janot, Gautier & Brunot
+    2019 (EMPS), whose offset is this.
+    """
+
+    name: ClassVar[str] = "asymmetric_friction"
+    words: ClassVar[str] = "direction-dependent friction"
+    strength: ClassVar[str] = "difference"
+    signed: ClassVar[bool] = True
+    substeps: ClassVar[int] = 4
+
+    difference: Scalar = parameter(symbol="dF", unit="N")
+    width: Scalar = parameter(symbol="vs", unit="m/s", lower=0.0, fitted=False)
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "AsymmetricFriction":
+        """See `AbstractElement.guess`: as wide as dry friction, beside which it stands."""
+        return cls(0.0, _coulomb_friction.CoulombFriction.guess(scales).width)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.force
+
+    def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
+        """See `AbstractElement.force`."""
+        return self.difference * jnp.tanh(v / self.width) ** 2

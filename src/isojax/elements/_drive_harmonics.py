@@ -1,0 +1,61 @@
+"""Harmonics of the drive that the recorded one does not show."""
+
+import math
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from .._parameters import parameter
+from .._types import Lanes, Scalar
+from ._base import AbstractElement, Channels, Scales
+
+_PARTS = tuple(f"drive_{part}_{order}" for order in (2, 3) for part in ("cosine", "sine"))
+
+
+class DriveHarmonics(AbstractElement):
+    """The force that acted holds a harmonic of the recorded one (recorded as commanded, a shaker that bends).
+
+    `u + h A cos(n theta + phi)`, with A and theta the amplitude and phase of the drive `A cos(theta)`; the
+    share h is the same at every level and frequency.
+
+    Attributes:
+        share: h, harmonic over fundamental [1].
+        phase: phi [rad].
+        order: n, 2 or 3 [1].
+
+    Source: Tomlinson 1979 on the force distortion of shakers; Ewins 2000, sec. 3.
+    """
+
+    name: ClassVar[str] = "drive_harmonics"
+    words: ClassVar[str] = "harmonics of the drive that its record lacks"
+    strength: ClassVar[str] = "share"
+    channels: ClassVar[tuple[str, ...]] = _PARTS
+
+    share: Scalar = parameter(symbol="h", unit="1", lower=0.0)
+    phase: Scalar = parameter(symbol="phi", unit="rad")
+    order: Scalar = parameter(symbol="n", unit="1", fitted=False)
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "DriveHarmonics":
+        """See `AbstractElement.guess`."""
+        return cls(0.0, 0.0, 3.0)
+
+    @classmethod
+    def grid(cls, scales: Scales) -> "tuple[DriveHarmonics, ...]":
+        """See `AbstractElement.grid`: both orders, phases a third of a turn apart."""
+        third = 2.0 * math.pi / 3.0
+        return tuple(cls(0.0, phase, order) for order in (2.0, 3.0) for phase in (-third, 0.0, third))
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return 1.0
+
+    def channel_drive(self, channels: Channels) -> Lanes | float:
+        """See `AbstractElement.channel_drive`."""
+        second, third = (
+            jnp.cos(self.phase) * channels[f"drive_cosine_{order}"]
+            - jnp.sin(self.phase) * channels[f"drive_sine_{order}"]
+            for order in (2, 3)
+        )
+        return self.share * jnp.where(self.order == 2.0, second, third)

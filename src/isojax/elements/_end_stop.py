@@ -1,0 +1,76 @@
+"""End stop."""
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+
+from .._parameters import parameter
+from .._types import Internal, Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class EndStop(AbstractElement):
+    """End stop: a further spring that is met beyond a gap, on both sides or on one.
+
+    `K [u(x - g) - u(-x - g)]` [N] with the rounded ramp `u(d) = w ln(1 + exp(d / w))`, which is max(d, 0) but
+    for a corner of width w: a declared regularising width, not a physical number. The rounding takes in
+    `pi^2/12 K w^2` of energy on either side of the corner. `side` +1 keeps the first ramp alone, -1 the
+    second.
+
+    With a free linear spring a two-sided stop is exactly the class of a free gap: `K x - K clip(x, -g, g)` is
+    this law, so that "K more beyond g" and "K less within g" differ by what is called the linear spring. What
+    parts them is a look at the rig, or the stiffness at motion smaller than the gap known beforehand.
+
+    Attributes:
+        stiffness: K, of the stop [N/m].
+        gap: g, free way up to it [m].
+        side: 0 two-sided, +1 met by positive displacement alone, -1 by negative [1]; declared, not fitted.
+        width: w [m].
+
+    Source: Shaw & Holmes 1983, J. Sound Vib. 90:129, for the piecewise linear law.
+    """
+
+    name: ClassVar[str] = "end_stop"
+    words: ClassVar[str] = "end stop"
+    strength: ClassVar[str] = "stiffness"
+    substeps: ClassVar[int] = 4
+
+    stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
+    gap: Scalar = parameter(symbol="g", unit="m", lower=0.0)
+    side: Scalar = parameter(symbol="side", unit="1", fitted=False)
+    width: Scalar = parameter(symbol="w", unit="m", lower=0.0, fitted=False)
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "EndStop":
+        """See `AbstractElement.guess`: a corner of 0.5 % of the motion, but one that steps resolve.
+
+        The motion covers no more than two widths in an integration step; the corner spans about six.
+        """
+        return cls._placed(scales, 0.7, 0.0)
+
+    @classmethod
+    def grid(cls, scales: Scales) -> "tuple[EndStop, ...]":
+        """See `AbstractElement.grid`: met by all but small motion, by strong motion, by its peaks alone."""
+        return tuple(
+            cls._placed(scales, share, side) for side in (0.0, 1.0, -1.0) for share in (0.35, 0.7, 1.2)
+        )
+
+    @classmethod
+    def _placed(cls, scales: Scales, share: float, side: float) -> "EndStop":
+        """Give the absent effect with a gap of a share of the motion."""
+        way = scales.velocity * scales.sample_time / cls.substeps
+        width = max(0.005 * scales.displacement, 0.5 * way)
+        return cls(0.0, share * scales.displacement, side, width)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.force / scales.displacement
+
+    def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
+        """See `AbstractElement.force`."""
+        above = self.width * jax.nn.softplus((x - self.gap) / self.width)
+        below = self.width * jax.nn.softplus((-x - self.gap) / self.width)
+        upper, lower = jnp.minimum(1.0, 1.0 + self.side), jnp.minimum(1.0, 1.0 - self.side)
+        return self.stiffness * (upper * above - lower * below)

@@ -1,0 +1,69 @@
+"""Free gap."""
+
+from typing import ClassVar
+
+import jax
+
+from .._parameters import parameter
+from .._types import Internal, Lanes, Scalar
+from ._base import AbstractElement, Scales
+
+
+class Freeplay(AbstractElement):
+    """Free gap in the spring: within it, part of the stiffness is missing.
+
+    `-K clip(x, -g, g)` [N] beside the linear spring, which then has `k1 - K` within the gap and `k1 x
+    -+ K g` beyond it; K = k1 is a gap without any spring. The corners are rounded: `clip` is `w ln[(1 + e^((x
+    + g)/w)) / (1 + e^((x - g)/w))] - g`, with the declared regularising width w.
+
+    With a free linear spring it is exactly the class of the two-sided end stop, of equal K, g and w: `K x - K
+    clip(x, -g, g)` is that stop, and the two linear springs differ by K. No record parts them; a look at the
+    rig does, or the stiffness at motion smaller than the gap known beforehand.
+
+    Attributes:
+        lost_stiffness: K, missing within the gap [N/m].
+        gap: g, half of the free way [m].
+        width: w [m].
+
+    Source: Tustin 1947, J. IEE 94 IIA:143 (backlash); Comparin & Singh 1989, J. Sound Vib. 134:259, with
+    its describing function.
+    """
+
+    name: ClassVar[str] = "freeplay"
+    words: ClassVar[str] = "free gap (freeplay)"
+    strength: ClassVar[str] = "lost_stiffness"
+    substeps: ClassVar[int] = 4
+
+    lost_stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
+    gap: Scalar = parameter(symbol="g", unit="m", lower=0.0)
+    width: Scalar = parameter(symbol="w", unit="m", lower=0.0, fitted=False)
+
+    @classmethod
+    def guess(cls, scales: Scales) -> "Freeplay":
+        """See `AbstractElement.guess`: corners like those of an end stop, 0.5 % of the motion.
+
+        The motion covers no more than two widths in an integration step; a corner spans about six.
+        """
+        return cls._placed(scales, 0.35)
+
+    @classmethod
+    def grid(cls, scales: Scales) -> "tuple[Freeplay, ...]":
+        """See `AbstractElement.grid`: the gaps of its look-alike, the end stop, and a smaller one."""
+        return tuple(cls._placed(scales, share) for share in (0.1, 0.35, 0.7, 1.2))
+
+    @classmethod
+    def _placed(cls, scales: Scales, share: float) -> "Freeplay":
+        """Give the absent effect with a gap of a share of the motion."""
+        way = scales.velocity * scales.sample_time / cls.substeps
+        width = max(0.005 * scales.displacement, 0.5 * way)
+        return cls(0.0, share * scales.displacement, width)
+
+    @classmethod
+    def typical_strength(cls, scales: Scales) -> float:
+        """See `AbstractElement.typical_strength`."""
+        return scales.force / scales.displacement
+
+    def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
+        """See `AbstractElement.force`."""
+        beyond = jax.nn.softplus((x + self.gap) / self.width) - jax.nn.softplus((x - self.gap) / self.width)
+        return -self.lost_stiffness * (self.width * beyond - self.gap)
