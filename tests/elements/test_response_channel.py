@@ -60,7 +60,7 @@ def test_clipping_loses_its_share_beyond_the_level_of_either_sign(share):
 
 
 def test_a_clipped_record_is_the_clip_of_the_plain_one():
-    clipped = simulate(Isolator(800.0, (*PLANT, Clipping(1.0, 0.2))), DRIVE, duration=1.0)
+    clipped = simulate(Isolator(800.0, (*PLANT, Clipping(1.0, 0.15))), DRIVE, duration=1.0)
     plain = simulate(LAG, DRIVE, duration=1.0)
-    assert float(jnp.max(plain.reading)) > 0.25
-    np.testing.assert_allclose(clipped.reading, np.clip(plain.reading, -0.2, 0.2), rtol=1e-12, atol=1e-15)
+    assert float(jnp.max(plain.reading)) > 0.2
+    np.testing.assert_allclose(clipped.reading, np.clip(plain.reading, -0.15, 0.15), rtol=1e-12, atol=1e-15)

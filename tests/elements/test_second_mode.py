@@ -16,16 +16,17 @@ OMEGA = np.linspace(10.0, 80.0, 29)
 def response(model, quantity):
     """Reading over drive at every angular frequency, by the model's own linearisation."""
     zero = jnp.zeros(())
-    rest = (zero,) * (2 + model.internal_states)
+    rest = jnp.zeros(2 + model.internal_states)
 
     def moved(state, u):
-        return (*model.rates(state, u, 0.0, quantity), model.reading(state, u, 0.0, quantity))
+        state = tuple(state)
+        return jnp.stack([*model.rates(state, u, 0.0, quantity), model.reading(state, u, 0.0, quantity)])
 
     by_state, by_drive = (np.array(part) for part in jax.jacfwd(moved, (0, 1))(rest, zero))
     own, inward = by_state[:-1], by_drive[:-1]
     return np.array(
         [
-            by_state[-1] @ np.linalg.solve(1j * w * np.eye(len(rest)) - own, inward) + by_drive[-1]
+            by_state[-1] @ np.linalg.solve(1j * w * np.eye(rest.size) - own, inward) + by_drive[-1]
             for w in OMEGA
         ]
     )

@@ -59,7 +59,7 @@ class SecondMode(AbstractElement):
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
         """See `AbstractElement.force`."""
-        return -self.mass * self._acceleration(x, v, s)
+        return self.mass * self._acceleration(x, v, s)
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
         """See `AbstractElement.state_rate`."""
