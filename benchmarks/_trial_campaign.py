@@ -1,0 +1,245 @@
+"""Campaigns of the blind trial, drawn from a seed and filed by the rig simulator."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from _trial_effects import EFFECTS, Hidden, Motion, Shape, chosen_effects, generator, log_uniform, with_size
+from _trial_outside import OUTSIDE
+from isojax import elements, rig
+from isojax.identification import fit, read_campaign, scales
+from isojax.identification._score import score_test
+from isojax.models import Isolator
+
+CLASSES = ("none", "one", "two", "outside")
+SHARES = (0.25, 0.45, 0.15, 0.15)
+"""How often each class is drawn."""
+
+SIGNIFICANT = 3.5
+"""Standard errors that are one detection limit."""
+
+RATE = 250.0
+CYCLES = 20
+DWELLS = (1250, 1160, 1080, 1010, 950, 900, 850, 800)
+"""Samples of the dwells, 4.0 to 6.25 Hz: their sum and the longest are the same in every campaign."""
+
+SECONDS = sum(DWELLS) / RATE
+PERIOD = 8.0
+PAPER = (1.0805e6, -6.974e8, 2.51667e11, 1.027e4, -3.6880e5, 5.3753e6)
+LARGEST = 30.0
+"""Largest size, in detection limits."""
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A campaign as drawn, before the size of what it hides is known.
+
+    Args:
+        seed: of everything.
+        kind: "none", "one", "two" or "outside".
+        base: the six coefficients of the plant.
+        layout: "stepped", "swept" or "mixed".
+        levels: force amplitudes of the fitted and of the held-out records, N.
+        plans: what to test.
+        bench: how it is measured.
+        names: effects that are hidden.
+    """
+
+    seed: int
+    kind: str
+    base: tuple[float, ...]
+    layout: str
+    levels: tuple[float, ...]
+    plans: tuple[rig.Plan, ...]
+    bench: rig.Bench
+    names: tuple[str, ...]
+
+    @property
+    def plant(self) -> rig.Plant:
+        """The plant without what is hidden."""
+        return rig.Plant(rig.base_laws(*self.base))
+
+    @property
+    def model(self) -> Isolator:
+        """The true declared model."""
+        laws = (
+            elements.LinearStiffness,
+            elements.AbsQuadraticStiffness,
+            elements.CubicStiffness,
+            elements.LinearDamping,
+            elements.AbsQuadraticDamping,
+            elements.CubicDamping,
+        )
+        return Isolator(800.0, tuple(law(value) for law, value in zip(laws, self.base, strict=True)))  # pyright: ignore[reportArgumentType]
+
+
+@dataclass(frozen=True)
+class Secret:
+    """One hidden effect.
+
+    Args:
+        name: catalogue name, or that of a law outside the catalogue.
+        size: strength in the unit of the catalogue; NaN outside of it.
+        limit: detection limit in that unit.
+        shape: its other coefficients.
+        law: the rig's law.
+    """
+
+    name: str
+    size: float
+    limit: float
+    shape: Shape
+    law: rig.Law | rig.Instrument
+
+    @property
+    def element(self) -> elements.AbstractElement:
+        """The catalogue element with the true numbers."""
+        return with_size(EFFECTS[self.name].probe(self.shape), self.size)
+
+
+def kind_of(seed: int) -> str:
+    """Give the class of a seed."""
+    return str(generator(seed, "kind").choice(CLASSES, p=SHARES))
+
+
+def sketch(seed: int, kind: str | None = None, names: tuple[str, ...] | None = None) -> Sketch:
+    """Draw a campaign.
+
+    Args:
+        seed: of everything.
+        kind: its class, drawn if omitted.
+        names: what it hides, drawn if omitted.
+    """
+    kind = kind_of(seed) if kind is None else kind
+    draw = generator(seed, "bench")
+    base = tuple(float(value) for value in np.array(PAPER) * draw.uniform(0.9, 1.1, 6))
+    top = draw.uniform(90.0, 170.0)
+    levels = top * np.array(
+        [draw.uniform(0.3, 0.45), draw.uniform(0.55, 0.75), 1.0, draw.uniform(0.45, 0.95)]
+    )
+    levels = tuple(float(level) for level in np.round(levels, 1))
+    layout = str(draw.choice(["stepped", "swept", "mixed"], p=[0.6, 0.2, 0.2]))
+    counts = np.array(DWELLS)
+    for first, last in ((1, 6), (2, 5), (3, 4)):
+        moved = int(draw.integers(-20, 21))
+        counts[first] += moved
+        counts[last] -= moved
+    shaker = rig.Shaker(
+        second=draw.uniform(0.0, 0.02),
+        second_phase=draw.uniform(0.0, 6.28),
+        third=draw.uniform(0.0, 0.012),
+        third_phase=draw.uniform(0.0, 6.28),
+        dropout=draw.uniform(0.0, 0.2),
+        dropout_frequency=draw.uniform(4.6, 5.8),
+    )
+    bench = rig.Bench(
+        rate=RATE,
+        noise=log_uniform(draw, 0.003, 0.02),
+        force_noise=draw.uniform(0.0, 0.05),
+        drift=draw.uniform(0.0, 0.002),
+        shaker=shaker,
+        tolerance=1e-9,
+    )
+    plans = _plans(layout, levels, tuple((CYCLES * RATE / counts).tolist()), draw)
+    if names is None:
+        names = _names(seed, kind)
+    return Sketch(seed, kind, base, layout, levels, plans, bench, names)
+
+
+def _names(seed: int, kind: str) -> tuple[str, ...]:
+    if kind == "outside":
+        return (str(generator(seed, "outside").choice(sorted(OUTSIDE))),)
+    return tuple(chosen_effects(seed, {"none": 0, "one": 1, "two": 2}[kind]))
+
+
+def _plans(
+    layout: str, levels: tuple[float, ...], frequencies: tuple[float, ...], draw: np.random.Generator
+) -> tuple[rig.Plan, ...]:
+    """Four records to fit and two to hold out."""
+    low, middle, high, held = levels
+    both = ("forward", "backward")
+    span = draw.uniform(2.2, 2.6)
+
+    def sines(levels: tuple[float, ...], directions: tuple, holdout: tuple[float, ...] = ()) -> rig.Plan:
+        if layout == "swept":
+            return rig.SweptSine(levels, 4.0, 4.0 + span, span / SECONDS, directions, holdout_levels=holdout)
+        return rig.SteppedSine(levels, frequencies, CYCLES, directions, holdout_levels=holdout)
+
+    held_out = sines((), both, (held,))
+    if layout == "mixed":
+        noise = rig.Multisine((round(0.4 * high, 1),), 2.0, 12.0, PERIOD, round(SECONDS / PERIOD))
+        first = sines((low, high), ("forward",))
+        return first, sines((middle,), ("backward",)), noise, held_out
+    if draw.random() < 0.5:
+        return sines((low, high), both), held_out
+    return sines((low, middle, high), ("forward",)), sines((high,), ("backward",)), held_out
+
+
+def twin(drawn: Sketch, folder: Path):
+    """File the campaign that hides nothing, and fit the true structure to it."""
+    path = rig.write_campaign(folder, drawn.plant, drawn.plans, drawn.seed, "twin", drawn.bench)
+    return fit(drawn.model, read_campaign(path))
+
+
+def motion_of(drawn: Sketch, innocent) -> Motion:
+    """Give how the plant moves without what is hidden."""
+    magnitudes = scales(innocent.campaign)
+    return Motion(
+        min(drawn.levels),
+        magnitudes.displacement,
+        magnitudes.acceleration,
+        magnitudes.angular_frequency,
+        drawn.base[0],
+        drawn.base[3],
+    )
+
+
+def secrets(drawn: Sketch, innocent) -> tuple[Secret, ...]:
+    """Draw how large the hidden effects are.
+
+    One detection limit is 3.5 standard errors of the strength beside the true declared model: 3.5 / |g| with
+    g the whitened trace of the effect less what the six coefficients, the initial states and the stiffness
+    scales imitate. It is read off the score test of the twin campaign, the shape of the effect being known.
+
+    Args:
+        drawn: the campaign.
+        innocent: the fit of its twin.
+    """
+    motion = motion_of(drawn, innocent)
+    if drawn.kind == "outside":
+        draw = generator(drawn.seed, "outside", *drawn.names)
+        force = motion.lowest * log_uniform(draw, 0.03, 0.15)
+        (name,) = drawn.names
+        return (Secret(name, float("nan"), float("nan"), {}, OUTSIDE[name](draw, motion, force)),)
+    # All effects are tested, so that the shapes, and with them the compiled code, are those of every seed.
+    shapes = {
+        name: effect.shape(generator(drawn.seed, "shape", name), motion) for name, effect in EFFECTS.items()
+    }
+    test = score_test(
+        innocent.estimate,
+        scales(innocent.campaign),
+        tuple(EFFECTS[name].probe(shapes[name]) for name in EFFECTS),
+    )
+    limits = {score.element.name: SIGNIFICANT * score.error for score in test.scores}
+    return tuple(
+        _secret(drawn, name, EFFECTS[name], shapes[name], limits[name], motion)
+        for name in drawn.names
+        if name in limits
+    )
+
+
+def _secret(drawn: Sketch, name: str, effect: Hidden, shape: Shape, limit: float, motion: Motion) -> Secret:
+    draw = generator(drawn.seed, "size", name)
+    # The smallest of two effects must be one that a test can see, else there is but one.
+    smallest = 3.0 if drawn.kind == "two" else 1.0
+    size = min(limit * log_uniform(draw, smallest, LARGEST), effect.most(motion))
+    if effect.signed and draw.random() < 0.5:
+        size = -size
+    return Secret(name, size, limit, shape, effect.law(size, shape))
+
+
+def file_campaign(drawn: Sketch, hidden: tuple[Secret, ...], folder: Path) -> Path:
+    """File the campaign; where the plant runs away the effect is too large, which the caller hears of."""
+    plant = drawn.plant.plus(*(secret.law for secret in hidden))
+    return rig.write_campaign(folder, plant, drawn.plans, drawn.seed, "blind", drawn.bench)

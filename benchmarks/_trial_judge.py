@@ -1,0 +1,273 @@
+"""The blind trial's table: each criterion, its figure, its count, its Wilson interval, PASS or FAIL."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from _trial_effects import exact_class, known_by
+
+Row = dict[str, Any]
+CLEAR = 3.0
+"""Detection limits from which an effect must be named."""
+
+GOOD = 1.05
+"""chi2/dof up to which a fit needs no explanation."""
+
+WORTH = 0.05
+"""Held-out excess, in chi2/dof, that the oracle must remove for a share of it to mean anything."""
+
+
+class Mark(NamedTuple):
+    """One line of the table.
+
+    Attributes:
+        criterion: in words, with its pass mark.
+        figure: what came out; NaN where there was nothing to judge.
+        judged: campaigns, or coefficients, that it rests on.
+        interval: 95 % interval of the figure where it is a share, else None.
+        passed: None where there was nothing to judge.
+        failing: campaigns that speak against it, in words.
+    """
+
+    criterion: str
+    figure: float
+    judged: int
+    interval: tuple[float, float] | None
+    passed: bool | None
+    failing: tuple[str, ...] = ()
+
+
+def wilson(hits: int, count: int, z: float = 1.959964) -> tuple[float, float]:
+    """Give the 95 % interval of a share.
+
+    Source: Wilson 1927, J. Am. Stat. Assoc. 22:209.
+    """
+    if count == 0:
+        return 0.0, 1.0
+    share = hits / count
+    centre = (share + z**2 / (2 * count)) / (1 + z**2 / count)
+    half = z * np.sqrt(share * (1 - share) / count + z**2 / (4 * count**2)) / (1 + z**2 / count)
+    return float(max(0.0, centre - half)), float(min(1.0, centre + half))
+
+
+def _share(
+    words: str,
+    rows: Iterable[Row],
+    holds: Callable[[Row], bool],
+    passes: Callable[[float], bool],
+    failing_when: bool = False,
+) -> Mark:
+    """Judge a share of campaigns; those where `holds` is `failing_when` are listed."""
+    rows = list(rows)
+    told = [(row, "error" not in row and holds(row)) for row in rows]
+    hits = sum(held for _, held in told)
+    figure = hits / len(rows) if rows else float("nan")
+    failing = tuple(line(row) for row, held in told if held == failing_when or "error" in row)
+    return Mark(words, figure, len(rows), wilson(hits, len(rows)), passes(figure) if rows else None, failing)
+
+
+def line(row: Row) -> str:
+    """Put a campaign in one line: seed, truth, what was named, chi2/dof before and after, why."""
+    if "error" in row:
+        return f"seed {row['seed']:4d} {row['kind']}: {row['error'].strip().splitlines()[-1]}"
+    truth = " + ".join(
+        f"{one['effect']} {one['size']:.3g} ({one['limits']:.1f} limits)"
+        if one["limits"] == one["limits"]
+        else one["effect"]
+        for one in row["truth"]
+    )
+    named = " + ".join("|".join(one["set"]) for one in row.get("findings", ())) or "nothing"
+    text = f"seed {row['seed']:4d} {row['layout']:7s} {truth or 'nothing hidden'}"
+    if "verdict" in row:
+        text += f" -> {row['verdict']}: {named}"
+    if "before" in row:
+        chi2 = [row[when][role] for role in ("fit", "holdout") for when in ("before", "after")]
+        text += "  chi2/dof fit {:.4g} -> {:.4g}, held out {:.4g} -> {:.4g}".format(*chi2)
+    if "oracle" in row:
+        text += " (oracle {fit:.4g}, {holdout:.4g})".format(**row["oracle"])
+    return text + (f"  [{row['reason']}]" if row.get("reason") else "")
+
+
+def names_right(row: Row) -> bool:
+    """Say whether the first effect named is the true one or of its exact class."""
+    return bool(row["findings"]) and row["findings"][0]["effect"] in exact_class(row["truth"][0]["effect"])
+
+
+def in_set(row: Row) -> bool:
+    """Say whether the truth is in the first reported set."""
+    return row["truth"][0]["effect"] in row["findings"][0]["set"]
+
+
+def both_named(row: Row) -> bool:
+    """Say whether each of two effects is in a set of its own."""
+    first, second = (set(exact_class(one["effect"])) for one in row["truth"])
+    sets = [set(one["set"]) for one in row["findings"]]
+    return any(
+        first & one and second & other for i, one in enumerate(sets) for j, other in enumerate(sets) if i != j
+    )
+
+
+def removed(row: Row) -> float:
+    """Give the share of the held-out excess that the oracle removes which the loop removed, too."""
+    before, after, best = (row[key]["holdout"] for key in ("before", "after", "oracle"))
+    return (before - after) / (before - best)
+
+
+def admits_outside(row: Row) -> bool:
+    """Say whether the loop owns up to an effect outside the catalogue."""
+    return row["verdict"] in ("unexplained", "partly_explained")
+
+
+def stays_unnamed(row: Row) -> bool:
+    """Say whether a left-out effect is unexplained, too small to need explaining, or known by that name."""
+    known = known_by(row["truth"][0]["effect"])
+    named = [one["effect"] for one in row["findings"]]
+    return admits_outside(row) or not named or all(name in known for name in named)
+
+
+def table(rows: list[Row]) -> list[Mark]:
+    """Judge all campaigns by the criteria of the diagnosis."""
+    loops = [row for row in rows if row["task"] == "loop"]
+    none = [row for row in loops if row["kind"] == "none"]
+    one = [row for row in loops if row["kind"] == "one" and _clear(row)]
+    named = [row for row in one if row.get("findings")]
+    gains = [row for row in named if len(exact_class(row["truth"][0]["effect"])) > 1 and names_right(row)]
+    sizes = [len(row["findings"][0]["set"]) for row in named]
+    outside = [row for row in loops if row["kind"] == "outside" and _visible(row)]
+    two = [row for row in loops if row["kind"] == "two" and _clear(row) and len(row.get("truth", "xx")) == 2]
+    left = [row for row in rows if row["task"] == "leave_out" and _clear(row)]
+    worth = [
+        row
+        for row in (*one, *two)
+        if "oracle" in row and row["before"]["holdout"] - row["oracle"]["holdout"] > WORTH
+    ]
+    shares = np.array([removed(row) for row in worth])
+    wrong_sign = [
+        row
+        for row in rows
+        if any(not f.get("signed", True) and f["strength"] < 0 for f in row.get("findings", ()))
+    ]
+    seconds = [row["seconds"] for row in loops if "seconds" in row]
+    median = float(np.median(sizes)) if sizes else float("nan")
+    marks = [
+        _share(
+            "an effect named where there is none, at most 5 %",
+            none,
+            lambda r: bool(r["findings"]),
+            lambda f: f <= 0.05,
+            failing_when=True,
+        ),
+        _share(
+            "right family first, at 3 limits and more, at least 90 %", one, names_right, lambda f: f >= 0.9
+        ),
+        _share("truth in the first reported set, at least 98 %", named, in_set, lambda f: f >= 0.98),
+        Mark("median size of that set, at most 2", median, len(sizes), None, median <= 2 if sizes else None),
+        _share(
+            "exact classes reported as a set, 100 %",
+            gains,
+            lambda r: set(exact_class(r["truth"][0]["effect"])) <= set(r["findings"][0]["set"]),
+            lambda f: f == 1.0,
+        ),
+        _share(
+            "outside the catalogue: unexplained or partly explained, at least 90 %",
+            outside,
+            admits_outside,
+            lambda f: f >= 0.9,
+        ),
+        _share(
+            "left out of the catalogue: likewise, or a name it is known by, at least 90 %",
+            left,
+            stays_unnamed,
+            lambda f: f >= 0.9,
+        ),
+        _share("two effects at once, both named, at least 70 %", two, both_named, lambda f: f >= 0.7),
+        _quantile(
+            "held-out excess removed against the oracle: median at least 0.95", shares, worth, 50, 0.95
+        ),
+        _quantile("the same: 5th percentile at least 0.8", shares, worth, 5, 0.8),
+        *coverage(rows),
+        Mark(
+            "inadmissible sign reported as a finding, never",
+            float(len(wrong_sign)),
+            len(rows),
+            None,
+            not wrong_sign if rows else None,
+            tuple(line(row) for row in wrong_sign),
+        ),
+    ]
+    if seconds:
+        marks.append(
+            Mark(
+                "seconds of a loop, 6 records of 32 s: median",
+                float(np.median(seconds)),
+                len(seconds),
+                None,
+                None,
+            )
+        )
+    return marks
+
+
+def _clear(row: Row) -> bool:
+    return "error" in row or all(one["limits"] >= CLEAR for one in row["truth"])
+
+
+def _visible(row: Row) -> bool:
+    """Say whether an effect outside the catalogue leaves anything to explain, or was named all the same."""
+    return "error" in row or row["before"]["fit"] > GOOD or bool(row["findings"])
+
+
+def _quantile(words: str, shares: np.ndarray, rows: list[Row], percent: float, least: float) -> Mark:
+    figure = float(np.percentile(shares, percent)) if shares.size else float("nan")
+    failing = tuple(
+        f"{share:.3f} {line(row)}" for share, row in zip(shares, rows, strict=True) if share < least
+    )
+    return Mark(words, figure, shares.size, None, figure >= least if shares.size else None, failing)
+
+
+def coverage(rows: list[Row]) -> list[Mark]:
+    """Judge the 95 % intervals of the true structure's coefficients, each effect's strength by itself."""
+    off: dict[str, list[tuple[float, Row]]] = {}
+    lost: dict[str, int] = {}
+    for row in rows:
+        if "off" not in row or not row["oracle_converged"]:
+            continue
+        hidden = {one["effect"] for one in row["truth"]}
+        if not all(one["limits"] >= CLEAR for one in row["truth"]):
+            continue
+        for name, value in row["off"].items():
+            key = name.partition(".")[0]
+            key = key if key in hidden else "the six declared coefficients"
+            if value is None:
+                lost[key] = lost.get(key, 0) + 1
+            else:
+                off.setdefault(key, []).append((value, row))
+    marks = []
+    for key, values in sorted(off.items()):
+        inside = sum(abs(value) <= 1.96 for value, _ in values)
+        figure, interval = inside / len(values), wilson(inside, len(values))
+        words = f"95 % intervals of {key} cover the truth, 90-98 %"
+        if key in lost:
+            words += f" ({lost[key]} undetermined)"
+        # Few repeats cannot tell 98 from 100 %: too wide an interval shows in the interval of the share.
+        passed = interval[0] <= 0.98 and interval[1] >= 0.90 and (figure >= 0.90 or len(values) < 30)
+        scatter = float(np.sqrt(np.mean([value**2 for value, _ in values])))
+        marks.append(Mark(f"{words}; rms {scatter:.2f} se", figure, len(values), interval, passed))
+    return marks
+
+
+def print_table(rows: list[Row], verbose: bool) -> bool:
+    """Print the table; say whether nothing failed."""
+    marks = table(rows)
+    for mark in marks:
+        word = {True: "PASS", False: "FAIL", None: "    "}[mark.passed]
+        spread = "" if mark.interval is None else f"[{mark.interval[0]:.3f}, {mark.interval[1]:.3f}]"
+        print(f"{word}  {mark.figure:8.3f}  {mark.judged:5d}  {spread:16s}  {mark.criterion}")
+    if verbose:
+        for mark in marks:
+            if mark.failing:
+                print(f"\n{mark.criterion}:")
+                for text in mark.failing:
+                    print(f"  {text}")
+    return all(mark.passed is not False for mark in marks)

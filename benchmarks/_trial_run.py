@@ -1,0 +1,207 @@
+"""One campaign of the blind trial: drawn, diagnosed without its truth, and beside an oracle that knows it."""
+
+import os
+import tempfile
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from _trial_campaign import Secret, Sketch, file_campaign, secrets, sketch, twin
+from _trial_effects import EFFECTS, exact_class
+from isojax._results import is_successful
+from isojax.elements import CATALOGUE
+from isojax.identification import Fit, Loop, classical_guess, close_loop, diagnose, extend, fit, read_campaign
+from isojax.identification._diagnose import MOST_OF_IT, is_good
+from isojax.models import Isolator
+from isojax.records import Campaign
+
+Row = dict[str, Any]
+TRIES = 4
+"""Times that the size is halved where the plant runs away."""
+
+
+def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = None) -> Row:
+    """Draw a campaign, do a task on it, and say all that the judge needs.
+
+    Args:
+        seed: of the campaign.
+        kind: class of the campaign.
+        task: "loop" (diagnosed blind), "leave_out" (the true effect is no candidate) or "coverage" (the true
+            structure fitted, nothing diagnosed).
+        names: what is hidden; drawn if omitted.
+
+    Returns:
+        What goes into a line of the output file; "error" where something raised.
+    """
+    begin = time.perf_counter()
+    row: Row = {"seed": seed, "kind": kind, "task": task}
+    try:
+        drawn = sketch(seed, kind, names)
+        with tempfile.TemporaryDirectory() as folder:
+            hidden, path, size = _simulated(drawn, Path(folder))
+            campaign = read_campaign(path)
+        row |= _facts(drawn, hidden, size)
+        if task == "loop":
+            row |= _said_of(close_loop(campaign))
+        elif task == "leave_out":
+            row |= _without_the_truth(campaign, exact_class(hidden[0].name))
+        if kind != "outside" and (task == "coverage" or (kind != "none" and task == "loop")):
+            row |= _oracle(drawn, hidden, campaign)
+    except Exception as problem:  # one campaign that fails is a failure of the trial, not its end
+        row["error"] = "".join(traceback.format_exception(problem))[-2000:]
+    row["total_seconds"] = round(time.perf_counter() - begin, 2)
+    return row
+
+
+def _simulated(drawn: Sketch, folder: Path) -> tuple[tuple[Secret, ...], Path, float]:
+    """File the campaign, with smaller effects where the plant would run away."""
+    hidden = secrets(drawn, twin(drawn, folder / "twin")) if drawn.names else ()
+    for attempt in range(TRIES):
+        share = 0.5**attempt
+        smaller = tuple(_shrunk(secret, share) for secret in hidden)
+        try:
+            return smaller, file_campaign(drawn, smaller, folder / f"blind{attempt}"), share
+        except RuntimeError:
+            continue
+    raise RuntimeError(f"The plant of seed {drawn.seed} runs away at an eighth of the drawn size.")
+
+
+def _shrunk(secret: Secret, share: float) -> Secret:
+    if share == 1.0 or not np.isfinite(secret.size):
+        return secret
+    size = share * secret.size
+    law = EFFECTS[secret.name].law(size, secret.shape)
+    return Secret(secret.name, size, secret.limit, secret.shape, law)
+
+
+def _facts(drawn: Sketch, hidden: tuple[Secret, ...], share: float) -> Row:
+    """Give the truth."""
+    return {
+        "layout": drawn.layout,
+        "levels": drawn.levels,
+        "noise": drawn.bench.noise,
+        "drift": drawn.bench.drift,
+        "base": drawn.base,
+        "shrunk": share,
+        "truth": [
+            {
+                "effect": secret.name,
+                "size": secret.size,
+                "limits": abs(secret.size) / secret.limit,
+                "shape": secret.shape or {key: float(number) for key, number in vars(secret.law).items()},
+            }
+            for secret in hidden
+        ],
+    }
+
+
+def _errors(held: Fit) -> Row:
+    """Give chi2/dof with every segment restarted, of both roles."""
+    return {role: None if errors is None else errors.chi2_per_dof for role, errors in held.errors.items()}
+
+
+def _said_of(loop: Loop) -> Row:
+    """Give what the closed loop says."""
+    findings = []
+    for finding in loop.findings:
+        entry: Row = {
+            "effect": finding.effect,
+            "set": [finding.effect, *finding.indistinguishable],
+            "p_value": finding.p_value,
+            "explained": finding.excess_explained,
+            "transfer": finding.transfer,
+        }
+        element = loop.after.model.element(finding.effect)
+        if element is not None:
+            name = f"{finding.effect}.{element.strength}"
+            entry |= {
+                "strength": float(loop.after.model[name]),
+                "error": loop.after.standard_errors.get(name, float("nan")),
+                "signed": element.signed,
+            }
+        findings.append(entry)
+    return {
+        "verdict": loop.verdict,
+        "findings": findings,
+        "before": _errors(loop.before),
+        "after": _errors(loop.after),
+        "scatter": loop.before.stats.stiffness_scatter,
+        "reason": loop.last.reason,
+        "ranking": [
+            [entry.effect, round(entry.z, 2), entry.p_value, entry.admissible]
+            for entry in (loop.extensions[0].verdict if loop.extensions else loop.last).ranking[:6]
+        ],
+        "seconds": round(loop.seconds, 2),
+    }
+
+
+def _without_the_truth(campaign: Campaign, excluded: tuple[str, ...]) -> Row:
+    """Diagnose while the true effect, and what is exactly like it, are no candidates."""
+    begin = time.perf_counter()
+    current = before = fit(classical_guess(campaign).model, campaign)
+    first, steps, significance = before.estimate.excess, [], 0.01
+    while True:
+        verdict = diagnose(current, first_excess=first, significance=significance, excluded=excluded)
+        if verdict.refit is None or len(steps) == 3:
+            break
+        steps.append(extend(current, verdict))
+        current = steps[-1].after
+        significance *= 0.5
+    found = current.estimate
+    word = verdict.verdict
+    if steps:
+        explained = 1.0 - found.excess / max(first, 1.0)
+        good = is_good(found.chi2 / found.dof, found.excess, first)
+        word = "found" if good else "partly_explained" if explained >= MOST_OF_IT else "unexplained"
+    findings = [step.verdict.finding for step in steps]
+    return {
+        "excluded": excluded,
+        "verdict": word,
+        "findings": [
+            {"effect": one.effect, "set": [one.effect, *one.indistinguishable], "p_value": one.p_value}
+            for one in findings
+        ],
+        "before": _errors(before),
+        "after": _errors(current),
+        "reason": verdict.reason,
+        "seconds": round(time.perf_counter() - begin, 2),
+    }
+
+
+def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign) -> Row:
+    """Fit the true structure from the true numbers: what the best diagnosis could reach."""
+    truth = drawn.model
+    model = truth.with_elements(*(_as_declared(secret, campaign) for secret in hidden))
+    found = fit(model, campaign)
+    exact = Isolator(800.0, (*truth.elements, *(secret.element for secret in hidden)))  # pyright: ignore[reportArgumentType]
+    off = {
+        name: (float(found.model[name]) - float(exact[name])) / error
+        for name, error in found.standard_errors.items()
+    }
+    return {
+        "oracle": _errors(found),
+        "oracle_converged": bool(is_successful(found.result)),
+        "off": {name: (value if np.isfinite(value) else None) for name, value in off.items()},
+    }
+
+
+def _as_declared(secret: Secret, campaign: Campaign):
+    """Give the true element, what is no physical number in it (a regularising width) as the model sets it."""
+    from isojax._parameters import own_parameters
+    from isojax.identification import scales
+
+    guess = CATALOGUE[secret.name].guess(scales(campaign))
+    numbers = dict(vars(secret.element))
+    for field, spec in own_parameters(guess):
+        if not spec.fitted and field not in secret.shape:
+            numbers[field] = getattr(guess, field)
+    return CATALOGUE[secret.name](**numbers)
+
+
+def crowded(most: int = 30_000) -> bool:
+    """Say whether compiled code crowds the address space, which Linux limits to 65530 mappings."""
+    mappings = Path("/proc/self/maps")
+    return os.path.exists(mappings) and len(mappings.read_bytes().splitlines()) > most
