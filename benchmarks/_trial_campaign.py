@@ -209,7 +209,7 @@ def secrets(drawn: Sketch, innocent) -> tuple[Secret, ...]:
     motion = motion_of(drawn, innocent)
     if drawn.kind == "outside":
         draw = generator(drawn.seed, "outside", *drawn.names)
-        force = motion.lowest * log_uniform(draw, 0.03, 0.15)
+        force = motion.lowest * log_uniform(draw, 0.1, 0.4)
         (name,) = drawn.names
         return (Secret(name, float("nan"), float("nan"), {}, OUTSIDE[name](draw, motion, force)),)
     # All effects are tested, so that the shapes, and with them the compiled code, are those of every seed.

@@ -1,0 +1,154 @@
+"""The blind trial: its draws and its arithmetic; and a small sample of it, which the diagnosis must pass."""
+
+import math
+import sys
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import stats
+
+from isojax import rig
+from isojax.elements import CATALOGUE
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from _trial_campaign import kind_of, sketch
+from _trial_effects import COMMONEST, EFFECTS, Motion, chosen_effects, exact_class, generator, with_size
+from _trial_judge import table, wilson
+from _trial_outside import OUTSIDE
+from _trial_run import run_one
+
+MOTION = Motion(40.0, 1e-3, 1.0, 31.0, 1.08e6, 1.03e4)
+SAMPLE = range(1000, 1020)
+
+
+def test_the_interval_of_a_share_is_wilsons():
+    for hits, count in ((0, 7), (3, 20), (20, 20), (57, 61)):
+        known = stats.binomtest(hits, count).proportion_ci(method="wilson")
+        assert wilson(hits, count) == pytest.approx((known.low, known.high), abs=1e-6)
+
+
+def test_a_seed_draws_the_same_campaign_again_and_another_seed_another():
+    assert sketch(5) == sketch(5)
+    assert sketch(5).base != sketch(6).base
+    kinds = [kind_of(seed) for seed in range(400)]
+    assert {kind: kinds.count(kind) > 30 for kind in kinds} == dict.fromkeys(
+        ("none", "one", "two", "outside"), True
+    )
+
+
+def test_every_campaign_has_records_of_equal_length_and_two_held_out():
+    for seed in range(40):
+        drawn = sketch(seed)
+        trials = [trial for plan in drawn.plans for trial in plan.trials(drawn.bench.shaker, seed)]
+        assert {round(trial.seconds * drawn.bench.rate) for trial in trials} == {8000}
+        assert [trial.role for trial in trials].count("holdout") == 2
+        assert len(trials) == 6
+        assert all(0.0 <= drawn.bench.drift <= 0.002 for _ in trials)
+
+
+def test_two_effects_are_never_of_one_exact_class():
+    for seed in range(200):
+        first, second = chosen_effects(seed, 2)
+        assert second not in exact_class(first)
+
+
+@pytest.mark.parametrize("name", sorted(EFFECTS))
+def test_a_line_of_the_table_is_one_effect_for_the_rig_and_for_the_model(name):
+    effect = EFFECTS[name]
+    shape = effect.shape(generator(3, name), MOTION)
+    law = effect.law(0.5 * effect.most(MOTION), shape)
+    probe = effect.probe(shape)
+    assert law.name == name == probe.name
+    assert float(getattr(probe, probe.strength)) == 0.0
+    assert effect.signed <= probe.signed
+    assert all(other in CATALOGUE for other in effect.exact)
+    element = with_size(probe, 0.5 * effect.most(MOTION))
+    if isinstance(law, rig.Law) and not law.inner and not law.inertia:
+        for x, v in ((6e-4, 0.02), (-8e-4, 0.03), (3e-4, -0.025)):
+            sides = tuple(math.copysign(1.0, switch(x, v, ())) for switch in law.switches)
+            assert law.force(0.0, x, v, (), sides) == pytest.approx(
+                float(element.force(jnp.asarray(x), jnp.asarray(v), ())), rel=1e-6
+            )
+
+
+def test_the_coverage_run_has_ten_effects_that_can_be_drawn():
+    assert len(set(COMMONEST)) == 10
+    assert set(COMMONEST) <= set(EFFECTS)
+
+
+@pytest.mark.parametrize("name", sorted(OUTSIDE))
+def test_a_law_outside_the_catalogue_is_as_strong_as_told_and_has_no_name_in_it(name):
+    law = OUTSIDE[name](generator(4, name), MOTION, 5.0)
+    assert law.name == name
+    assert name not in CATALOGUE
+    phase = np.linspace(0.0, 2 * np.pi, 2001)[:-1]
+    x, v = MOTION.displacement * np.sin(phase), MOTION.displacement * MOTION.angular * np.cos(phase)
+    sides = [np.where(switch(x, v, ()) >= 0.0, 1.0, -1.0) for switch in law.switches]
+    force = np.broadcast_to(law.force(np.linspace(0.0, 30.0, 2000), x, v, (), sides), x.shape)
+    assert 0.5 * 5.0 < np.max(np.abs(force)) < 1.3 * 5.0
+
+
+def _row(seed, kind, truth, findings, **more):
+    errors = {"before": {"fit": 1.5, "holdout": 2.0}, "after": {"fit": 1.0, "holdout": 1.1}}
+    return {
+        "seed": seed,
+        "kind": kind,
+        "task": "loop",
+        "layout": "stepped",
+        "truth": [{"effect": name, "size": 1.0, "limits": limits, "shape": {}} for name, limits in truth],
+        "findings": [
+            {"effect": one[0], "set": list(one), "signed": True, "strength": 1.0} for one in findings
+        ],
+        "verdict": "found" if findings else "none",
+        "oracle": {"fit": 1.0, "holdout": 1.0},
+        "seconds": 5.0,
+        **errors,
+        **more,
+    }
+
+
+def _figure(rows, words):
+    return next(mark for mark in table(rows) if mark.criterion.startswith(words))
+
+
+def test_the_table_counts_what_it_says():
+    gains = ("added_mass", "input_gain", "sensor_gain")
+    rows = [
+        _row(0, "none", (), ()),
+        _row(1, "none", (), (("input_delay",),)),
+        _row(2, "one", (("coulomb_friction", 9.0),), (("coulomb_friction", "dahl_friction"),)),
+        _row(3, "one", (("coulomb_friction", 9.0),), (("dahl_friction", "coulomb_friction"),)),
+        _row(4, "one", (("coulomb_friction", 1.5),), ()),
+        _row(5, "one", (("input_gain", 9.0),), (("added_mass", "input_gain"),)),
+        _row(6, "two", (("input_gain", 9.0), ("input_delay", 4.0)), (("input_delay",), gains)),
+        _row(7, "two", (("input_gain", 9.0), ("input_delay", 4.0)), (gains,)),
+        _row(8, "outside", (("detent", float("nan")),), (), verdict="unexplained"),
+        {"seed": 9, "kind": "one", "task": "loop", "error": "ValueError: no"},
+    ]
+    assert _figure(rows, "an effect named").figure == 0.5
+    assert _figure(rows, "an effect named").passed is False
+    assert _figure(rows, "right family").figure == 0.5
+    assert _figure(rows, "right family").judged == 4
+    assert _figure(rows, "truth in").figure == 1.0
+    assert _figure(rows, "median size").figure == 2.0
+    assert _figure(rows, "exact classes").figure == 0.0
+    assert _figure(rows, "outside").figure == 1.0
+    assert _figure(rows, "two effects").figure == 0.5
+    assert _figure(rows, "held-out excess").figure == pytest.approx(0.9)
+    assert _figure(rows, "inadmissible sign").passed is True
+    rows[2]["findings"][0] |= {"signed": False, "strength": -1.0}
+    assert _figure(rows, "inadmissible sign").passed is False
+
+
+@pytest.mark.slow
+def test_a_small_sample_is_judged_right():
+    """Twenty campaigns: too few for the marks of the whole trial, enough to see that nothing is broken."""
+    rows = [run_one(seed, ("none", "one")[seed % 2], "loop") for seed in SAMPLE]
+    assert not [row["error"] for row in rows if "error" in row]
+    false, right = _figure(rows, "an effect named"), _figure(rows, "right family")
+    assert false.interval[0] <= 0.05, false.failing
+    assert right.judged >= 5
+    assert right.figure >= 0.8, right.failing
+    assert _figure(rows, "inadmissible sign").passed
