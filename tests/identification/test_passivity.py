@@ -4,8 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from isojax.elements import CATALOGUE, BoucWen, CubicStiffness, DahlFriction, MaxwellBranch, Scales
+from isojax.elements import (
+    CATALOGUE,
+    BoucWen,
+    CubicStiffness,
+    DahlFriction,
+    MaxwellBranch,
+    Scales,
+    SecondMode,
+)
 from isojax.identification._linear_balance import with_strength
 from isojax.identification._passivity import find_activity, work_per_cycle
 
@@ -29,6 +38,29 @@ def test_dahl_friction_takes_the_energy_of_its_closed_loop():
     ends = np.tanh(AMPLITUDE / presliding)
     lost = (1 + ends) * presliding * (1 - np.exp(-2 * AMPLITUDE / presliding))
     np.testing.assert_allclose(work, 2 * level * (2 * AMPLITUDE - lost), rtol=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.7, 0.93, 1.08, 1.6])
+def test_an_undamped_attached_mass_that_still_rings_is_no_source_of_energy(share):
+    """From rest it has gained what it holds, never less than nothing; single cycles of the beat give back."""
+    law = SecondMode(40.0, share * 30.0, 0.0)
+    assert find_activity(law, 1e-3, 0.03) is None
+    work, _ = work_per_cycle(law, np.array([1e-3]), np.array([30.0]))
+    x, v = scipy_ringing(share * 30.0, 1e-3, 30.0, 6 * 2 * np.pi / 30.0)
+    # At the end of a cycle the isolator is at its centre.
+    np.testing.assert_allclose(6 * work, 0.5 * 40.0 * (v**2 + (share * 30.0 * x) ** 2), rtol=2e-2)
+
+
+def scipy_ringing(own: float, size: float, omega: float, end: float) -> tuple[float, float]:
+    """Displacement and velocity of an undamped attached mass, driven from rest."""
+    solution = solve_ivp(
+        lambda t, y: [y[1], own**2 * (size * math.sin(omega * t) - y[0])],
+        (0.0, end),
+        [0.0, 0.0],
+        rtol=1e-9,
+        atol=1e-12,
+    )
+    return float(solution.y[0, -1]), float(solution.y[1, -1])
 
 
 def test_a_bouc_wen_law_without_beta_is_a_spring_and_takes_nothing():

@@ -21,11 +21,15 @@ TOLERANCE = 1e-3
 """Work below zero that is laid to rounding, as a share of the elastic energy that the loop moves."""
 
 
+SETTLED = 1e-2
+"""Share of its range by which a settled force may differ between the last two cycles."""
+
+
 @eqx.filter_jit
-def _last_loop(
+def _loops(
     element: AbstractElement, amplitude: Float[Array, " lane"], angular: Float[Array, " lane"]
 ) -> Float[Array, "time lane"]:
-    """Drive an element along sinusoids, from rest; give its force over the last cycle."""
+    """Drive an element along sinusoids, from rest; give its force."""
     step = 2.0 * jnp.pi / STEPS
 
     def motion(phase: Array) -> tuple[Array, Array]:
@@ -48,8 +52,7 @@ def _last_loop(
         return moved(s, slopes, 1.0), element.force(*motion(phase), s)
 
     rest = tuple(jnp.zeros_like(amplitude) for _ in range(element.internal_states))
-    force = jax.lax.scan(body, rest, step * jnp.arange(CYCLES * STEPS, dtype=float))[1]
-    return force[-STEPS:]
+    return jax.lax.scan(body, rest, step * jnp.arange(CYCLES * STEPS, dtype=float))[1]
 
 
 def work_per_cycle(
@@ -58,6 +61,8 @@ def work_per_cycle(
     """Give the energy that an element takes from a sinusoidal motion in one cycle.
 
     `W = closed integral of f dx` over the last of several cycles, the memory driven along `x = X sin(w t)`.
+    A memory that still rings then, as a lightly damped mass does, gives and takes by turns: of it, the mean
+    over all cycles since rest, which no passive law makes negative.
 
     Args:
         element: the element, with its own force and internal states.
@@ -70,10 +75,14 @@ def work_per_cycle(
 
     Source: Erlicher & Point 2004, Comptes Rendus Mecanique 332:51, on what makes Bouc-Wen models passive.
     """
-    force = np.asarray(_last_loop(element, jnp.asarray(amplitude), jnp.asarray(angular)))
+    forces = np.asarray(_loops(element, jnp.asarray(amplitude), jnp.asarray(angular)))
+    before, force = forces[-2 * STEPS : -STEPS], forces[-STEPS:]
     phase = 2.0 * np.pi * np.arange(STEPS) / STEPS
-    work = np.mean(force * np.cos(phase)[:, None], axis=0) * 2.0 * np.pi * amplitude
-    return work, 0.5 * np.ptp(force, axis=0) * amplitude
+    power = (forces * np.cos(np.tile(phase, CYCLES))[:, None]).reshape(CYCLES, STEPS, -1)
+    works = 2.0 * np.pi * amplitude * np.mean(power, axis=1)
+    reach = np.ptp(force, axis=0)
+    rings = np.max(np.abs(force - before), axis=0) > SETTLED * reach
+    return np.where(rings, np.mean(works, axis=0), works[-1]), 0.5 * reach * amplitude
 
 
 def find_activity(element: AbstractElement, largest_x: float, largest_v: float) -> str | None:

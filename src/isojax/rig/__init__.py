@@ -30,6 +30,9 @@ from ._friction import CoulombFriction as CoulombFriction
 from ._hysteresis import BoucWen as BoucWen
 from ._hysteresis import DahlFriction as DahlFriction
 from ._inertia import AddedMass as AddedMass
+from ._inertia import SecondMode as SecondMode
+from ._instruments import AcCoupling as AcCoupling
+from ._instruments import Clipping as Clipping
 from ._instruments import InputDelay as InputDelay
 from ._instruments import InputGain as InputGain
 from ._instruments import InputOffset as InputOffset
@@ -37,6 +40,7 @@ from ._instruments import Instrument as Instrument
 from ._instruments import SensorGain as SensorGain
 from ._instruments import SensorOffset as SensorOffset
 from ._law import Law as Law
+from ._lugre import LugreFriction as LugreFriction
 from ._paper import paper_plan as paper_plan
 from ._paper import y_plant as y_plant
 from ._paper import z_plant as z_plant
@@ -44,6 +48,7 @@ from ._plan import Plan as Plan
 from ._plan import Trial as Trial
 from ._plant import Plant as Plant
 from ._plant import base_laws as base_laws
+from ._relaxation import FractionalDamping as FractionalDamping
 from ._relaxation import MaxwellBranch as MaxwellBranch
 from ._shaker import EXAMPLE_SHAKER as EXAMPLE_SHAKER
 from ._shaker import IDEAL_SHAKER as IDEAL_SHAKER
@@ -54,3 +59,4 @@ from ._springs import AbsQuadraticStiffness as AbsQuadraticStiffness
 from ._springs import CubicStiffness as CubicStiffness
 from ._springs import LinearStiffness as LinearStiffness
 from ._springs import QuadraticStiffness as QuadraticStiffness
+from ._two_chambers import DualChamber as DualChamber

@@ -1,7 +1,7 @@
 """Effects of the instruments: what is recorded is not quite what acts on the plant and how it answers.
 
 With every instrument in place, acting force(t) = (1 + gain deviation) x recorded force(t - delay) + offset,
-and recorded output = (1 + gain deviation) x output + offset.
+and recorded output = (1 + gain deviation) x output + offset, less what coupling and range take away.
 """
 
 from abc import ABC
@@ -10,6 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 
 class Instrument(ABC):
@@ -103,3 +105,46 @@ class SensorOffset(Instrument):
     ) -> Float[np.ndarray, " time"]:
         """The output plus the offset."""
         return output + self.value
+
+
+@dataclass(frozen=True)
+class AcCoupling(Instrument):
+    """The output channel is AC coupled: an RC high-pass of first order, discharged at the first instant.
+
+    The capacitor is followed exactly along straight lines between points of a spline, eight to a step.
+
+    Args:
+        corner: Hz.
+    """
+
+    name: ClassVar[str] = "ac_coupling"
+    corner: float
+
+    def recorded_output(
+        self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The output less the voltage of the capacitor."""
+        between = 8
+        step = (times[1] - times[0]) / between
+        fine = times[0] + step * np.arange(between * (times.size - 1) + 1)
+        values = CubicSpline(times, output)(fine)
+        a = 2 * np.pi * self.corner * step
+        # Voltage after a straight line from the old to the new value, from the old voltage.
+        kept, mean = np.exp(-a), -np.expm1(-a) / a
+        discharged = [-(1 - mean) * values[0]]
+        capacitor = lfilter([1 - mean, mean - kept], [1, -kept], values, zi=discharged)[0]
+        return output - capacitor[::between]
+
+
+@dataclass(frozen=True)
+class Clipping(Instrument):
+    """The output channel saturates at +-level, in the SI unit of the output."""
+
+    name: ClassVar[str] = "clipping"
+    level: float
+
+    def recorded_output(
+        self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The output within the level."""
+        return np.minimum(np.maximum(output, -self.level), self.level)
