@@ -14,7 +14,7 @@ from ._period_map import trajectory
 from ._pieces import Crossings, advance_in_pieces, find_crossings
 
 _FEWEST_STEPS, _MOST_STEPS = 16, 1 << 12
-"""Steps a piece of the coarsest trial, and at most."""
+"""Steps a piece of the coarsest trial, and at most; of several drive periods so many times more."""
 
 
 class Split(NamedTuple):
@@ -110,7 +110,8 @@ def find_split(
     crossings = find_crossings(model, path, 2.0 * math.pi * turns, places)
     kinks = model.kinks(path)
     sizes = state_scale(kinks)[jnp.maximum(crossings.kinks, 0)] if kinks else jnp.ones(places)
-    least = jnp.asarray(max(_FEWEST_STEPS, integrator.steps_a_period(model) // (places + 1)))
+    periods = math.ceil(turns)
+    least = jnp.asarray(max(_FEWEST_STEPS, periods * integrator.steps_a_period(model) // (places + 1)))
     split = Split(state_scale(path), crossings, sizes, least, crossings.complete)
     unknown = jnp.concatenate([state / split.scale, crossings.phases])
 
@@ -122,5 +123,5 @@ def find_split(
     # Fourth order: sixteen times less a doubling.
     doublings = jnp.ceil(jnp.log2(apart / tolerance) / 4.0)
     wanted = least * 2.0 ** jnp.clip(jnp.where(jnp.isfinite(doublings), doublings, 0.0), 1.0, 20.0)
-    split = split._replace(steps=jnp.minimum(wanted, _MOST_STEPS).astype(int))
+    split = split._replace(steps=jnp.minimum(wanted, periods * _MOST_STEPS).astype(int))
     return split, unknown, matrices[1], phases[1]
