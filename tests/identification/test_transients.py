@@ -1,11 +1,12 @@
 """Releases and blows, written to disk by the rig and read back; the model is complete or lacks a spring."""
 
+import dataclasses
 import json
 
 import numpy as np
 import pytest
 
-from isojax import close_loop, read_campaign, rig
+from isojax import classical_guess, close_loop, read_campaign, rig
 
 PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(2.5e11), rig.LinearDamping(5e3)))
 PLANS = {
@@ -71,3 +72,17 @@ def test_without_leave_to_add_a_missing_effect_is_named_and_not_called_found(tmp
     assert "cubic spring explains it best, but no effect might be added" in str(loop)
     with pytest.raises(ValueError, match="`max_iterations` must be 0 or more, but is -1"):
         close_loop(loop.loop.campaign, max_iterations=-1)
+
+
+def test_noise_of_a_hammer_is_no_drive_and_the_start_still_finds_the_swings(tmp_path):
+    campaign = written(tmp_path, "impulse", '["linear", "cubic"]')
+    random = np.random.default_rng(8)
+
+    def noisy(record):
+        noise = random.normal(0.0, 0.02 * np.abs(record.input).max(), record.input.size)
+        return dataclasses.replace(record, input=record.input + noise)
+
+    guess = classical_guess(dataclasses.replace(campaign, records=tuple(map(noisy, campaign.records))))
+    assert guess.notes == ()
+    assert float(guess.model["linear_stiffness.coefficient"]) == pytest.approx(1.08e6, rel=0.02)
+    assert float(guess.model["linear_damping.coefficient"]) == pytest.approx(5e3, rel=0.1)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..models import Isolator
-from ..records import Campaign, Record
+from ..records import Campaign, Record, driven_samples
 from ._all_dwells import dwell_motion, fit_all_dwells
 from ._decrement import about_rest, logarithmic_decrement
 from ._linear_balance import BalanceFit
@@ -15,9 +15,6 @@ _SMOOTH = np.array([0.25, 0.5, 0.25])
 
 _FEWEST = 1
 """Swings a coefficient that the balance needs at least; each gives a spring and a damper equation."""
-
-_OFF = 0.02
-"""Share of its peak below which the drive of a blow is over."""
 
 
 def decaying_response(campaign: Campaign, record: Record) -> FrequencyResponse:
@@ -34,8 +31,8 @@ def decaying_response(campaign: Campaign, record: Record) -> FrequencyResponse:
         A line a half swing, the first and the last left out; none where the decay has fewer than three.
     """
     order = {"displacement": 0, "velocity": 1, "acceleration": 2}[campaign.output.quantity]
-    driven = np.abs(record.input) > _OFF * np.max(np.abs(record.input))
-    begin = int(np.flatnonzero(driven)[-1]) + 1 if np.any(driven) else 0
+    driven = np.flatnonzero(driven_samples(record.input))
+    begin = int(driven[-1]) + 1 if driven.size else 0
     swings = logarithmic_decrement(about_rest(record.output)[begin:], record.rate)
     nothing = np.zeros(0)
     if swings.amplitude.size < 3:

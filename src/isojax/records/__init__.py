@@ -4,6 +4,7 @@ from ._band import Band as Band
 from ._band import excited_band as excited_band
 from ._band import power_spectrum as power_spectrum
 from ._band import ringing_frequency as ringing_frequency
+from ._blow import driven_samples as driven_samples
 from ._campaign import Campaign as Campaign
 from ._campaign import Filter as Filter
 from ._campaign import InputChannel as InputChannel
