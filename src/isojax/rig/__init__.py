@@ -26,7 +26,12 @@ from ._dampers import PositionDamping as PositionDamping
 from ._excitation import Chirp as Chirp
 from ._excitation import Piece as Piece
 from ._excitation import Tones as Tones
+from ._friction import AsymmetricFriction as AsymmetricFriction
 from ._friction import CoulombFriction as CoulombFriction
+from ._friction import StribeckFriction as StribeckFriction
+from ._gaps import EndStop as EndStop
+from ._gaps import Freeplay as Freeplay
+from ._gas import PolytropicGas as PolytropicGas
 from ._hysteresis import BoucWen as BoucWen
 from ._hysteresis import DahlFriction as DahlFriction
 from ._inertia import AddedMass as AddedMass
@@ -59,4 +64,5 @@ from ._springs import AbsQuadraticStiffness as AbsQuadraticStiffness
 from ._springs import CubicStiffness as CubicStiffness
 from ._springs import LinearStiffness as LinearStiffness
 from ._springs import QuadraticStiffness as QuadraticStiffness
+from ._springs import QuinticStiffness as QuinticStiffness
 from ._two_chambers import DualChamber as DualChamber

@@ -66,3 +66,17 @@ class QuadraticStiffness(Law):
     def force(self, t, x, v, z, s):
         """Force in N; see `Law.force`."""
         return self.coefficient * x * x
+
+
+@dataclass(frozen=True)
+class QuinticStiffness(Law):
+    """f = k5 x^5, with k5 in N/m^5."""
+
+    name: ClassVar[str] = "quintic_stiffness"
+    coefficient: float
+
+    @no_type_check
+    def force(self, t, x, v, z, s):
+        """Force in N; see `Law.force`."""
+        square = x * x
+        return self.coefficient * square * square * x
