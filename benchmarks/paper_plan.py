@@ -126,8 +126,8 @@ def sweep(
     order = range(lines.size) if direction == "forward" else range(lines.size - 1, -1, -1)
     receptance, jumped = np.zeros(lines.size, dtype=complex), np.zeros(lines.size - 1, dtype=bool)
     before, previous, place = None, None, None
-    for now in order:
-        found = find_amplitudes(case, shaker_force(level, lines[now], drops), lines[now])[[0, -1]]
+    for here in order:
+        found = find_amplitudes(case, shaker_force(level, lines[here], drops), lines[here])[[0, -1]]
         if before is None:
             # From rest a record settles on the lower branch; beyond the folds there is one only.
             amplitude = found[0]
@@ -135,11 +135,11 @@ def sweep(
             guess = before if previous is None else 2 * before - previous
             amplitude = found[np.argmin(np.abs(np.log(found / max(guess, 1e-9 + 0.5 * before))))]
             assert place is not None
-            jumped[min(now, place)] = abs(np.log(amplitude / before)) > 0.25
-        spring, damper = equivalent(case, amplitude, 2 * np.pi * lines[now])
-        angular = 2 * np.pi * lines[now]
-        receptance[now] = 1.0 / (spring - MASS * angular**2 + 1j * damper * angular)
-        previous, before, place = before, amplitude, now
+            jumped[min(here, place)] = abs(np.log(amplitude / before)) > 0.25
+        spring, damper = equivalent(case, amplitude, 2 * np.pi * lines[here])
+        angular = 2 * np.pi * lines[here]
+        receptance[here] = 1.0 / (spring - MASS * angular**2 + 1j * damper * angular)
+        previous, before, place = before, amplitude, here
     return receptance, jumped
 
 

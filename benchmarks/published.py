@@ -78,7 +78,8 @@ def cascade() -> None:
     point = first(branch, "symmetry_breaking")
     found = [(point, 0.5)]
     for number in range(DOUBLINGS):
-        branch = ij.switch_branch(branch, point, most=150)
+        # Each doubled orbit leaves the one before by less, and doubles again sooner.
+        branch = ij.switch_branch(branch, point, step=0.02 / 2**number, most=150)
         point = first(branch, "period_doubling", 2**number)
         found.append((point, float(point.periods)))
     ours = np.array([float(point.amplitude) for point, _ in found])

@@ -175,7 +175,7 @@ def _check_delay(model: Isolator, places: tuple[int, ...], hold: Hold) -> None:
     def shift(values: list[Array]) -> Array:
         return jnp.asarray(replace_parameters(model, values).shift(), dtype=float)
 
-    slopes = jax.grad(shift)([jnp.asarray(entry.value, dtype=float) for entry in listed])
+    slopes = jax.jacfwd(shift)([jnp.asarray(entry.value, dtype=float) for entry in listed])
     for place in places:
         if float(slopes[place]) != 0.0:
             raise ValueError(
