@@ -38,7 +38,7 @@ class Clipping(AbstractElement):
     def grid(cls, scales: Scales) -> "tuple[Clipping, ...]":
         """See `AbstractElement.grid`: levels just below the largest reading."""
         largest = max(scales.largest_reading, scales.reading)
-        return tuple(cls(0.0, share * largest) for share in (0.99, 0.97, 0.93, 0.85, 0.7))
+        return tuple(cls(0.0, share * largest) for share in (0.98, 0.93, 0.85, 0.7))
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:

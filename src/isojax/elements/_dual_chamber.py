@@ -46,13 +46,10 @@ class DualChamber(AbstractElement):
 
     @classmethod
     def grid(cls, scales: Scales) -> "tuple[DualChamber, ...]":
-        """See `AbstractElement.grid`: flow mostly laminar to mostly turbulent, on both sides of the band."""
+        """See `AbstractElement.grid`: flow half to mostly turbulent, on both sides of the band."""
         laminar, turbulent = 1.0 / scales.angular_frequency, scales.displacement / scales.velocity**2
-        return tuple(
-            cls(0.0, slow * laminar, rough * turbulent)
-            for slow in (0.1, 0.5, 2.0)
-            for rough in (0.2, 1.0, 5.0)
-        )
+        pairs = ((0.1, 0.5), (0.1, 3.0), (0.5, 0.5), (0.5, 3.0), (2.0, 1.0))
+        return tuple(cls(0.0, slow * laminar, rough * turbulent) for slow, rough in pairs)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:

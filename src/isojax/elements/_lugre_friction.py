@@ -50,7 +50,7 @@ class LugreFriction(AbstractElement):
     @classmethod
     def grid(cls, scales: Scales) -> "tuple[LugreFriction, ...]":
         """See `AbstractElement.grid`: presliding below the motion, Stribeck velocity below its velocity."""
-        return tuple(cls._shaped(scales, way, speed) for way in (0.03, 0.1, 0.4) for speed in (0.1, 0.4))
+        return tuple(cls._shaped(scales, way, speed) for way in (0.05, 0.3) for speed in (0.1, 0.4))
 
     @classmethod
     def _shaped(cls, scales: Scales, way: float, speed: float) -> "LugreFriction":

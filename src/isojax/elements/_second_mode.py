@@ -74,5 +74,5 @@ class SecondMode(AbstractElement):
         return w2 * w2 * (x - s[0]) + 2.0 * self.damping_ratio * w2 * (v - s[1])
 
 
-NATURAL = (0.4, 0.6, 0.75, 0.9, 1.05, 1.25, 1.6, 2.2, 4.0)
+NATURAL = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.5)
 """Natural frequencies of the grid over the centre of the excited band."""
