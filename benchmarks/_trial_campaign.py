@@ -5,7 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from _trial_effects import EFFECTS, Hidden, Motion, Shape, chosen_effects, generator, log_uniform, with_size
+from _trial_effects import (
+    EFFECTS,
+    Motion,
+    Shape,
+    element_of,
+    exact_class,
+    generator,
+    log_uniform,
+    shuffled_effects,
+)
 from _trial_outside import OUTSIDE
 from isojax import elements, rig
 from isojax.identification import fit, read_campaign, scales
@@ -43,7 +52,7 @@ class Sketch:
         levels: force amplitudes of the fitted and of the held-out records, N.
         plans: what to test.
         bench: how it is measured.
-        names: effects that are hidden.
+        names: what to hide, in the order of choice: the first that leave a trace are hidden.
     """
 
     seed: int
@@ -91,11 +100,6 @@ class Secret:
     limit: float
     shape: Shape
     law: rig.Law | rig.Instrument
-
-    @property
-    def element(self) -> elements.AbstractElement:
-        """The catalogue element with the true numbers."""
-        return with_size(EFFECTS[self.name].probe(self.shape), self.size)
 
 
 def kind_of(seed: int) -> str:
@@ -150,7 +154,7 @@ def sketch(seed: int, kind: str | None = None, names: tuple[str, ...] | None = N
 def _names(seed: int, kind: str) -> tuple[str, ...]:
     if kind == "outside":
         return (str(generator(seed, "outside").choice(sorted(OUTSIDE))),)
-    return tuple(chosen_effects(seed, {"none": 0, "one": 1, "two": 2}[kind]))
+    return () if kind == "none" else shuffled_effects(seed)
 
 
 def _plans(
@@ -216,24 +220,26 @@ def secrets(drawn: Sketch, innocent) -> tuple[Secret, ...]:
     shapes = {
         name: effect.shape(generator(drawn.seed, "shape", name), motion) for name, effect in EFFECTS.items()
     }
-    test = score_test(
-        innocent.estimate,
-        scales(innocent.campaign),
-        tuple(EFFECTS[name].probe(shapes[name]) for name in EFFECTS),
-    )
+    magnitudes = scales(innocent.campaign)
+    probes = tuple(element_of(name, shapes[name], magnitudes) for name in EFFECTS)
+    test = score_test(innocent.estimate, magnitudes, probes)
     limits = {score.element.name: SIGNIFICANT * score.error for score in test.scores}
-    return tuple(
-        _secret(drawn, name, EFFECTS[name], shapes[name], limits[name], motion)
-        for name in drawn.names
-        if name in limits
-    )
+    hidden: list[Secret] = []
+    for name in drawn.names:
+        apart = not any(name in exact_class(other.name) for other in hidden)
+        if len(hidden) < {"one": 1, "two": 2}[drawn.kind] and apart and name in limits:
+            hidden.append(_secret(drawn, name, shapes[name], limits[name], motion))
+    return tuple(hidden)
 
 
-def _secret(drawn: Sketch, name: str, effect: Hidden, shape: Shape, limit: float, motion: Motion) -> Secret:
+def _secret(drawn: Sketch, name: str, shape: Shape, limit: float, motion: Motion) -> Secret:
+    effect = EFFECTS[name]
     draw = generator(drawn.seed, "size", name)
-    # The smallest of two effects must be one that a test can see, else there is but one.
+    # The smaller of two effects must be one that a test can see, else there is but one.
     smallest = 3.0 if drawn.kind == "two" else 1.0
     size = min(limit * log_uniform(draw, smallest, LARGEST), effect.most(motion))
+    if effect.fixed is not None:
+        size = effect.fixed
     if effect.signed and draw.random() < 0.5:
         size = -size
     return Secret(name, size, limit, shape, effect.law(size, shape))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from _trial_effects import exact_class, known_by
+from _trial_effects import exact_class, family, known_by
 
 Row = dict[str, Any]
 CLEAR = 3.0
@@ -90,18 +90,18 @@ def line(row: Row) -> str:
 
 
 def names_right(row: Row) -> bool:
-    """Say whether the first effect named is the true one or of its exact class."""
-    return bool(row["findings"]) and row["findings"][0]["effect"] in exact_class(row["truth"][0]["effect"])
+    """Say whether the first effect named is of the true family."""
+    return bool(row["findings"]) and row["findings"][0]["effect"] in family(row["truth"][0]["effect"])
 
 
 def in_set(row: Row) -> bool:
-    """Say whether the truth is in the first reported set."""
-    return row["truth"][0]["effect"] in row["findings"][0]["set"]
+    """Say whether the true family is in the first reported set."""
+    return bool(set(family(row["truth"][0]["effect"])) & set(row["findings"][0]["set"]))
 
 
 def both_named(row: Row) -> bool:
     """Say whether each of two effects is in a set of its own."""
-    first, second = (set(exact_class(one["effect"])) for one in row["truth"])
+    first, second = (set(family(one["effect"])) for one in row["truth"])
     sets = [set(one["set"]) for one in row["findings"]]
     return any(
         first & one and second & other for i, one in enumerate(sets) for j, other in enumerate(sets) if i != j

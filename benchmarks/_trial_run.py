@@ -10,12 +10,20 @@ from typing import Any
 import numpy as np
 
 from _trial_campaign import Secret, Sketch, file_campaign, secrets, sketch, twin
-from _trial_effects import EFFECTS, exact_class
+from _trial_effects import EFFECTS, element_of, exact_class
 from isojax._results import is_successful
-from isojax.elements import CATALOGUE
-from isojax.identification import Fit, Loop, classical_guess, close_loop, diagnose, extend, fit, read_campaign
+from isojax.identification import (
+    Fit,
+    Loop,
+    classical_guess,
+    close_loop,
+    diagnose,
+    extend,
+    fit,
+    read_campaign,
+    scales,
+)
 from isojax.identification._diagnose import MOST_OF_IT, is_good
-from isojax.models import Isolator
 from isojax.records import Campaign
 
 Row = dict[str, Any]
@@ -173,12 +181,13 @@ def _without_the_truth(campaign: Campaign, excluded: tuple[str, ...]) -> Row:
 
 def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign) -> Row:
     """Fit the true structure from the true numbers: what the best diagnosis could reach."""
-    truth = drawn.model
-    model = truth.with_elements(*(_as_declared(secret, campaign) for secret in hidden))
-    found = fit(model, campaign)
-    exact = Isolator(800.0, (*truth.elements, *(secret.element for secret in hidden)))  # pyright: ignore[reportArgumentType]
+    magnitudes = scales(campaign)
+    truth = drawn.model.with_elements(
+        *(element_of(secret.name, secret.shape, magnitudes, secret.size) for secret in hidden)
+    )
+    found = fit(truth, campaign)
     off = {
-        name: (float(found.model[name]) - float(exact[name])) / error
+        name: (float(found.model[name]) - float(truth[name])) / error
         for name, error in found.standard_errors.items()
     }
     return {
@@ -186,19 +195,6 @@ def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign) -> Ro
         "oracle_converged": bool(is_successful(found.result)),
         "off": {name: (value if np.isfinite(value) else None) for name, value in off.items()},
     }
-
-
-def _as_declared(secret: Secret, campaign: Campaign):
-    """Give the true element, what is no physical number in it (a regularising width) as the model sets it."""
-    from isojax._parameters import own_parameters
-    from isojax.identification import scales
-
-    guess = CATALOGUE[secret.name].guess(scales(campaign))
-    numbers = dict(vars(secret.element))
-    for field, spec in own_parameters(guess):
-        if not spec.fitted and field not in secret.shape:
-            numbers[field] = getattr(guess, field)
-    return CATALOGUE[secret.name](**numbers)
 
 
 def crowded(most: int = 30_000) -> bool:

@@ -4,22 +4,24 @@ import math
 import sys
 from pathlib import Path
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import integrate, stats
 
 from isojax import rig
-from isojax.elements import CATALOGUE
+from isojax.elements import CATALOGUE, Scales
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from _trial_campaign import kind_of, sketch
-from _trial_effects import COMMONEST, EFFECTS, Motion, chosen_effects, exact_class, generator, with_size
+from _trial_effects import COMMONEST, EFFECTS, Motion, element_of, generator, shuffled_effects
 from _trial_judge import table, wilson
 from _trial_outside import OUTSIDE
 from _trial_run import run_one
 
 MOTION = Motion(40.0, 1e-3, 1.0, 31.0, 1.08e6, 1.03e4)
+SCALES = Scales(800.0, 150.0, 1e-3, 0.031, 1.0, 31.0, 0.004, 0.01, 1.0)
 SAMPLE = range(1000, 1020)
 
 
@@ -48,29 +50,71 @@ def test_every_campaign_has_records_of_equal_length_and_two_held_out():
         assert all(0.0 <= drawn.bench.drift <= 0.002 for _ in trials)
 
 
-def test_two_effects_are_never_of_one_exact_class():
-    for seed in range(200):
-        first, second = chosen_effects(seed, 2)
-        assert second not in exact_class(first)
+def test_a_new_line_in_the_table_leaves_the_order_of_the_others(monkeypatch):
+    before = {seed: shuffled_effects(seed) for seed in range(50)}
+    monkeypatch.setitem(EFFECTS, "yet_another", EFFECTS["input_delay"])
+    for seed, order in before.items():
+        assert tuple(name for name in shuffled_effects(seed) if name != "yet_another") == order
 
 
 @pytest.mark.parametrize("name", sorted(EFFECTS))
 def test_a_line_of_the_table_is_one_effect_for_the_rig_and_for_the_model(name):
     effect = EFFECTS[name]
     shape = effect.shape(generator(3, name), MOTION)
+    if "side" in shape:
+        shape["side"] = -1.0
     law = effect.law(0.5 * effect.most(MOTION), shape)
-    probe = effect.probe(shape)
-    assert law.name == name == probe.name
-    assert float(getattr(probe, probe.strength)) == 0.0
-    assert effect.signed <= probe.signed
-    assert all(other in CATALOGUE for other in effect.exact)
-    element = with_size(probe, 0.5 * effect.most(MOTION))
+    absent = element_of(name, shape, SCALES)
+    element = element_of(name, shape, SCALES, 0.5 * effect.most(MOTION))
+    assert law.name == name == absent.name
+    assert float(getattr(absent, absent.strength)) == 0.0
+    assert effect.signed <= absent.signed
+    assert all(other in CATALOGUE for other in (*effect.exact, *effect.near, *effect.known_by))
     if isinstance(law, rig.Law) and not law.inner and not law.inertia:
-        for x, v in ((6e-4, 0.02), (-8e-4, 0.03), (3e-4, -0.025)):
+        for x, v in ((9e-4, 0.02), (-9e-4, 0.03), (3e-5, -0.025), (-3e-5, -0.01)):
             sides = tuple(math.copysign(1.0, switch(x, v, ())) for switch in law.switches)
             assert law.force(0.0, x, v, (), sides) == pytest.approx(
-                float(element.force(jnp.asarray(x), jnp.asarray(v), ())), rel=1e-6
+                float(element.force(jnp.asarray(x), jnp.asarray(v), ())), rel=1e-4, abs=1e-6
             )
+
+
+INSTRUMENTS = ("ac_coupling",)
+MEMORIES = [name for name in sorted(EFFECTS) if CATALOGUE[name].internal_states and name not in INSTRUMENTS]
+
+
+@pytest.mark.parametrize("name", MEMORIES)
+def test_a_memory_of_the_table_is_one_for_the_rig_and_for_the_model(name):
+    """Driven along one motion, by SciPy and from rest, both end with one force."""
+    effect = EFFECTS[name]
+    shape = effect.shape(generator(3, name), MOTION)
+    law = effect.law(0.5 * effect.most(MOTION), shape)
+    element = element_of(name, shape, SCALES, 0.5 * effect.most(MOTION))
+    compiled = eqx.filter_jit(element.state_rate)
+
+    def motion(t):
+        return 1e-3 * np.sin(31.0 * t), 0.031 * np.cos(31.0 * t)
+
+    def sides(x, v, z):
+        return [1.0 if switch(x, v, z) >= 0.0 else -1.0 for switch in law.switches]
+
+    def of_rig(t, z):
+        return law.rate(t, *motion(t), z, sides(*motion(t), z))
+
+    def of_model(t, s):
+        x, v = motion(t)
+        return compiled(jnp.asarray(x), jnp.asarray(v), tuple(map(jnp.asarray, s)))
+
+    end = 0.7
+    options = {"method": "LSODA", "rtol": 1e-7, "atol": 1e-12, "max_step": 2e-3}
+    z, s = (
+        integrate.solve_ivp(rate, (0.0, end), np.zeros(states), **options).y[:, -1]
+        for rate, states in ((of_rig, law.inner), (of_model, element.internal_states))
+    )
+    x, v = motion(end)
+    told = float(element.force(jnp.asarray(x), jnp.asarray(v), tuple(map(jnp.asarray, s))))
+    # The few branches of the fractional law forget their start otherwise than the many of the rig.
+    close = 1e-2 if name == "fractional_damping" else 1e-4
+    assert law.force(end, x, v, z, sides(x, v, z)) == pytest.approx(told, rel=close)
 
 
 def test_the_coverage_run_has_ten_effects_that_can_be_drawn():
