@@ -6,7 +6,9 @@ would add and the linearised force balance are worked out along the motion, all 
 linear, time-varying solve, which knows nothing of the effects, carries all columns.
 """
 
+import itertools
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
 
 import diffrax
 import equinox as eqx
@@ -15,8 +17,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._parameters import list_parameters
-from ..models import RK4, Isolator, Quantity, State, scan_records
+from .._parameters import list_parameters, own_parameters
+from ..elements import AbstractElement
+from ..models import RK4, Isolator, Quantity, State
 from ._batch import Batch, Prepared, workers
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, scaled_model, share_lanes
 
@@ -29,69 +32,175 @@ def _nodes(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lane
     return ends.reshape(time * steps, 3, lanes)
 
 
+class _Family(NamedTuple):
+    """Absent effects of one kind, side by side: a kind is traced once, whatever its grid.
+
+    Attributes:
+        elements: the effects, their numbers stacked.
+        strengths: the strength of each.
+        places: where each stands among the absent effects.
+        states: internal states of each.
+    """
+
+    elements: AbstractElement
+    strengths: Float[Array, " member"]
+    places: tuple[int, ...]
+    states: int
+
+
+def _families(probes: tuple[AbstractElement, ...]) -> tuple[_Family, ...]:
+    """Put absent effects of one kind side by side."""
+    groups: dict[Any, list[int]] = {}
+    for place, probe in enumerate(probes):
+        groups.setdefault((type(probe), jax.tree_util.tree_structure(probe)), []).append(place)
+    families = []
+    for places in groups.values():
+        members = [probes[place] for place in places]
+        stacked = jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *members)
+        strength = getattr(stacked, stacked.strength)
+        families.append(_Family(stacked, strength, tuple(places), stacked.internal_states))
+    return tuple(families)
+
+
+def _stacked_states(families: tuple[_Family, ...], probes: tuple[AbstractElement, ...], rows: State) -> State:
+    """Give the internal states of absent effects family by family, each with its members first."""
+    ends = np.cumsum([0, *(probe.internal_states for probe in probes)])
+    return tuple(
+        jnp.stack([rows[ends[place] + state] for place in family.places])
+        for family in families
+        for state in range(family.states)
+    )
+
+
+def _own(families: tuple[_Family, ...], states: State) -> list[State]:
+    """Share stacked internal states out among the families."""
+    ends = np.cumsum([0, *(family.states for family in families)])
+    return [states[begin:end] for begin, end in itertools.pairwise(ends)]
+
+
 @eqx.filter_jit
 def _path(
-    model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> tuple[State, Array, Array, dict[str, Array]]:
-    """Simulate; give states, drive, its rate and channels at the start of each integration step."""
+    model: Isolator,
+    families: tuple[_Family, ...],
+    scale: Array,
+    states: State,
+    memories: State,
+    batch: Batch,
+    quantity: Quantity,
+    sample_time: float,
+) -> tuple[State, State, Array, Array, dict[str, Array]]:
+    """Simulate, the memories of absent effects following.
+
+    Returns:
+        At the start of each integration step: the states; those memories; drive, its rate and channels.
+    """
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
     drive, rate = _nodes(batch.drive), _nodes(batch.drive_rate)
-    step = sample_time * batch.drive.shape[0] / drive.shape[0]
     channels = {name: _nodes(values) for name, values in batch.channels.items()}
-    _, path = scan_records(
-        current, RK4(), quantity, step, states, drive, rate, lambda state, u, du: state, channels
-    )
-    return path, drive[:, 0], rate[:, 0], {name: values[:, 0] for name, values in channels.items()}
+    step = sample_time * batch.drive.shape[0] / drive.shape[0]
+    solver, size = RK4(), len(states)
+
+    def field(t: float, state: State, args: tuple[Any, Any, Any]) -> State:
+        place = round(2.0 * t)
+        u, du, beside = args[0][place], args[1][place], {name: at[place] for name, at in args[2].items()}
+        own = state[:size]
+        rates = current.rates(own, u, du, quantity, channels=beside)
+        y = current.reading(own, u, du, quantity, beside)
+        followed: list[Array] = []
+        for family, internal in zip(families, _own(families, state[size:]), strict=True):
+            if not family.states:
+                continue
+
+            def follow(element: AbstractElement, s: State) -> State:
+                law, sensed = element.state_rate(own[0], own[1], s), element.reading_rate(y, s)
+                return tuple(one + other for one, other in zip(law, sensed, strict=True))
+
+            followed.extend(jax.vmap(follow)(family.elements, internal))
+        return tuple(step * value for value in (*rates, *followed))
+
+    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
+
+    def body(state: State, table: tuple) -> tuple[State, State]:
+        moved, *_ = solver.step(term, 0.0, 1.0, state, table, None, False)
+        return moved, state
+
+    _, path = jax.lax.scan(body, (*states, *memories), (drive, rate, channels))
+    starts = {name: values[:, 0] for name, values in channels.items()}
+    return path[:size], path[size:], drive[:, 0], rate[:, 0], starts
+
+
+_Change = tuple[tuple[Array, ...], Array]
+"""Change of the rates of the carried states but the first, whose rate is the velocity; and of the reading."""
 
 
 @eqx.filter_jit
 def _partials(
     model: Isolator,
-    carried_states: int,
+    families: tuple[_Family, ...],
     moving: tuple[int, ...],
     scale: Array,
     path: State,
+    memories: State,
     u: Array,
     du: Array,
     channels: dict[str, Array],
     quantity: Quantity,
-) -> tuple[Array, list[tuple[tuple[Array, ...], Array]], list[tuple[tuple[Array, ...], Array]]]:
+) -> tuple[Array, list[_Change], list[_Change], list[_Change]]:
     """Differentiate rates and reading along the path.
 
     Returns:
-        The reading; then, for each parameter that moves and for the stiffness scale, and for each carried
-        state, the change of the rates of the carried states but the first (whose rate is the velocity) and of
-        the reading.
+        The reading; the changes with each parameter that moves; with the strength of each absent effect; with
+        the stiffness scale, where there is one, and each state.
     """
     values = tuple(entry.value for entry in list_parameters(model))
 
-    def both(values: tuple[Array, ...], scale: Array, state: State) -> tuple[tuple[Array, ...], Array]:
-        current = scaled_model(model, values, scale)
+    def along(current: Isolator, state: State, internal: State = ()) -> _Change:
         late = current.shift() - jax.lax.stop_gradient(current.shift())
-        full = (*state, *path[carried_states:])
-        rates = current.rates(full, u - late * du, du, quantity, channels=channels)[1:carried_states]
-        return rates, current.reading(full, u - late * du, du, quantity, channels)
+        full, acted = (*state, *internal), u - late * du
+        rates = current.rates(full, acted, du, quantity, channels=channels)[1 : len(state)]
+        return rates, current.reading(full, acted, du, quantity, channels)
 
-    state = path[:carried_states]
-    (_, reading) = both(values, scale, state)
+    def both(values: tuple[Array, ...], scale: Array, state: State) -> _Change:
+        return along(scaled_model(model, values, scale), state)
+
+    (_, reading) = both(values, scale, path)
     by_parameter = []
     for place in moving:
 
-        def along(number: Array, place: int = place) -> tuple[tuple[Array, ...], Array]:
-            return both((*values[:place], number, *values[place + 1 :]), scale, state)
+        def with_number(number: Array, place: int = place) -> _Change:
+            return both((*values[:place], number, *values[place + 1 :]), scale, path)
 
-        by_parameter.append(jax.jvp(along, (values[place],), (jnp.ones(()),))[1])
-    if has_stiffness_scale(model):
-        by_parameter.append(jax.jvp(lambda s: both(values, s, state), (scale,), (jnp.ones_like(scale),))[1])
+        by_parameter.append(jax.jvp(with_number, (values[place],), (jnp.ones(()),))[1])
+
+    present = scaled_model(model, values, scale)
+    by_probe: dict[int, _Change] = {}
+    for family, own in zip(families, _own(families, memories), strict=True):
+
+        def by_strength(element: AbstractElement, strength: Array, internal: State) -> _Change:
+            def with_strength(number: Array) -> _Change:
+                probe = eqx.tree_at(lambda e: getattr(e, e.strength), element, number)
+                extended = Isolator(present.mass, (*present.elements, probe), present.excitation)
+                return along(extended, path, internal)
+
+            return jax.jvp(with_strength, (strength,), (jnp.ones(()),))[1]
+
+        # Along the path the members of a family come after time.
+        internal = tuple(jnp.moveaxis(values, 1, 0) for values in own)
+        changes = jax.vmap(by_strength)(family.elements, family.strengths, internal)
+        for member, place in enumerate(family.places):
+            by_probe[place] = jax.tree_util.tree_map(lambda values, member=member: values[member], changes)
+
     by_state = []
-    for index in range(carried_states):
+    if has_stiffness_scale(model):
+        by_state.append(jax.jvp(lambda s: both(values, s, path), (scale,), (jnp.ones_like(scale),))[1])
+    for index in range(len(path)):
 
-        def shifted(number: Array, index: int = index) -> tuple[tuple[Array, ...], Array]:
-            return both(values, scale, (*state[:index], number, *state[index + 1 :]))
+        def shifted(number: Array, index: int = index) -> _Change:
+            return both(values, scale, (*path[:index], number, *path[index + 1 :]))
 
-        by_state.append(jax.jvp(shifted, (state[index],), (jnp.ones_like(state[index]),))[1])
-    return reading, by_parameter, by_state
+        by_state.append(jax.jvp(shifted, (path[index],), (jnp.ones_like(path[index]),))[1])
+    return reading, by_parameter, [by_probe[place] for place in sorted(by_probe)], by_state
 
 
 @eqx.filter_jit
@@ -157,24 +266,42 @@ def column_information(
         A^T A of each lane, lanes first.
     """
     parts = len(prepared.batches)
-    model = unknowns.model
-    size = 2 + sum(element.internal_states for element in model.elements[:carried])
+    whole = unknowns.model
+    model = Isolator(whole.mass, whole.elements[:carried], whole.excitation)
+    probes = whole.elements[carried:]
+    families = _families(probes)
+    size = 2 + model.internal_states
     moving = tuple(int(np.flatnonzero(column)[0]) for column in unknowns.directions.T)
     units = [float(unknowns.directions[place, index]) for index, place in enumerate(moving)]
-    if has_stiffness_scale(model):
+    known = len(list_parameters(model))
+    own = tuple(place for place in moving if place < known)
+    # Which probe each further direction belongs to.
+    owner = np.repeat(np.arange(len(probes)), [len(own_parameters(probe)) for probe in probes])
+    columns = [own.index(place) if place < known else len(own) + owner[place - known] for place in moving]
+    scaled, wanted = has_stiffness_scale(model), has_stiffness_scale(whole)
+    if wanted:
         units.append(STIFFNESS_SCALE_UNIT)
 
     def one(part: int) -> np.ndarray:
-        batch = prepared.batches[part].following(model)
+        batch = prepared.batches[part].following(whole)
         scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
         states = share_lanes(unknowns.states, part, parts)
-        path, u, du, channels = _path(model, scale, states, batch, prepared.quantity, prepared.sample_time)
+        memories = _stacked_states(families, probes, states[size:])
+        path, memories, u, du, channels = _path(
+            model, families, scale, states[:size], memories, batch, prepared.quantity, prepared.sample_time
+        )
         lanes, nodes = scale.shape[0], u.shape[0]
         steps = nodes // batch.measured.shape[0]
         wide = jnp.broadcast_to(scale, u.shape)
-        reading, by_parameter, by_state = _partials(
-            model, size, moving, wide, path, u, du, channels, prepared.quantity
+        reading, by_parameter, by_probe, by_state = _partials(
+            model, families, own, wide, path, memories, u, du, channels, prepared.quantity
         )
+        del memories
+        by_parameter = [[*by_parameter, *by_probe][column] for column in columns]
+        if wanted:
+            nothing = jax.tree_util.tree_map(jnp.zeros_like, by_state[0])
+            by_parameter.append(by_state[0] if scaled else nothing)
+        by_state = by_state[-size:]
         rest = [jnp.zeros_like(u)] * size
         forcing = jnp.stack(
             [

@@ -23,7 +23,8 @@ def fit_report(fit: Fit) -> str:
     """Give the report of a fit.
 
     Coefficients with standard error, relative error and start value; those at a bound, never moved, or not
-    determined by the data by name; strong correlations; errors in physical units and over the noise.
+    determined by the data by name; strong correlations; errors in physical units and over the noise. Of a
+    search that failed there are no numbers but NaN, and why it failed.
 
     Args:
         fit: the fit.
@@ -58,6 +59,9 @@ def _model(fit: Fit) -> list[str]:
 
 def _statistics(fit: Fit) -> list[str]:
     stats, unit = fit.stats, OUTPUT_UNITS[fit.campaign.output.quantity]
+    if not is_successful(fit.result):
+        nothing = dict.fromkeys(("chi2", "aic", "bic", "stiffness_scatter"), math.nan)
+        stats = stats._replace(**nothing)
     integrator = fit.estimate.bench.problem.integrator
     rows = [
         ("samples", f"{stats.samples}"),
@@ -111,6 +115,8 @@ def _value(entry: Parameter, error: float | None, start: float | None, fit: Fit)
     if error is None:
         return f"{value:<12.6g} {unit} (fixed)"
     begun = "(added)" if start is None else f"(init = {start:.6g})"
+    if not is_successful(fit.result):
+        return f"{'not found':<12} {unit} {begun}"
     if not math.isfinite(error):
         return f"{value:<12.6g} +/- unknown {unit} {begun}"
     share = f" ({100 * error / abs(value):.2g} %)" if value != 0.0 else ""
@@ -118,6 +124,8 @@ def _value(entry: Parameter, error: float | None, start: float | None, fit: Fit)
 
 
 def _correlations(fit: Fit) -> list[str]:
+    if not is_successful(fit.result):
+        return []
     correlation = fit.estimate.uncertainty.correlation
     pairs = [
         (float(correlation[i, j]), fit.free[i], fit.free[j])
@@ -145,6 +153,8 @@ def warnings_of(fit: Fit) -> list[str]:
         "momentum that it gave, is a guess. Sample faster or use a softer tip."
         for blow in brief_blows(fit.campaign)
     ]
+    if not is_successful(fit.result):
+        return lines
     lines += _not_determined(fit)
     start = {entry.name: float(entry.value) for entry in list_parameters(fit.start)}
     errors = fit.standard_errors

@@ -192,7 +192,7 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
 
 def _states_of(
     model: Isolator, before: Isolator, states: Float[np.ndarray, "lanes state"]
-) -> Float[np.ndarray, "lanes state"]:
+) -> Float[np.ndarray, "lanes extended"]:
     """Give the deviations of the initial states of an extended model: of what stayed; none of the rest."""
     known, place = {}, 2
     for element in before.elements:
