@@ -1,11 +1,72 @@
 """Which test would part effects that the data cannot."""
 
+from typing import NamedTuple
+
 from ..elements import CATALOGUE
 
-GAIN_CLASS = {"added_mass", "input_gain", "sensor_gain"}
-LAG_CLASS = {"input_delay", "maxwell_branch", "added_mass"}
-HYSTERESIS = {"dahl_friction", "bouc_wen", "coulomb_friction"}
-OFFSETS = {"quadratic_stiffness", "input_offset", "sensor_offset"}
+
+class LookAlikes(NamedTuple):
+    """Effects that one test parts.
+
+    Attributes:
+        names: catalogue names, any two of which call for the test.
+        test: what to do and why it parts them, in words.
+        needed: one of the names without which the test says nothing; empty if none.
+    """
+
+    names: frozenset[str]
+    test: str
+    needed: str = ""
+
+
+CLASSES = (
+    LookAlikes(
+        frozenset({"added_mass", "input_gain", "sensor_gain"}),
+        "weigh a known extra mass onto the isolator and repeat one level: a mass error stays in kilograms, a "
+        "gain error stays in per cent",
+    ),
+    LookAlikes(
+        frozenset({"input_delay", "maxwell_branch", "added_mass", "dual_chamber", "fractional_damping"}),
+        "extend the band to twice the resonance: a delay's apparent damping changes sign at the resonance "
+        "and grows above it, that of a relaxation does not",
+        needed="input_delay",
+    ),
+    LookAlikes(
+        frozenset({"dahl_friction", "bouc_wen", "coulomb_friction", "lugre_friction"}),
+        "repeat at a third of the lowest level: presliding turns friction into stiffness there, while dry "
+        "friction keeps its force",
+    ),
+    LookAlikes(
+        frozenset({"quadratic_stiffness", "input_offset", "sensor_offset"}),
+        "measure the mean displacement (a DC-capable sensor), or repeat with a known static load",
+    ),
+    LookAlikes(
+        frozenset({"dual_chamber", "maxwell_branch"}),
+        "repeat at a third and at three times the level: an orifice slows the relaxation down as the flow "
+        "rises, a Maxwell branch knows no level",
+    ),
+    LookAlikes(
+        frozenset({"fractional_damping", "maxwell_branch", "dual_chamber"}),
+        "widen the band to more than a decade: rubber follows one power of frequency, a relaxation has one "
+        "time constant",
+        needed="fractional_damping",
+    ),
+    LookAlikes(
+        frozenset({"second_mode", "added_mass"}),
+        "extend the band upwards: a second mode ends in a notch, while a mass goes on with the square of the "
+        "frequency",
+    ),
+    LookAlikes(
+        frozenset({"ac_coupling", "input_delay"}),
+        "extend the band downwards: the lead of an AC coupling grows there, the phase of a delay vanishes",
+    ),
+    LookAlikes(
+        frozenset({"clipping", "end_stop"}),
+        "repeat the top level with the next larger range of the response channel: a stop stays, a clipped "
+        "top does not",
+    ),
+)
+"""Which test parts which effects; further classes go here."""
 
 
 def separating_experiment(effect: str, others: tuple[str, ...]) -> str:
@@ -21,32 +82,15 @@ def separating_experiment(effect: str, others: tuple[str, ...]) -> str:
     if not others:
         return ""
     together = {effect, *others}
-    advice = []
-    if len(together & GAIN_CLASS) > 1:
-        advice.append(
-            "weigh a known extra mass onto the isolator and repeat one level: a mass error stays in "
-            "kilograms, a gain error "
-            "stays in per cent"
-        )
-    if len(together & LAG_CLASS) > 1 and "input_delay" in together:
-        advice.append(
-            "extend the band to twice the resonance: a delay's apparent damping changes sign at the "
-            "resonance and "
-            "grows above it, that of a relaxation does not"
-        )
-    if len(together & HYSTERESIS) > 1:
-        advice.append(
-            "repeat at a third of the lowest level: presliding turns friction into stiffness there, while "
-            "dry friction "
-            "keeps its force"
-        )
-    if len(together & OFFSETS) > 1:
-        advice.append(
-            "measure the mean displacement (a DC-capable sensor), or repeat with a known static load"
-        )
+    advice = [
+        alike.test
+        for alike in CLASSES
+        if len(together & alike.names) > 1 and (not alike.needed or alike.needed in together)
+    ]
     if not advice:
         names = ", ".join(CATALOGUE[name].words for name in (effect, *others))
         advice.append(
             f"add one level a factor of three lower and one higher; {names} scale differently with level"
         )
-    return "; ".join(advice)[0].upper() + "; ".join(advice)[1:] + "."
+    words = "; ".join(advice)
+    return words[0].upper() + words[1:] + "."

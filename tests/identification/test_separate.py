@@ -1,0 +1,39 @@
+"""The advice on which test parts look-alikes."""
+
+import pytest
+
+from isojax.elements import CATALOGUE
+from isojax.identification._separate import CLASSES, separating_experiment
+
+
+def test_every_class_names_effects_of_the_catalogue():
+    for alike in CLASSES:
+        assert alike.names <= set(CATALOGUE)
+        assert alike.needed in {"", *alike.names}
+
+
+@pytest.mark.parametrize(
+    ("effect", "others", "test"),
+    [
+        ("added_mass", ("input_gain",), "known extra mass"),
+        ("maxwell_branch", ("input_delay",), "twice the resonance"),
+        ("lugre_friction", ("dahl_friction",), "a third of the lowest level"),
+        ("dual_chamber", ("maxwell_branch",), "three times the level"),
+        ("fractional_damping", ("maxwell_branch",), "more than a decade"),
+        ("second_mode", ("added_mass",), "upwards"),
+        ("ac_coupling", ("input_delay",), "downwards"),
+        ("end_stop", ("clipping",), "range of the response channel"),
+    ],
+)
+def test_look_alikes_come_with_the_test_that_parts_them(effect, others, test):
+    assert test in separating_experiment(effect, others)
+    assert test in separating_experiment(others[0], (effect,))
+
+
+def test_a_relaxation_and_a_mass_without_a_delay_need_no_test_of_delays():
+    assert "delay" not in separating_experiment("maxwell_branch", ("added_mass",))
+
+
+def test_unknown_pairs_are_told_apart_by_level_and_nothing_needs_parting_alone():
+    assert "three lower" in separating_experiment("cubic_stiffness", ("clipping",))
+    assert separating_experiment("cubic_stiffness", ()) == ""
