@@ -131,7 +131,7 @@ def draw_springs() -> None:
     stop = elements.EndStop(1e6, 1e-3, 0.0, 1.5e-5)
     lines = (
         (stop, "both sides", AFTER),
-        (elements.EndStop(1e6, 1e-3, 1.0, 1.5e-5), "one side", BEFORE),
+        (elements.EndStop(0.5e6, 1e-3, 1.0, 1.5e-5), "one side", BEFORE),
         (elements.CubicStiffness(9e10), "cubic spring", NEUTRAL),
     )
     page(stop, lines, stiffness, stiff, 1e3, mean_force(lines))

@@ -3,7 +3,6 @@
 from typing import ClassVar
 
 import jax
-import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
@@ -13,19 +12,20 @@ from ._base import AbstractElement, Scales
 class EndStop(AbstractElement):
     """End stop: a further spring that is met beyond a gap, on both sides or on one.
 
-    `K [u(x - g) - u(-x - g)]` [N] with the rounded ramp `u(d) = w ln(1 + exp(d / w))`, which is max(d, 0) but
-    for a corner of width w: a declared regularising width, not a physical number. The rounding takes in
-    `pi^2/12 K w^2` of energy on either side of the corner. `side` +1 keeps the first ramp alone, -1 the
-    second.
+    `K [(1 + side) u(x - g) - (1 - side) u(-x - g)]` [N] with the rounded ramp `u(d) = w ln(1 + exp(d / w))`,
+    which is max(d, 0) but for a corner of width w: a declared regularising width, not a physical number. The
+    rounding of a corner of the stiffness k takes in `pi^2/12 k w^2` of energy on either side of it. K is the
+    mean of the two stops; with side = 0 each has K, with side = +1 only positive displacement meets one, of
+    2 K. The side is fitted, for a search that starts on the wrong one must find its way.
 
-    With a free linear spring a two-sided stop is exactly the class of a free gap: `K x - K clip(x, -g, g)` is
-    this law, so that "K more beyond g" and "K less within g" differ by what is called the linear spring. What
-    parts them is a look at the rig, or the stiffness at motion smaller than the gap known beforehand.
+    With a free linear spring a stop with side = 0 is exactly the class of a free gap: `K x - K clip(x, -g,
+    g)` is this law, so that "K more beyond g" and "K less within g" differ by what is called the linear
+    spring. What parts them is a look at the rig, or the linear spring known beforehand.
 
     Attributes:
-        stiffness: K, of the stop [N/m].
+        stiffness: K, mean of the two stops [N/m].
         gap: g, free way up to it [m].
-        side: 0 two-sided, +1 met by positive displacement alone, -1 by negative [1]; declared, not fitted.
+        side: 0 alike on both sides, +1 met by positive displacement alone, -1 by negative alone [1].
         width: w [m].
 
     Source: Shaw & Holmes 1983, J. Sound Vib. 90:129, for the piecewise linear law.
@@ -38,7 +38,7 @@ class EndStop(AbstractElement):
 
     stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
     gap: Scalar = parameter(symbol="g", unit="m", lower=0.0)
-    side: Scalar = parameter(symbol="side", unit="1", fitted=False)
+    side: Scalar = parameter(symbol="side", unit="1", lower=-1.0, upper=1.0)
     width: Scalar = parameter(symbol="w", unit="m", lower=0.0, fitted=False)
 
     @classmethod
@@ -51,9 +51,12 @@ class EndStop(AbstractElement):
 
     @classmethod
     def grid(cls, scales: Scales) -> "tuple[EndStop, ...]":
-        """See `AbstractElement.grid`: met by all but small motion, by strong motion, by its peaks alone."""
+        """See `AbstractElement.grid`: met by all but small motion, by strong motion, by its peaks alone.
+
+        A start on one side leaves a little of the other, for at the very bound nothing would move.
+        """
         return tuple(
-            cls._placed(scales, share, side) for side in (0.0, 1.0, -1.0) for share in (0.35, 0.7, 1.2)
+            cls._placed(scales, share, side) for side in (0.0, 0.8, -0.8) for share in (0.35, 0.7, 1.2)
         )
 
     @classmethod
@@ -72,5 +75,4 @@ class EndStop(AbstractElement):
         """See `AbstractElement.force`."""
         above = self.width * jax.nn.softplus((x - self.gap) / self.width)
         below = self.width * jax.nn.softplus((-x - self.gap) / self.width)
-        upper, lower = jnp.minimum(1.0, 1.0 + self.side), jnp.minimum(1.0, 1.0 - self.side)
-        return self.stiffness * (upper * above - lower * below)
+        return self.stiffness * ((1.0 + self.side) * above - (1.0 - self.side) * below)
