@@ -3,7 +3,7 @@
 python docs/effects/draw_memory.py
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import jax
@@ -96,13 +96,13 @@ def over_amplitude(ax: Axes, element, omega: float, colour: str, name: str, stif
     ax.loglog(1e3 * sizes, 1e-3 * np.abs(values[:, 0 if stiffness else 1]), color=colour, label=name)
 
 
-def over_frequency(axes: tuple[Axes, Axes], dynamic: np.ndarray, colour: str, name: str, style="-") -> None:
+def over_frequency(axes: Sequence[Axes], dynamic: np.ndarray, colour: str, name: str, style="-") -> None:
     """Stiffness and damping of a dynamic stiffness over the frequency."""
     axes[0].semilogx(FREQUENCY, 1e-3 * dynamic.real, style, color=colour, label=name)
     axes[1].semilogx(FREQUENCY, 1e-3 * dynamic.imag / OMEGA, style, color=colour, label=name)
 
 
-def labelled(axes: tuple[Axes, Axes]) -> None:
+def labelled(axes: Sequence[Axes]) -> None:
     """Labels of stiffness and damping over the frequency."""
     label(axes[0], "frequency [Hz]", DK)
     label(axes[1], "frequency [Hz]", DC)
@@ -170,10 +170,8 @@ def maxwell_branch() -> Figure:
     """Stiffness that comes and damping that goes with frequency."""
     figure, *axes = panels("dk = K (w tau)^2 / (1 + (w tau)^2)", "dc = K tau / (1 + (w tau)^2)")
     for tau, colour in zip((0.1, 0.03, 0.01), LEVELS, strict=False):
-        over_frequency(
-            tuple(axes), 1e5 * 1j * OMEGA * tau / (1 + 1j * OMEGA * tau), colour, f"tau {1e3 * tau:g} ms"
-        )
-    labelled(tuple(axes))
+        over_frequency(axes, 1e5 * 1j * OMEGA * tau / (1 + 1j * OMEGA * tau), colour, f"tau {1e3 * tau:g} ms")
+    labelled(axes)
     return figure
 
 
@@ -186,8 +184,8 @@ def dual_chamber() -> Figure:
         both = np.array([equivalent(law, size, 2.0 * np.pi * f) for f in frequency])
         for ax, values in zip(axes, both.T, strict=True):
             ax.semilogx(frequency, 1e-3 * values, color=colour, label=f"{1e3 * size:g} mm")
-    over_frequency(tuple(axes), 1e5 * 1j * OMEGA * 0.01 / (1 + 1j * OMEGA * 0.01), MEASURED, "o = 0", ":")
-    labelled(tuple(axes))
+    over_frequency(axes, 1e5 * 1j * OMEGA * 0.01 / (1 + 1j * OMEGA * 0.01), MEASURED, "o = 0", ":")
+    labelled(axes)
     return figure
 
 
@@ -196,14 +194,14 @@ def fractional_damping() -> Figure:
     figure, *axes = panels("stiffness: the law and its branches", "damping falls as w^(alpha - 1)")
     for order, colour in zip((0.2, 0.4, 0.7), LEVELS, strict=False):
         size = 1e5 / 27.0**order
-        over_frequency(tuple(axes), size * (1j * OMEGA) ** order, colour, f"alpha {order}")
+        over_frequency(axes, size * (1j * OMEGA) ** order, colour, f"alpha {order}")
         element = elements.FractionalDamping(size, order, 27.0 / 40.0, 27.0 * 12.0)
         some = slice(10, None, 20)
         branches = np.array([equivalent(element, 1e-3, omega) for omega in OMEGA[some]])
         for ax, values in zip(axes, branches.T, strict=True):
             ax.plot(FREQUENCY[some], 1e-3 * values, "o", color=colour, markersize=3)
     axes[1].set_yscale("log")
-    labelled(tuple(axes))
+    labelled(axes)
     return figure
 
 
