@@ -134,12 +134,18 @@ def test_a_fit_that_failed_ends_with_code_one_and_its_report_says_so(
     monkeypatch.setattr("isojax.identification._descent.MOST_REFUSALS", 1)
     monkeypatch.setattr("isojax.identification._descent.STALLED", 0.0)
     campaign = failing_campaign(tmp_path / "campaign")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "model.json").write_text("of an earlier run", encoding="utf-8")
     assert main([command, str(campaign), "--out", str(tmp_path / "out"), "--quiet"]) == 1
     assert capsys.readouterr().err == ""
     report = (tmp_path / "out" / file).read_text(encoding="utf-8")
     assert "The search failed." in report
     assert "is not good, but" not in report
-    isojax.load_model(tmp_path / "out" / "model.json")
+    assert not (tmp_path / "out" / "model.json").exists()
+    if command == "fit":
+        listed = report.split("[[Coefficients]]")[1].split("[[")[0].strip().splitlines()
+        assert [line.split()[1:3] for line in listed if "mass" not in line] == [["not", "found"]] * 3
+        assert "reduced chi-square   = nan" in report
     if command == "close-loop":
         assert "The fit failed" in report
         result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))

@@ -81,14 +81,19 @@ def _parser() -> argparse.ArgumentParser:
     loop = commands.add_parser("close-loop", help="fit, name what is missing, add it, report")
     _campaign(loop)
     loop.add_argument(
-        "--out", required=True, metavar="DIR", help="where report.html, result.json and model.json go"
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="where report.html, result.json and model.json go (no model after a failed fit)",
     )
     _quiet(loop)
     loop.set_defaults(run=lambda asked: _close_loop(asked.campaign, asked.out, asked.quiet))
 
     single = commands.add_parser("fit", help="fit the declared model and print its report")
     _campaign(single)
-    single.add_argument("--out", metavar="DIR", help="where model.json and fit.txt go")
+    single.add_argument(
+        "--out", metavar="DIR", help="where model.json (not after a failed fit) and fit.txt go"
+    )
     _quiet(single)
     single.set_defaults(run=lambda asked: _fit(asked.campaign, asked.out, asked.quiet))
 
@@ -183,7 +188,7 @@ def _fit(campaign: str | Path, out: str | None, quiet: bool) -> int:
     fitted = fit(guess.model, measured, progress=progress)
     report = str(fitted)
     if folder is not None:
-        write_texts(folder, {"model.json": model_text(fitted.model), "fit.txt": report + "\n"})
+        write_texts(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
     print(report)
     print(f"{time.perf_counter() - begin:.1f} s with compiling")
     return _exit_code(fitted)

@@ -71,6 +71,9 @@ def test_report_of_an_extended_model_marks_what_was_added(found):
 def test_report_says_why_a_search_failed(found):
     report = str(found.after._replace(result=RESULTS.not_converged))
     assert RESULTS[RESULTS.not_converged] in report
+    assert report.count("not found") == len(found.after.free)
+    assert "[[Correlations" not in report
+    assert f"{float(found.after.model['linear_stiffness.coefficient']):.6g}" not in report
 
 
 def test_report_shows_integration_error_where_it_is_known(found):

@@ -193,6 +193,24 @@ def test_an_asymmetric_spring_doubles_without_breaking_a_symmetry():
         assert abs((values[0] - value) * (values[1] - value)) < 1e-8
 
 
+def test_a_broken_branch_that_comes_back_meets_no_fold_where_it_crosses(monkeypatch):
+    # There the search for the point is singular; badly located, it must still be told for what it is.
+    branch = ij.continue_branch(
+        UEDA, parameter="amplitude", frequency=0.3 * ONE, start=0.05, stop=1.0, step=0.05
+    )
+    breaks = [point for point in branch.special_points if point.kind == "symmetry_breaking"][:2]
+    monkeypatch.setattr("isojax.stability._special_points._BISECTIONS", 3)
+    jax.clear_caches()
+    loop = ij.switch_branch(branch, breaks[0])
+    jax.clear_caches()
+    assert bool(loop.closed)
+    kinds = [point.kind for point in loop.special_points]
+    doublings = ["period_doubling"] * 2
+    assert kinds == [*doublings, "symmetry_breaking", *doublings, "symmetry_breaking"]
+    met = [float(point.value) for point in loop.special_points if point.kind == "symmetry_breaking"]
+    np.testing.assert_allclose(met, [float(point.value) for point in breaks[::-1]], rtol=1e-9)
+
+
 def test_derivatives_of_a_doubling_are_central_differences(broken):
     start = broken.points.y0[-40]
     force = float(broken.points.value[-40])

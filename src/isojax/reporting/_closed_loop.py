@@ -58,13 +58,14 @@ class ClosedLoop:
         return self.loop.seconds
 
     def report(self, folder: str | Path) -> None:
-        """Write report.html, result.json and model.json.
+        """Write report.html, result.json and, unless the last fit failed, model.json.
 
         Args:
             folder: where they go; made if it is not there.
 
         Raises:
-            ValueError: if something else than a folder is in the way, or the model is not finite.
+            ValueError: if something else than a folder is in the way, or a model that was found is not
+                finite.
         """
         write_report(self.loop, folder)
 

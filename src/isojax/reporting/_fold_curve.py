@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..stability import FoldCurve
-from ._stability_style import MARKS, draw_special_points, drive_unit, drive_words, quantity
+from ._stability_style import MARKS, draw_special_points, drive_unit, drive_words, mark_handle, quantity
 from ._style import BEFORE, axes_for, entitle
 
 _INSIDE = "#f7dadd"
@@ -80,16 +80,5 @@ def draw_lens(ax: Axes, curve: FoldCurve, *, filled: bool) -> list[Any]:
     handles.insert(0, Line2D([], [], color=colour, linewidth=width, label=MARKS["fold"].words))
     places = [("cusp", float(cusp.frequency), float(cusp.amplitude)) for cusp in curve.cusps]
     if draw_special_points(ax, places):
-        mark = MARKS["cusp"]
-        handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="none",
-                marker=mark.marker,
-                markersize=9,
-                color=mark.colour,
-                label=mark.words,
-            )
-        )
+        handles.append(mark_handle("cusp"))
     return handles

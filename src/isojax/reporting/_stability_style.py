@@ -132,18 +132,31 @@ def draw_special_points(
         if np.isfinite(x) and np.isfinite(y):
             found.setdefault(point if isinstance(point, str) else point.kind, []).append((x, y))
     for kind, places in found.items():
-        mark = MARKS[kind]
-        ax.plot(
-            *np.transpose(places),
-            linestyle="none",
-            marker=mark.marker,
-            markersize=9 if mark.marker == "*" else 6,
-            markerfacecolor=mark.colour,
-            markeredgecolor="#222222",
-            markeredgewidth=0.8,
-            zorder=5,
-        )
+        ax.plot(*np.transpose(places), zorder=5, **_form(MARKS[kind]))
     return tuple(found)
+
+
+def _form(mark: Mark) -> dict[str, Any]:
+    return {
+        "linestyle": "none",
+        "marker": mark.marker,
+        "markersize": 9 if mark.marker == "*" else 6,
+        "markerfacecolor": mark.colour,
+        "markeredgecolor": "#222222",
+        "markeredgewidth": 0.8,
+    }
+
+
+def mark_handle(kind: str) -> Line2D:
+    """Give the entry of a bifurcation in a legend.
+
+    Args:
+        kind: of the bifurcation.
+
+    Returns:
+        The handle.
+    """
+    return Line2D([], [], label=MARKS[kind].words, **_form(MARKS[kind]))
 
 
 def stability_legend(
@@ -166,21 +179,7 @@ def stability_legend(
     handles.append(Line2D([], [], color=grey, linewidth=1.6, label="stable"))
     if unstable:
         handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_UNSTABLE, label="unstable"))
-    for kind in MARKS:
-        if kind in set(kinds):
-            mark = MARKS[kind]
-            handles.append(
-                Line2D(
-                    [],
-                    [],
-                    linestyle="none",
-                    marker=mark.marker,
-                    markersize=9 if mark.marker == "*" else 6,
-                    markerfacecolor=mark.colour,
-                    markeredgecolor="#222222",
-                    label=mark.words,
-                )
-            )
+    handles += [mark_handle(kind) for kind in MARKS if kind in set(kinds)]
     handles += list(extra)
     ax.legend(handles=handles, fontsize=7.5, frameon=False)
 

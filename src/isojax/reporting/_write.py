@@ -1,10 +1,12 @@
 """What a closed loop leaves on disk."""
 
 import json
+import math
 from pathlib import Path
 
-from ..identification import Loop
-from ..models import Isolator, model_to_dict, write_whole
+from .._results import is_successful
+from ..identification import Fit, Loop
+from ..models import model_to_dict, write_whole
 from ._page import render_page
 from ._result import result_dict
 
@@ -31,49 +33,56 @@ def check_folder(folder: str | Path) -> Path:
 def write_report(loop: Loop, folder: str | Path) -> None:
     """Write report.html, result.json and model.json; everything is ready before the first is written.
 
+    Where the last fit failed there is no model: no model.json is written, and one of before is removed.
+
     Args:
         loop: the closed loop.
         folder: where they go; made if it is not there. Other files in it stay as they are.
 
     Raises:
-        ValueError: if something else than a folder is in the way, or the model is not finite.
+        ValueError: if something else than a folder is in the way, or a model that was found is not finite.
     """
     folder = check_folder(folder)
-    for entry in loop.after.model.parameters:
-        if entry.value != entry.value:
-            raise ValueError(
-                f"Argument `loop` must hold a finite model, but its {entry.name} is {entry.value}."
-            )
     texts = {
-        "model.json": model_text(loop.after.model),
+        "model.json": model_text(loop.after),
         "report.html": render_page(loop),
         "result.json": json.dumps(result_dict(loop), indent=1, allow_nan=False) + "\n",
     }
     write_texts(folder, texts)
 
 
-def model_text(model: Isolator) -> str:
-    """Give a model as `save_model` writes it.
+def model_text(fit: Fit) -> str | None:
+    """Give the model of a fit as `save_model` writes it.
 
     Args:
-        model: the isolator.
+        fit: the fit.
 
     Returns:
-        JSON.
+        JSON; None where the search failed, so that no one goes on with numbers that were not found.
 
     Raises:
-        ValueError: if a parameter is not finite.
+        ValueError: if a parameter of a model that was found is not finite.
     """
-    return json.dumps(model_to_dict(model), indent=1, allow_nan=False) + "\n"
+    if not is_successful(fit.result):
+        return None
+    for entry in fit.model.parameters:
+        if not math.isfinite(entry.value):
+            raise ValueError(
+                f"Argument `fit` must hold a finite model, but its {entry.name} is {entry.value}."
+            )
+    return json.dumps(model_to_dict(fit.model), indent=1, allow_nan=False) + "\n"
 
 
-def write_texts(folder: Path, texts: dict[str, str]) -> None:
+def write_texts(folder: Path, texts: dict[str, str | None]) -> None:
     """Write files whole; the folder is made now that everything to write is ready.
 
     Args:
         folder: where they go.
-        texts: content by file name.
+        texts: content by file name; None removes the file that an earlier run left.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
-        write_whole(folder / name, text)
+        if text is None:
+            (folder / name).unlink(missing_ok=True)
+        else:
+            write_whole(folder / name, text)

@@ -71,13 +71,9 @@ def fold_curve(
     Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, secs. 9.5 (cusp) and 10.3; Govaerts 2000,
     Numerical Methods for Bifurcations of Dynamical Equilibria, ch. 4.
     """
-    integrator = _check(model, amplitude_range, frequency_range, search, step, most, integrator)
-    if start is None:
-        start = _meet(model, "fold", amplitude_range, frequency_range, search, step, integrator)
-    family = _plane(model, amplitude_range, frequency_range, start, "fold")
-    symmetric = bool(np.isfinite(np.asarray(start.half_period_multipliers)).all())
-    turns = 0.5 if symmetric else float(start.periods)
-    curve = _Curve(family, integrator, "fold", turns, start, step, most)
+    window = (amplitude_range, frequency_range)
+    curve = _curve("fold", model, window, start, search, step, most, integrator)
+    family, symmetric = curve.family, curve.turns == 0.5
     unknowns, normals, closed, ended = curve.follow()
     found = curve.polished(unknowns, normals)
     cusps = []
@@ -86,7 +82,12 @@ def fold_curve(
         cusps.append(Cusp(amplitude, frequency, point.state))
     numbers = curve.numbers(found)
     return FoldCurve(
-        *numbers[:4], tuple(cusps), jnp.array(closed), start.periods, symmetric, _outcome(ended, numbers[4])
+        *numbers[:4],
+        tuple(cusps),
+        jnp.array(closed),
+        curve.start.periods,
+        symmetric,
+        _outcome(ended, numbers[4]),
     )
 
 
@@ -124,14 +125,12 @@ def period_doubling_curve(
 
     Source: as of `fold_curve`; Swift & Wiesenfeld 1984, Phys. Rev. Lett. 52:705.
     """
-    integrator = _check(model, amplitude_range, frequency_range, search, step, most, integrator)
-    if start is None:
-        start = _meet(model, "period_doubling", amplitude_range, frequency_range, search, step, integrator)
-    family = _plane(model, amplitude_range, frequency_range, start, "period_doubling")
-    curve = _Curve(family, integrator, "period_doubling", float(start.periods), start, step, most)
+    window = (amplitude_range, frequency_range)
+    curve = _curve("period_doubling", model, window, start, search, step, most, integrator)
     unknowns, normals, closed, ended = curve.follow()
     numbers = curve.numbers(curve.polished(unknowns, normals))
-    return PeriodDoublingCurve(*numbers[:4], jnp.array(closed), start.periods, _outcome(ended, numbers[4]))
+    periods = curve.start.periods
+    return PeriodDoublingCurve(*numbers[:4], jnp.array(closed), periods, _outcome(ended, numbers[4]))
 
 
 def _outcome(ended: bool, good: Array) -> RESULTS:
@@ -139,24 +138,31 @@ def _outcome(ended: bool, good: Array) -> RESULTS:
     return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
 
 
-def _check(
+def _curve(
+    kind: Kind,
     model: Isolator,
-    amplitude_range: tuple[float, float],
-    frequency_range: tuple[float, float],
+    window: tuple[tuple[float, float], tuple[float, float]],
+    start: SpecialPoint | None,
     search: int,
     step: float,
     most: int,
     integrator: Integrator | None,
-) -> Integrator:
+) -> "_Curve":
+    """Check what was asked for, and give the search for a curve from its start on."""
     check_float64()
     refuse_traced(model)
-    for name, ends in (("amplitude_range", amplitude_range), ("frequency_range", frequency_range)):
+    for name, ends in zip(("amplitude_range", "frequency_range"), window, strict=True):
         if not (len(ends) == 2 and 0.0 < ends[0] < ends[1] < math.inf):
             raise ValueError(f"Argument `{name}` must be two positive ascending numbers, but is {ends}.")
     for name, value in (("search", search), ("step", step), ("most", most)):
         if not value > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
-    return tracing_steps() if integrator is None else integrator
+    integrator = tracing_steps() if integrator is None else integrator
+    start = _meet(model, kind, *window, search, step, integrator) if start is None else start
+    family = _plane(model, *window, start, kind)
+    # Only a symmetric orbit has multipliers over half a period; a doubling never is of one.
+    symmetric = bool(np.isfinite(np.asarray(start.half_period_multipliers)).all())
+    return _Curve(family, integrator, kind, 0.5 if symmetric else float(start.periods), start, step, most)
 
 
 def _meet(

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .._results import RESULTS
+from .._results import RESULTS, is_successful
 from ..models import Integrator
 from ._branch import SpecialPoint
 from ._extended import Kind, first_places, polish_jitted
@@ -141,17 +141,24 @@ def _locate(
         low, high = jax.lax.fori_loop(0, _BISECTIONS, halve, (low, high))
         found = correct(0.5 * (low + high))
         _, slope = _slopes(here, integrator, turns, scale, found)
-        setting = here.at(found[states:])
-        begin = tuple(found[:states] * scale)
-        half = jnp.stack(period_map(setting.model, integrator, setting.drive, begin, turns=0.5)) / scale
-        once = jnp.stack(period_map(setting.model, integrator, setting.drive, begin)) / scale
-        size = jnp.max(jnp.abs(found[:states]))
-        repeats = jnp.stack(
-            [jnp.max(jnp.abs(half - found[:states])), jnp.max(jnp.abs(once - found[:states]))]
-        )
-        return found, slope[:, :states] + jnp.eye(states), repeats / size
+        repeats = _repeats(here, integrator, scale, found[:states], found[states:])
+        return found, slope[:, :states] + jnp.eye(states), repeats
 
     return jax.vmap(lane)(family.amplitude, family.frequency, scale, *ends, before, which)
+
+
+def _repeats(
+    family: Family, integrator: Integrator, scale: Array, scaled: Array, shares: Array
+) -> Float[Array, "2"]:
+    """Give the distance of the motion from its mirror image half a period on, and from itself a period on."""
+    setting = family.at(shares)
+    begin = tuple(scaled * scale)
+    later = (period_map(setting.model, integrator, setting.drive, begin, turns=turns) for turns in (0.5, 1.0))
+    off = [jnp.max(jnp.abs(jnp.stack(state) / scale - scaled)) for state in later]
+    return jnp.stack(off) / jnp.max(jnp.abs(scaled))
+
+
+_repeats_jitted = eqx.filter_jit(_repeats)
 
 
 def find_special_points(
@@ -210,11 +217,38 @@ def find_special_points(
                 (live.amplitude[lanes[index]], live.frequency[lanes[index]]),
             )
             states = scale.shape[1]
-            state, shares = found[index, :states] * scale[lanes[index]], found[index, states:]
-            points.append(
-                special_point(own, integrator, kind, own_periods, own_half, int(lanes[index]), state, shares)
-            )
+            size, lane_number = scale[lanes[index]], int(lanes[index])
+            state, shares = found[index, :states] * size, found[index, states:]
+            point = special_point(own, integrator, kind, own_periods, own_half, lane_number, state, shares)
+            crossed = _crossed(periods, half, odd) if kind == "fold" else None
+            if crossed is not None and not _is_fold(own, integrator, size, point, crossed[0]):
+                other = special_point(own, integrator, *crossed, lane_number, state, shares)
+                point = other if is_successful(other.result) else point
+            points.append(point)
     return tuple(points)
+
+
+def _crossed(periods: int, half: bool, odd: bool) -> tuple[Kind, int, bool] | None:
+    """Give what a branch meets where it crosses the one that it may have left."""
+    if odd and not half and periods == 1:
+        return "symmetry_breaking", 1, True
+    return ("period_doubling", 1, False) if periods == 2 else None
+
+
+def _is_fold(
+    family: Family, integrator: Integrator, scale: Array, point: SpecialPoint, crossing: Kind
+) -> bool:
+    """Whether a point was found and is not where the branch crosses the one that it left.
+
+    At a crossing the equations of the search are singular, so that it may stop beside it, too far for the
+    motion to count as symmetric or repeated; the fold's own equations then lead there or nowhere.
+    """
+    if not is_successful(point.result):
+        return False
+    family, point = jax.lax.stop_gradient((family, point))
+    shares = (point.value - family.start) / (family.stop - family.start)
+    mirrored, repeated = _repeats_jitted(family, integrator, scale, point.y0 / scale, shares)
+    return float(mirrored if crossing == "symmetry_breaking" else repeated) >= _MIRRORED
 
 
 def _judge(
@@ -228,10 +262,9 @@ def _judge(
     """Say which bifurcation a sign change is, of which orbit."""
     mirrored, repeated = repeats < _MIRRORED
     if which == 0:
-        if odd and not half and periods == 1 and mirrored:
-            return "symmetry_breaking", 1, True
-        if periods % 2 == 0 and periods == 2 and repeated:
-            return "period_doubling", 1, False
+        crossed = _crossed(periods, half, odd)
+        if crossed is not None and (mirrored if crossed[0] == "symmetry_breaking" else repeated):
+            return crossed
         return "fold", periods, half
     if which == 1:
         return ("symmetry_breaking" if half else "period_doubling"), periods, half
