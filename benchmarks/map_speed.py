@@ -4,8 +4,9 @@ Run `python benchmarks/map_speed.py` (needs the extra `bench`, and a C compiler 
 minutes). Printed: the first call, which compiles, in a fresh process, with that process's peak memory; then,
 of 1000 x 500 cells on two cores, the median seconds of later calls, the contestants taking turns, so that a
 busy machine slows all; half the processor time of both cores ("work"), which other programs move less; the
-errors of the multipliers against many more steps; the ratios, turn by turn; and PASS or FAIL beside each
-target. The exit status is 1 after a FAIL.
+errors of the multipliers against many more steps; seconds of maps of rising size, and of one of 200 x 100
+cells without and with its derivatives; PASS or FAIL beside each target, a ratio of times being the median of
+those of the turns; and, not judged, ratios of times and of work. The exit status is 1 after a FAIL.
 
 The peers (_map_peers.py, _map_peer.c) solve the same equations by Newton's method with the variational
 equations and stop by the same rule. Numba and C take 128 steps of RK4 a period and march up the forces, so
