@@ -1,0 +1,76 @@
+"""Springs with gaps, the quintic spring and falling friction are recovered from the simulated bench."""
+
+import numpy as np
+import pytest
+
+from isojax import rig
+from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
+from isojax.identification import fit, scales
+from isojax.identification._fit import DEFAULT_SOLVER
+from isojax.identification._refit import is_determined, refit_candidate
+from isojax.identification._score import score_test
+from isojax.models import Isolator
+
+PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(1e11), rig.LinearDamping(8e3)))
+START = Isolator(800.0, (LinearStiffness(1.05e6), CubicStiffness(1.2e11), LinearDamping(9e3)))
+PLAN = rig.Multisine((150.0, 600.0), 2.0, 14.0, period=2.0, periods=2, lines="full")
+RIVALS = ("quintic_stiffness", "stribeck_friction", "end_stop", "freeplay", "quadratic_stiffness")
+
+
+def _scored(simulated, effect, rate=200.0):
+    """Score test of a few candidates on a plant with one effect."""
+    bench = rig.Bench(rate=rate, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+    campaign = simulated(
+        PLANT.plus(effect), PLAN, 3, bench, stiffness=("linear", "cubic"), damping=("linear",)
+    )
+    found, magnitudes = fit(START, campaign), scales(campaign)
+    probes = tuple(probe for name in RIVALS for probe in CATALOGUE[name].grid(magnitudes))
+    return score_test(found.estimate, magnitudes, probes), magnitudes
+
+
+def _refitted(test, magnitudes, name):
+    index = next(place for place, score in enumerate(test.scores) if score.element.name == name)
+    found = refit_candidate(test, index, magnitudes, DEFAULT_SOLVER, 40, lambda line: None)
+    assert is_determined(found, test.scores[index])
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "expected"),
+    [
+        (rig.QuinticStiffness(3e15), {"quintic_stiffness.coefficient": 3e15}),
+        (
+            rig.EndStop(2e5, 1e-3),
+            {"end_stop.stiffness": 2e5, "end_stop.gap": 1e-3, "end_stop.side": 0.0},
+        ),
+        (rig.EndStop(2e5, 1e-3, -1.0), {"end_stop.stiffness": 1e5, "end_stop.gap": 1e-3}),
+        (rig.Freeplay(1e5, 5e-4), {"freeplay.lost_stiffness": 1e5, "freeplay.gap": 5e-4}),
+    ],
+    ids=["quintic", "two stops", "one stop", "play"],
+)
+def test_a_spring_law_is_recovered_with_its_shape(effect, expected, simulated):
+    test, magnitudes = _scored(simulated, effect)
+    leader = test.scores[0].element.name
+    found = _refitted(test, magnitudes, effect.name)
+    if leader not in {effect.name, "end_stop", "freeplay"}:
+        # A score knows no onset: one stop looks like a square of x until it is refitted.
+        assert found.chi2 < _refitted(test, magnitudes, leader).chi2 - 100.0
+    assert found.chi2 / found.dof < 1.05
+    for name, truth in expected.items():
+        error = float(found.uncertainty.standard_error[found.names.index(name)])
+        assert abs(float(found.model[name]) - truth) < 4.0 * error, name
+
+
+@pytest.mark.slow
+def test_play_and_a_stop_explain_a_record_alike(simulated):
+    test, magnitudes = _scored(simulated, rig.Freeplay(1e5, 5e-4))
+    names = [score.element.name for score in test.scores[:2]]
+    assert set(names) == {"end_stop", "freeplay"}
+    assert test.likeness[0, 1] > 0.9999
+    play, stop = (_refitted(test, magnitudes, name) for name in ("freeplay", "end_stop"))
+    # One coefficient more, the side, is worth no more than chance.
+    assert 0.0 <= play.chi2 - stop.chi2 + 2.0 < 15.0
+    np.testing.assert_allclose(
+        float(play.model["freeplay.gap"]), float(stop.model["end_stop.gap"]), rtol=0.02
+    )
