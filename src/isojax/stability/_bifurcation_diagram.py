@@ -162,6 +162,22 @@ def _points(
     return "frequency", still, varied
 
 
+def _seen(
+    model: Isolator,
+    integrator: Integrator,
+    setting: tuple[Array, Array],
+    state: State,
+    tangent: State,
+    settle: int,
+    samples: int,
+) -> tuple[tuple[State, State], tuple[Array, Array]]:
+    """Give where motion and disturbance end, and the samples and the disturbance's growth, motion first."""
+    drive = recorded_sine(model, *setting)
+    seen = watch_settled(model, integrator, drive, state, tangent, settle, samples)
+    path = jnp.moveaxis(jnp.stack(seen.samples, axis=-1), 0, 1)
+    return (seen.state, seen.tangent), (path, seen.growth.T)
+
+
 @eqx.filter_jit
 def _turned(
     model: Isolator,
@@ -178,10 +194,7 @@ def _turned(
         finite = jnp.all(jnp.isfinite(jnp.stack(state + tangent)), axis=0)
         state = tuple(jnp.where(finite, now, first) for now, first in zip(state, begin, strict=True))
         tangent = tuple(jnp.where(finite, now, 1.0) for now in tangent)
-        drive = recorded_sine(model, *setting)
-        seen = watch_settled(model, integrator, drive, state, tangent, settle, samples)
-        kept = jnp.moveaxis(jnp.stack(seen.samples, axis=-1), 0, 1), seen.growth.T
-        return (seen.state, seen.tangent), kept
+        return _seen(model, integrator, setting, state, tangent, settle, samples)
 
     ways = [slice(None, None, -1 if leg == "down" else 1) for leg in legs]
     forces = jnp.concatenate([amplitudes[way] for way in ways])
@@ -204,11 +217,11 @@ def _anew(
     samples: int,
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
     points, runs = amplitudes.size, begin[0].size
-    drive = recorded_sine(model, jnp.repeat(amplitudes, runs), jnp.repeat(frequencies, runs))
+    setting = jnp.repeat(amplitudes, runs), jnp.repeat(frequencies, runs)
     state = tuple(jnp.tile(value, points) for value in begin)
-    seen = watch_settled(model, integrator, drive, state, any_disturbance(state), settle, samples)
-    path = jnp.moveaxis(jnp.stack(seen.samples, axis=-1), 0, 1)
-    return path.reshape(points, runs, samples, -1), seen.growth.T.reshape(points, runs, samples)
+    _, kept = _seen(model, integrator, setting, state, any_disturbance(state), settle, samples)
+    path, growth = kept
+    return path.reshape(points, runs, samples, -1), growth.reshape(points, runs, samples)
 
 
 @eqx.filter_jit
