@@ -32,6 +32,10 @@ def _nodes(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lane
     return ends.reshape(time * steps, 3, lanes)
 
 
+_ENTRIES = 1.5e7
+"""Numbers that one table of columns along the motion may hold."""
+
+
 class _Family(NamedTuple):
     """Absent effects of one kind, side by side: a kind is traced once, whatever its grid.
 
@@ -286,6 +290,22 @@ def column_information(
         batch = prepared.batches[part].following(whole)
         scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
         states = share_lanes(unknowns.states, part, parts)
+        scales = share_lanes(unknowns.state_scales[:size], part, parts)
+        lanes = scale.shape[0]
+        # A table of all columns along all lanes may not fit the memory: a few lanes at a time.
+        entries = batch.drive.shape[0] * (batch.drive.shape[1] // 2) * (len(units) + whole.internal_states)
+        blocks = -(-lanes // max(1, int(_ENTRIES / entries)))
+        width = -(-lanes // blocks)
+        done = []
+        for first in range(0, lanes, width):
+            chosen = np.minimum(np.arange(first, first + width), lanes - 1)
+            some = jax.tree_util.tree_map(
+                lambda values, chosen=chosen: values[..., chosen], (batch, scale, states, scales)
+            )
+            done.append(block(*some)[: lanes - first])
+        return np.concatenate(done)
+
+    def block(batch: Batch, scale: Array, states: State, scales: State) -> np.ndarray:
         memories = _stacked_states(families, probes, states[size:])
         path, memories, u, du, channels = _path(
             model, families, scale, states[:size], memories, batch, prepared.quantity, prepared.sample_time
@@ -318,7 +338,6 @@ def column_information(
         )
         count = len(units)
         starts = np.zeros((size, count + size, lanes))
-        scales = share_lanes(unknowns.state_scales[:size], part, parts)
         for index in range(size):
             starts[index, count + index] = np.asarray(scales[index])
         response = _respond(slopes, forcing, jnp.asarray(starts), prepared.sample_time / steps)
