@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -14,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..excitations import Hold, tabulate
-from ..models import RK4, Isolator, Quantity
+from ..models import Isolator, Quantity
 from ..records import Record, measured_state
 from ._channels import channel_table
 from ._segments import Segment
@@ -47,7 +46,7 @@ class Batch(eqx.Module):
             The batch.
         """
         own = {name: self.channels[name] for name in model.channels}
-        return Batch(self.drive, self.drive_rate, self.measured, self.weight, own)
+        return Batch(self.drive, self.drive_rate, self.measured, self.weight, channels=own)
 
 
 class Prepared(NamedTuple):
@@ -195,84 +194,9 @@ def prepare(
     batches = tuple(
         Batch(
             *(turned(values, first) for values in (drive, rates, measured, weight)),
-            {name: turned(values, first) for name, values in beside.items()},
+            channels={name: turned(values, first) for name, values in beside.items()},
         )
         for first in range(0, lanes, share)
     )
     count = np.bincount(owner, weights=weight.sum(axis=1), minlength=len(records))
     return Prepared(batches, segments, owner, starts, spread, quantity, 1.0 / records[0].rate, count)
-
-
-MEMORY_STEPS = 2
-"""Integration steps a sample where internal states follow a measured motion."""
-
-
-@eqx.filter_jit
-def _memory_along(
-    model: Isolator, drive: Array, path: tuple[Array, Array], quantity: Quantity, sample_time: float
-) -> tuple[Array, ...]:
-    """Integrate the internal states along given motions, straight between samples; a lane a record."""
-    solver = RK4()
-
-    def field(t: float, internal: tuple[Array, ...], ends: tuple[Array, ...]) -> tuple[Array, ...]:
-        x0, v0, x1, v1, u = ends
-        state = (x0 + t * (x1 - x0), v0 + t * (v1 - v0), *internal)
-        return tuple(sample_time * rate for rate in model.rates(state, u, 0.0, quantity)[2:])
-
-    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
-
-    def body(
-        internal: tuple[Array, ...], ends: tuple[Array, ...]
-    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        moved = internal
-        for step in range(MEMORY_STEPS):
-            t0, t1 = step / MEMORY_STEPS, (step + 1) / MEMORY_STEPS
-            moved, *_ = solver.step(term, t0, t1, moved, ends, None, False)
-        return moved, internal
-
-    x, v = path
-    rest = tuple(jnp.zeros(x.shape[1]) for _ in range(model.internal_states))
-    return jax.lax.scan(body, rest, (x[:-1], v[:-1], x[1:], v[1:], drive[:-1]))[1]
-
-
-def _rms(values: Float[np.ndarray, " time"]) -> float:
-    """Give the rms, infinite or NaN where a value is; a memory that ran away may be too large to square."""
-    largest = float(np.max(np.abs(values)))
-    if not 0.0 < largest < np.inf:
-        return largest
-    return largest * float(np.sqrt(np.mean((values / largest) ** 2)))
-
-
-def internal_starts(
-    model: Isolator, records: tuple[Record, ...], prepared: Prepared
-) -> tuple[Float[np.ndarray, "internal lanes"], Float[np.ndarray, "internal lanes"]]:
-    """Run the internal states of a model along the measured motion.
-
-    Args:
-        model: the isolator; its memories are taken along, its force balance is not.
-        records: the records of the segments.
-        prepared: the segments.
-
-    Returns:
-        Internal states at each lane's first sample, and their rms over the lane.
-    """
-    lanes = prepared.record.size
-    starts = np.zeros((model.internal_states, lanes))
-    spread = np.ones((model.internal_states, lanes))
-    if model.internal_states == 0:
-        return starts, spread
-    length = max(record.input.size for record in records)
-    motions = np.zeros((3, length, len(records)))
-    for place, record in enumerate(records):
-        x, v = coordinate_motion(record, prepared.quantity, model.excitation == "base_acceleration")
-        motions[:, : x.size, place] = x, v, record.input
-        motions[:, x.size :, place] = motions[:, x.size - 1, place][:, None]
-    x, v, drive = (jnp.asarray(motion) for motion in motions)
-    histories = _memory_along(model, drive, (x, v), prepared.quantity, prepared.sample_time)
-    for state, history in enumerate(np.asarray(history) for history in histories):
-        for lane, segment in enumerate(prepared.segments):
-            first = min(segment.start, length - 2)
-            starts[state, lane] = history[first, segment.record]
-            piece = history[first : segment.stop, segment.record]
-            spread[state, lane] = max(_rms(piece), 1e-300)
-    return starts, spread

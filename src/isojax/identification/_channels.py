@@ -68,7 +68,7 @@ def drive_harmonic(record: Record, order: int, part: str) -> Float[np.ndarray, "
 
     Source: Gabor 1946.
     """
-    turned = hilbert(record.input - np.mean(record.input))
+    turned = np.asarray(hilbert(record.input - np.mean(record.input)))
     size = np.abs(turned)
     multiple = size * np.exp(1j * order * np.angle(turned))
     return multiple.real if part == "cosine" else multiple.imag

@@ -6,9 +6,8 @@ would add and the linearised force balance are worked out along the motion, all 
 linear, time-varying solve, which knows nothing of the effects, carries all columns.
 """
 
-import itertools
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import Any
 
 import diffrax
 import equinox as eqx
@@ -21,6 +20,7 @@ from .._parameters import list_parameters, own_parameters
 from ..elements import AbstractElement
 from ..models import RK4, Isolator, Quantity, State
 from ._batch import Batch, Prepared, workers
+from ._families import Family, find_families, follow_motion, share_states, stack_states
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, scaled_model, share_lanes
 
 
@@ -36,56 +36,10 @@ _ENTRIES = 1.5e7
 """Numbers that one table of columns along the motion may hold."""
 
 
-class _Family(NamedTuple):
-    """Absent effects of one kind, side by side: a kind is traced once, whatever its grid.
-
-    Attributes:
-        elements: the effects, their numbers stacked.
-        strengths: the strength of each.
-        places: where each stands among the absent effects.
-        states: internal states of each.
-    """
-
-    elements: AbstractElement
-    strengths: Float[Array, " member"]
-    places: tuple[int, ...]
-    states: int
-
-
-def _families(probes: tuple[AbstractElement, ...]) -> tuple[_Family, ...]:
-    """Put absent effects of one kind side by side."""
-    groups: dict[Any, list[int]] = {}
-    for place, probe in enumerate(probes):
-        groups.setdefault((type(probe), jax.tree_util.tree_structure(probe)), []).append(place)
-    families = []
-    for places in groups.values():
-        members = [probes[place] for place in places]
-        stacked = jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *members)
-        strength = getattr(stacked, stacked.strength)
-        families.append(_Family(stacked, strength, tuple(places), stacked.internal_states))
-    return tuple(families)
-
-
-def _stacked_states(families: tuple[_Family, ...], probes: tuple[AbstractElement, ...], rows: State) -> State:
-    """Give the internal states of absent effects family by family, each with its members first."""
-    ends = np.cumsum([0, *(probe.internal_states for probe in probes)])
-    return tuple(
-        jnp.stack([rows[ends[place] + state] for place in family.places])
-        for family in families
-        for state in range(family.states)
-    )
-
-
-def _own(families: tuple[_Family, ...], states: State) -> list[State]:
-    """Share stacked internal states out among the families."""
-    ends = np.cumsum([0, *(family.states for family in families)])
-    return [states[begin:end] for begin, end in itertools.pairwise(ends)]
-
-
 @eqx.filter_jit
 def _path(
     model: Isolator,
-    families: tuple[_Family, ...],
+    families: tuple[Family, ...],
     scale: Array,
     states: State,
     memories: State,
@@ -111,14 +65,14 @@ def _path(
         own = state[:size]
         rates = current.rates(own, u, du, quantity, channels=beside)
         y = current.reading(own, u, du, quantity, beside)
+        base = current.drive(u, du, beside) if current.excitation == "base_acceleration" else None
         followed: list[Array] = []
-        for family, internal in zip(families, _own(families, state[size:]), strict=True):
+        for family, internal in zip(families, share_states(families, state[size:]), strict=True):
             if not family.states:
                 continue
 
             def follow(element: AbstractElement, s: State) -> State:
-                law, sensed = element.state_rate(own[0], own[1], s), element.reading_rate(y, s)
-                return tuple(one + other for one, other in zip(law, sensed, strict=True))
+                return follow_motion(element, own[0], own[1], y, base, s)
 
             followed.extend(jax.vmap(follow)(family.elements, internal))
         return tuple(step * value for value in (*rates, *followed))
@@ -141,7 +95,7 @@ _Change = tuple[tuple[Array, ...], Array]
 @eqx.filter_jit
 def _partials(
     model: Isolator,
-    families: tuple[_Family, ...],
+    families: tuple[Family, ...],
     moving: tuple[int, ...],
     scale: Array,
     path: State,
@@ -179,7 +133,7 @@ def _partials(
 
     present = scaled_model(model, values, scale)
     by_probe: dict[int, _Change] = {}
-    for family, own in zip(families, _own(families, memories), strict=True):
+    for family, own in zip(families, share_states(families, memories), strict=True):
 
         def by_strength(element: AbstractElement, strength: Array, internal: State) -> _Change:
             def with_strength(number: Array) -> _Change:
@@ -273,7 +227,7 @@ def column_information(
     whole = unknowns.model
     model = Isolator(whole.mass, whole.elements[:carried], whole.excitation)
     probes = whole.elements[carried:]
-    families = _families(probes)
+    families = find_families(probes)
     size = 2 + model.internal_states
     moving = tuple(int(np.flatnonzero(column)[0]) for column in unknowns.directions.T)
     units = [float(unknowns.directions[place, index]) for index, place in enumerate(moving)]
@@ -306,7 +260,7 @@ def column_information(
         return np.concatenate(done)
 
     def block(batch: Batch, scale: Array, states: State, scales: State) -> np.ndarray:
-        memories = _stacked_states(families, probes, states[size:])
+        memories = stack_states(families, probes, states[size:])
         path, memories, u, du, channels = _path(
             model, families, scale, states[:size], memories, batch, prepared.quantity, prepared.sample_time
         )

@@ -10,10 +10,11 @@ from .._parameters import list_parameters
 from ..excitations import Hold
 from ..models import Integrator, Isolator, Quantity
 from ..records import Record
-from ._batch import Prepared, internal_starts, prepare
+from ._batch import Prepared, prepare
 from ._columns import column_information
 from ._elimination import Nuisances, Reduced, eliminate
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, information
+from ._memories import internal_starts
 from ._segments import Segment
 
 

@@ -18,6 +18,7 @@ from ..models import Integrator, Isolator
 from ._axis import ascending
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._drive import Sine
+from ._map_error import sampled_error, steps_needed
 from ._pass import (
     FOUND,
     NOT_CONVERGED,
@@ -26,9 +27,7 @@ from ._pass import (
     Lane,
     Method,
     cell_solvers,
-    sampled_error,
     states_at_zero,
-    steps_needed,
 )
 from ._starts import Candidates, find_candidates
 from ._surface import Surface, find_surface
@@ -259,7 +258,7 @@ def _gridded(
     names = {"states": "start", "radius": "spectral_radius", "swing": "response"}
     names |= {name: name for name in ("direction", "phases", "multipliers")}
 
-    def onto_grid(values: np.ndarray, missing: complex) -> np.ndarray:
+    def onto_grid(values: np.ndarray, missing: float | int | bool) -> np.ndarray:
         grid = values
         if not whole:
             grid = np.full((orbits * rows * columns, *values.shape[1:]), missing, dtype=values.dtype)

@@ -21,20 +21,11 @@ from ._surface import Surface
 _PASSES = 12
 """Newton steps after which a cell counts as failed."""
 
-_SAMPLED = 1024
+SAMPLED = 1024
 """Cells of which the integration error is found, and that share a further pass where the first did not do."""
 
-_CLOSED = 1e-9
+CLOSED = 1e-9
 """Relative step after which an orbit is closed far better than it is integrated."""
-
-_MARGIN = 1.03
-"""On the steps of a map that a sample of its orbits needs: the worst cell is seldom in the sample."""
-
-_DOUBLINGS = 3
-"""Trials with twice the steps where some orbits were not found."""
-
-_FINER = 4
-"""Times the steps of a map with which its error is found."""
 
 _WIDE = {"xla_cpu_prefer_vector_width": 512}
 """A tenth faster where processors have such vectors; the compiler's own preference is half of it."""
@@ -159,7 +150,7 @@ def newton_step(model: Isolator, method: Method, lane: Lane) -> tuple[State, Flo
     return step, matrix
 
 
-@eqx.filter_jit(compiler_options=_WIDE)
+@eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
 def _pass(model: Isolator, method: Method, lanes: Lane) -> tuple[State, Lanes, Array, Lanes]:
     step, matrix = jax.vmap(lambda lane: newton_step(model, method, lane))(lanes)
     state, swing, omega = lanes.state, lanes.swing, lanes.drive.angular_frequency
@@ -173,7 +164,7 @@ def _pass(model: Isolator, method: Method, lanes: Lane) -> tuple[State, Lanes, A
     return moved, size, roots, modulus(roots[..., 0])
 
 
-@eqx.filter_jit(compiler_options=_WIDE)
+@eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
 def _lanes(model: Isolator, tables: Any, where: Any) -> Lane:
     stacked, displacements, rest, forces, frequencies = tables
     force, column, interval = where
@@ -210,7 +201,7 @@ class CellSolver(eqx.Module):
         Returns:
             Their orbits.
         """
-        where = jax.device_put([_padded(values, size) for values in candidates[:3]], self.sharding)
+        where = jax.device_put([padded(values, size) for values in candidates[:3]], self.sharding)
         lanes = _lanes(self.model, self.tables, where)
         return self.improve(self.method, lanes, candidates.force.size, limit)
 
@@ -236,9 +227,9 @@ class CellSolver(eqx.Module):
                 break
             if not step.flags.writeable:
                 lanes, step, roots, radius = jax.tree_util.tree_map(np.array, (lanes, step, roots, radius))
-            for begin in range(0, late.size, _SAMPLED):
-                block = late[begin : begin + _SAMPLED]
-                some = jax.tree_util.tree_map(lambda it, block=block: _padded(it[block], _SAMPLED), lanes)
+            for begin in range(0, late.size, SAMPLED):
+                block = late[begin : begin + SAMPLED]
+                some = jax.tree_util.tree_map(lambda it, block=block: padded(it[block], SAMPLED), lanes)
                 again = _pass(self.model, method, jax.device_put(some, self.sharding))
                 targets = [*lanes.state, step, roots, radius]
                 for target, value in zip(targets, [*again[0], *again[1:]], strict=True):
@@ -249,7 +240,7 @@ class CellSolver(eqx.Module):
         push = np.hypot(lanes.drive.sine, lanes.drive.cosine)
         direction = np.stack([lanes.drive.sine / push, lanes.drive.cosine / push], axis=-1)
         phases = np.stack(lanes.phases, axis=-1) if lanes.phases else np.zeros((count, 0))
-        numbers = (states, roots, radius, lanes.swing)
+        numbers = (states, roots, radius, np.asarray(lanes.swing))
         if (code != FOUND).any():
             numbers = tuple(np.array(values) for values in numbers)
             for values in numbers:
@@ -258,8 +249,16 @@ class CellSolver(eqx.Module):
         return Found(states, direction, phases, roots, radius, swing, code)
 
 
-def _padded(values: np.ndarray, size: int) -> np.ndarray:
-    """Fill up to a fixed length by repeating the last value, so that one compiled pass serves."""
+def padded(values: np.ndarray, size: int) -> np.ndarray:
+    """Fill up to a fixed length by repeating the last value, so that one compiled pass serves.
+
+    Args:
+        values: the values.
+        size: the length.
+
+    Returns:
+        Values of that length.
+    """
     return np.concatenate([values, np.repeat(values[-1:], size - values.shape[0], axis=0)])
 
 
@@ -294,95 +293,6 @@ def cell_solvers(
     split = Method(integrator, half, jnp.asarray(surface.sides), steps)
     whole = Method(integrator, half, None, 4 * steps)
     return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
-
-
-def sampled_error(
-    solver: CellSolver, candidates: Candidates, found: Found, forces: np.ndarray, frequencies: np.ndarray
-) -> float:
-    """Give the integration error of multipliers, from a sample of cells solved with steps four times finer.
-
-    The distance of a multiplier from the finer ones is their characteristic polynomial there over its slope.
-    The slope counts as 0.1 at least: where two multipliers all but coincide they part like the square root of
-    any error, and their distance would say more of the place than of the integration.
-
-    Args:
-        solver: that of the map.
-        candidates: of the map.
-        found: their orbits.
-        forces: drive amplitudes of the map.
-        frequencies: of the map [Hz].
-
-    Returns:
-        The largest error; NaN where nothing was found.
-    """
-    good = np.flatnonzero(found.code == FOUND)
-    if not good.size:
-        return float("nan")
-    picked = good[np.unique(np.linspace(0, good.size - 1, _SAMPLED).astype(int))]
-    lanes = lanes_of(found, candidates, forces, frequencies, picked)
-    lanes = jax.tree_util.tree_map(lambda values: jnp.asarray(_padded(np.asarray(values), _SAMPLED)), lanes)
-    # So far that what is left is the error of the integration alone.
-    finer = solver.improve(solver.method.finer(_FINER), lanes, picked.size, limit=_CLOSED)
-    distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
-    distance.sort(axis=2)
-    nearest, others = distance[..., 0], distance[..., 1:]
-    ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), 0.1)
-    return float(np.nanmax(nearest * ratio))
-
-
-def steps_needed(
-    solver: CellSolver, candidates: Candidates, forces: np.ndarray, frequencies: np.ndarray
-) -> int:
-    """Give the steps a period at which the multipliers of a map are as good as its integrator promises.
-
-    From a sample of orbits and the order of the integrator: the error falls with the fourth power.
-
-    Args:
-        solver: with the steps that are tried.
-        candidates: of the map.
-        forces: drive amplitudes of the map.
-        frequencies: of the map [Hz].
-
-    Returns:
-        Steps a period, even.
-    """
-    integrator = solver.method.integrator
-    picked = np.unique(np.linspace(0, candidates.force.size - 1, _SAMPLED).astype(int))
-    some = Candidates(*(values[picked] for values in candidates))
-    taken = integrator.steps_per_period
-    for _ in range(_DOUBLINGS):
-        found = solver(some, _SAMPLED, limit=_CLOSED)
-        if (found.code == FOUND).all():
-            break
-        # Where the motion is too fast for the steps there is no orbit, and no error to go by.
-        solver, taken = eqx.tree_at(lambda it: it.method, solver, solver.method.finer(2)), 2 * taken
-    error = sampled_error(solver, some, found, forces, frequencies)
-    if not error > 0.0:
-        return integrator.steps_per_period
-    times = _MARGIN * (error / integrator.map_error) ** 0.25
-    return 2 * math.ceil(0.5 * taken * min(max(times, 0.5), 128.0))
-
-
-def lanes_of(
-    found: Found, candidates: Candidates, forces: np.ndarray, frequencies: np.ndarray, picked: np.ndarray
-) -> Lane:
-    """Give orbits that were found as starts.
-
-    Args:
-        found: the orbits.
-        candidates: what they were found from.
-        forces: drive amplitudes of the map.
-        frequencies: of the map [Hz].
-        picked: which of them.
-
-    Returns:
-        Lanes.
-    """
-    push = forces[candidates.force[picked]]
-    sine, cosine = (jnp.asarray(push * part) for part in found.direction[picked].T)
-    drive = Sine(sine, cosine, jnp.asarray(frequencies[candidates.frequency[picked]]))
-    state, phases = (tuple(jnp.asarray(values[picked].T)) for values in (found.states, found.phases))
-    return Lane(state, drive, phases, jnp.asarray(found.swing[picked]))
 
 
 @eqx.filter_jit
