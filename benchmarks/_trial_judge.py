@@ -14,7 +14,7 @@ CLEAR = 3.0
 GOOD = 1.05
 """chi2/dof up to which a fit needs no explanation."""
 
-WORTH = 0.05
+WORTH = 0.02
 """Held-out excess, in chi2/dof, that the oracle must remove for a share of it to mean anything."""
 
 
