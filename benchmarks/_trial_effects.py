@@ -230,7 +230,8 @@ EFFECTS: dict[str, Hidden] = {
         near={"quadratic_stiffness": "beside a free cubic spring the gas law is its square of x"},
     ),
     "end_stop": Hidden(
-        lambda size, shape: rig.EndStop(size, shape["gap"], shape["side"]),
+        # The catalogue gives the mean of both stops.
+        lambda size, shape: rig.EndStop(size * (1.0 + abs(shape["side"])), shape["gap"], shape["side"]),
         lambda motion: 0.5 * motion.k1,
         _stop_shape,
         near={"freeplay": "exact for a two-sided stop beside a free spring"},

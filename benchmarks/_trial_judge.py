@@ -140,7 +140,7 @@ def table(rows: list[Row]) -> list[Mark]:
     worth = [
         row
         for row in (*one, *two)
-        if "oracle" in row and row["before"]["holdout"] - row["oracle"]["holdout"] > WORTH
+        if row.get("oracle_converged") and row["before"]["holdout"] - row["oracle"]["holdout"] > WORTH
     ]
     shares = np.array([removed(row) for row in worth])
     wrong_sign = [

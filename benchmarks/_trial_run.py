@@ -11,7 +11,9 @@ import numpy as np
 
 from _trial_campaign import Secret, Sketch, file_campaign, secrets, sketch, twin
 from _trial_effects import EFFECTS, element_of, exact_class
+from isojax._parameters import own_parameters
 from isojax._results import is_successful
+from isojax.elements import AbstractElement
 from isojax.identification import (
     Fit,
     Loop,
@@ -185,7 +187,8 @@ def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign) -> Ro
     truth = drawn.model.with_elements(
         *(element_of(secret.name, secret.shape, magnitudes, secret.size) for secret in hidden)
     )
-    found = fit(truth, campaign)
+    start = drawn.model.with_elements(*(_off_its_bounds(one) for one in truth.elements[len(drawn.base) :]))
+    found = fit(start, campaign)
     off = {
         name: (float(found.model[name]) - float(truth[name])) / error
         for name, error in found.standard_errors.items()
@@ -195,6 +198,16 @@ def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign) -> Ro
         "oracle_converged": bool(is_successful(found.result)),
         "off": {name: (value if np.isfinite(value) else None) for name, value in off.items()},
     }
+
+
+def _off_its_bounds(element: AbstractElement) -> AbstractElement:
+    """Give an element whose fitted numbers may move: at the very bound of an interval nothing would."""
+    numbers = dict(vars(element))
+    for name, spec in own_parameters(element):
+        if spec.fitted and np.isfinite(spec.upper - spec.lower):
+            margin = 0.02 * (spec.upper - spec.lower)
+            numbers[name] = float(np.clip(numbers[name], spec.lower + margin, spec.upper - margin))
+    return type(element)(**numbers)
 
 
 def crowded(most: int = 30_000) -> bool:

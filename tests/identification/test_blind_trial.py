@@ -147,6 +147,8 @@ def _row(seed, kind, truth, findings, **more):
         ],
         "verdict": "found" if findings else "none",
         "oracle": {"fit": 1.0, "holdout": 1.0},
+        "oracle_converged": True,
+        "off": {},
         "seconds": 5.0,
         **errors,
         **more,
