@@ -68,10 +68,10 @@ def drive_harmonic(record: Record, order: int, part: str) -> Float[np.ndarray, "
 
     Source: Gabor 1946.
     """
-    turned = np.asarray(hilbert(record.input - np.mean(record.input)))
+    turned: np.ndarray = np.asarray(hilbert(record.input - np.mean(record.input)), dtype=complex)
     size = np.abs(turned)
     multiple = size * np.exp(1j * order * np.angle(turned))
-    return multiple.real if part == "cosine" else multiple.imag
+    return np.real(multiple) if part == "cosine" else np.imag(multiple)
 
 
 def output_line(record: Record, frequency: float) -> complex:

@@ -7,7 +7,7 @@ from typing import Any
 from .._results import RESULTS, is_successful
 from ..records import Campaign
 from ._classical_guess import classical_guess
-from ._diagnose import MOST_OF_IT, diagnose, is_good
+from ._diagnose import GOOD, MOST_OF_IT, diagnose, is_good
 from ._findings import Extension, Loop, Verdict, VerdictWord
 from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
 from ._look_ahead import find_superfluous
@@ -85,7 +85,7 @@ def close_loop(
         before,
         extensions,
         current,
-        _overall(current, first, bool(extensions), verdict),
+        _overall(before, current, bool(extensions), verdict),
         verdict,
         verdict.bounds,
         time.perf_counter() - begin,
@@ -159,13 +159,14 @@ def _revise(
     return (again, last) if bic(new, inflation) <= bic(old, inflation) else (extensions, verdict)
 
 
-def _overall(final: Fit, first_excess: float, any_found: bool, last: Verdict) -> VerdictWord:
+def _overall(before: Fit, final: Fit, any_found: bool, last: Verdict) -> VerdictWord:
     """Give the verdict over all iterations."""
     found = final.estimate
-    good = is_good(found.chi2 / found.dof, found.excess, first_excess)
+    first = before.estimate
+    good = is_good(found.chi2 / found.dof, found.excess, first.excess)
     if not any_found or not is_successful(final.result):
         return last.verdict
-    if good:
+    explained = 1.0 - found.excess / max(first.excess, 1.0)
+    if good and (first.chi2 / first.dof <= GOOD or explained >= MOST_OF_IT):
         return "found"
-    explained = 1.0 - found.excess / max(first_excess, 1.0)
     return "partly_explained" if explained >= MOST_OF_IT else "unexplained"

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from .._parameters import list_parameters, own_parameters
+from .._parameters import list_parameters
 from .._results import RESULTS
-from ..elements import AbstractElement, Scales
+from ..elements import CATALOGUE, Scales
 from ._admissible import find_violation
 from ._balance_start import find_balance_start
+from ._bounds import strength_unit, upper_bounds
 from ._estimate import Estimate
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
@@ -39,8 +40,9 @@ LEFT_OVER = 0.03
 MOST_OF_IT = 0.8
 """Share of the excess that an effect must explain to be the explanation."""
 
-SMALLEST_GAIN = 0.002
-"""Gain in chi2/dof below which no effect is named: with half a million samples anything is significant."""
+SMALLEST_GAIN = 0.0005
+"""Gain in chi2/dof below which no effect is named, and no effect told from another: with half a million
+samples anything is significant, and no bench is as good as that."""
 
 SMALLEST_SHARE = 0.2
 """Share of the remaining excess that an effect must explain to be named where the fit is not good."""
@@ -194,10 +196,27 @@ def _without_imitations(
 
 
 def _by_evidence(refits: list[Refit]) -> list[Refit]:
-    """List the refits that nothing speaks against, best first."""
+    """List the refits that nothing speaks against, best first.
+
+    Of those that these data do not tell apart the simplest goes first: fewest coefficients, then memories.
+    """
     usable = [refit for refit in refits if refit.violation is None]
+    if not usable:
+        return usable
     inflation = _inflation(usable)
-    return sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
+    usable = sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
+    most = bic(usable[0].estimate, inflation) + _close(usable[0].estimate)
+
+    def simplicity(refit: Refit) -> tuple[float, float]:
+        return len(refit.estimate.places), refit.estimate.model.internal_states
+
+    first = min((one for one in usable if bic(one.estimate, inflation) <= most), key=simplicity)
+    return [first, *(one for one in usable if one is not first)]
+
+
+def _close(found: Estimate) -> float:
+    """Give the difference of Schwarz's criterion up to which two effects are not told apart."""
+    return max(CLOSE_BIC, SMALLEST_GAIN * found.dof)
 
 
 def _inflation(usable: list[Refit]) -> float:
@@ -221,12 +240,12 @@ def _judge(
     inflation = _inflation(usable)
     good = is_good(fitted.chi2 / fitted.dof, fitted.excess, first_excess)
     ranking = _ranking(test, refits, usable, inflation)
-    bounds = _bounds(test, fitted, None)
+    bounds = upper_bounds(test, fitted, None) if fitted.chi2 / fitted.dof <= GOOD else {}
     if usable:
         best = usable[0]
         gain = fitted.chi2 - best.estimate.chi2
         extra = len(best.estimate.places) - len(fitted.places)
-        needed = max(SMALLEST_GAIN, _needed_share(fitted, good) * fitted.excess / fitted.dof)
+        needed = max(SMALLEST_GAIN, _needed_share(fitted) * fitted.excess / fitted.dof)
         enough = gain / fitted.dof >= needed
         clear = bic(fitted, inflation) - bic(best.estimate, inflation) > CLOSE_BIC
         share = transferred_share(fit, best.estimate, scales, solver, progress) if enough and clear else 0.0
@@ -254,15 +273,13 @@ def _too_little(best: Refit, gain: float, fitted: Estimate, extra: int) -> str:
     return f"adding {best.score.element.name} {gained} with {more}"
 
 
-def _needed_share(fitted: Estimate, good: bool) -> float:
+def _needed_share(fitted: Estimate) -> float:
     """Give the share of the remaining excess that an effect must explain to be named.
 
-    Where hardly any of the first excess is left and yet more than noise, every small error of the model is
-    significant: only what explains most of the rest counts there.
+    Where more than noise is left every small error of the model is significant: only what explains a good
+    part of the rest counts there.
     """
-    if fitted.chi2 / fitted.dof <= GOOD:
-        return 0.0
-    return MOST_OF_IT if good else SMALLEST_SHARE
+    return 0.0 if fitted.chi2 / fitted.dof <= GOOD else SMALLEST_SHARE
 
 
 def _found(
@@ -283,8 +300,10 @@ def _found(
         for entry in ranking
         if entry.effect != name
         and entry.admissible
+        # A law that contains the finding follows it everywhere, and was not found to say more.
+        and name not in CATALOGUE[entry.effect].absorbs
         and (
-            entry.delta_bic <= CLOSE_BIC
+            entry.delta_bic <= _close(best.estimate)
             or (np.isnan(entry.delta_bic) and abs(entry.likeness) > CLOSE_LIKENESS)
         )
     )
@@ -298,7 +317,9 @@ def _found(
         separating_experiment(name, together),
     )
     good = is_good(best.estimate.chi2 / best.estimate.dof, best.estimate.excess, first_excess)
-    if good:
+    # Where there was little to explain, that the fit is good is all that can be asked.
+    small = fitted.chi2 / fitted.dof <= GOOD
+    if good and (small or explained >= MOST_OF_IT):
         verdict = "found"
     elif explained >= MOST_OF_IT:
         verdict = "partly_explained"
@@ -307,15 +328,10 @@ def _found(
     left = best.estimate.excess / max(fitted.excess, 1.0)
     before, after = fitted.chi2 / fitted.dof, best.estimate.chi2 / best.estimate.dof
     reason = f"Adding {best.score.element.words} takes chi2/dof from {before:.4g} to {after:.4g}."
-    bounds = _bounds(test, fitted, name)
+    bounds = upper_bounds(test, fitted, name) if fitted.chi2 / fitted.dof <= GOOD else {}
     return Verdict(
         verdict, finding, ranking, together, float(max(left, 0.0)), test.hidden, bounds, best.estimate, reason
     )
-
-
-def _strength(element: AbstractElement) -> str:
-    """Give the unit of an element's strength."""
-    return dict(own_parameters(element))[element.strength].unit
 
 
 def _ranking(
@@ -353,7 +369,7 @@ def _ranking(
             score.visibility,
             strength,
             error,
-            _strength(score.element),
+            strength_unit(score.element),
             chi2,
             delta,
             likeness,
@@ -364,19 +380,3 @@ def _ranking(
     first = [test.scores[order[name]] for name in names]
     rest = [score for score in test.scores if score.element.name not in names]
     return tuple(candidate(score) for score in (*first, *rest))
-
-
-def _bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
-    """Say how large each effect that was not found could still be; nothing where the fit is not good.
-
-    A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
-    linear step from there says nothing of any strength.
-    """
-    if not fitted.chi2 / fitted.dof <= GOOD:
-        return {}
-    inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
-    return {
-        score.element.name: (abs(score.strength) + 1.96 * inflation * score.error, _strength(score.element))
-        for score in test.scores
-        if score.element.name != found
-    }

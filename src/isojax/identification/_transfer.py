@@ -10,19 +10,21 @@ from ..elements import Scales
 from ._errors import restart_records
 from ._estimate import Estimate, estimate
 from ._fit import Fit
-from ._problem import Bench, Problem
+from ._problem import Bench, Problem, one_hot
 
 
 def _split(problem: Problem) -> tuple[Problem, Problem]:
-    """Leave out the records of the highest level but one; without levels the second half of the segments."""
+    """Leave out the records of the highest level but one; without three levels every other segment.
+
+    Two levels are not parted: a law fitted to the lower alone says little of the upper.
+    """
     levels = sorted({record.level for record in problem.records if record.level is not None})
     if len(levels) >= 3:
         out = {place for place, record in enumerate(problem.records) if record.level == levels[-2]}
         seen = tuple(part for part in problem.segments if part.record not in out)
         unseen = tuple(part for part in problem.segments if part.record in out)
     elif len(problem.segments) >= 4:
-        half = len(problem.segments) // 2
-        seen, unseen = problem.segments[:half], problem.segments[half:]
+        seen, unseen = problem.segments[::2], problem.segments[1::2]
     else:
         seen = unseen = ()
         for part in problem.segments:
@@ -32,13 +34,33 @@ def _split(problem: Problem) -> tuple[Problem, Problem]:
     return problem._replace(segments=seen, heads=()), problem._replace(segments=unseen, heads=())
 
 
+def _excess_unseen(part: Estimate, unseen: Problem, spread: float) -> float:
+    """Give chi2 - dof of data that a refit did not see, its coefficients no surer than the refit made them.
+
+    With r the whitened error, J its slopes and C the covariance of the coefficients, chi2 is
+    `r' (I + J C J')^-1 r = r'r - r'J (C^-1 + J'J)^-1 J'r`.
+    """
+    bench = Bench(unseen)
+    nuisances = restart_records(bench, part.model, spread).point.nuisances
+    known = part.point.reduced.matrix[:-1, :-1]
+    sizes = 1.0 / np.sqrt(np.maximum(np.diag(known), 1e-300))
+    point = bench.evaluate(part.model, one_hot(part.model, part.places, list(sizes)), nuisances)
+    matrix = point.reduced.matrix
+    slopes, error = matrix[:-1, :-1], matrix[:-1, -1]
+    if not np.all(np.isfinite(matrix)):
+        return float("nan")
+    step = np.linalg.lstsq(known * np.outer(sizes, sizes) + slopes, error, rcond=1e-12)[0]
+    return float(matrix[-1, -1] - error @ step - point.free_samples)
+
+
 def transferred_share(
     fit: Fit, extended: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]
 ) -> float:
     """Give the share of the excess that an effect removes on data its refit did not see.
 
     Both models, without and with the effect, are refitted without a part of the data (a level, or half) and
-    held against that part; no coefficient is touched there.
+    held against that part; no coefficient is touched there, but each may be wrong by what its refit leaves
+    open.
 
     Args:
         fit: the fit without the effect.
@@ -69,8 +91,7 @@ def transferred_share(
         )
         if part.result == RESULTS.not_finite:
             return 0.0
-        point = restart_records(Bench(unseen), part.model, nuisances.stiffness_spread).point
-        excess.append(point.chi2 - point.free_samples)
-    if not np.isfinite(excess[1]):
+        excess.append(_excess_unseen(part, unseen, nuisances.stiffness_spread))
+    if not np.all(np.isfinite(excess)):
         return 0.0
     return float(1.0 - excess[1] / max(excess[0], 1.0)) if excess[1] < excess[0] else 0.0
