@@ -29,6 +29,7 @@ class AsymmetricFriction(AbstractElement):
     name: ClassVar[str] = "asymmetric_friction"
     words: ClassVar[str] = "direction-dependent friction"
     strength: ClassVar[str] = "difference"
+    needs: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
     signed: ClassVar[bool] = True
     substeps: ClassVar[int] = 4
 

@@ -54,6 +54,7 @@ class AbstractElement(eqx.Module):
         internal_states: how many internal states it carries.
         substeps: integration steps a sample that the law needs at least (sharp laws need more than one).
         absorbs: catalogue names of effects that this one contains; it takes their place in a model.
+        needs: catalogue names of effects without which this one means nothing.
         channels: signals made from the record that the effect follows, such as the clock; without a record it
             is absent.
         phased: whether those signals carry a phase of each record's own, found in the record.
@@ -66,6 +67,7 @@ class AbstractElement(eqx.Module):
     internal_states: ClassVar[int] = 0
     substeps: ClassVar[int] = 1
     absorbs: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[tuple[str, ...]] = ()
     channels: ClassVar[tuple[str, ...]] = ()
     phased: ClassVar[bool] = False
 

@@ -32,6 +32,7 @@ class Freeplay(AbstractElement):
     name: ClassVar[str] = "freeplay"
     words: ClassVar[str] = "free gap (freeplay)"
     strength: ClassVar[str] = "lost_stiffness"
+    needs: ClassVar[tuple[str, ...]] = ("linear_stiffness",)
     substeps: ClassVar[int] = 4
 
     lost_stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)

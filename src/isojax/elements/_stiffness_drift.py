@@ -23,6 +23,7 @@ class StiffnessDrift(AbstractElement):
     words: ClassVar[str] = "drift of the linear stiffness in the course of the test"
     strength: ClassVar[str] = "change"
     signed: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("linear_stiffness",)
     channels: ClassVar[tuple[str, ...]] = ("clock",)
 
     change: Scalar = parameter(symbol="dk", unit="N/m")

@@ -10,6 +10,28 @@ from scipy.signal.windows import blackmanharris
 from ..excitations import Hold, tabulate
 from ..records import Record
 
+_MAINS = 60.0
+"""Highest frequency of the mains [Hz]."""
+
+
+def meaningless(records: tuple[Record, ...]) -> tuple[str, ...]:
+    """Name the effects whose signals mean nothing in some of these records.
+
+    The phase of a drive is that of a sine or a sweep; hum must lie below half the sampling rate.
+
+    Args:
+        records: the records.
+
+    Returns:
+        Catalogue names.
+    """
+    names = []
+    if not all(record.kind in ("stepped_sine", "swept") for record in records):
+        names.append("drive_harmonics")
+    if any(record.rate <= 2.0 * _MAINS for record in records):
+        names.append("mains_hum")
+    return tuple(names)
+
 
 def channel_table(
     name: str, record: Record, hold: Hold, substeps: int, shift: float

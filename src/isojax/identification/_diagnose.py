@@ -12,6 +12,7 @@ from ..elements import CATALOGUE, Scales
 from ._admissible import find_violation
 from ._balance_start import find_balance_start
 from ._bounds import strength_unit, upper_bounds
+from ._channels import meaningless
 from ._estimate import Estimate
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
@@ -105,7 +106,7 @@ def diagnose(
         reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[fit.result]}"
         return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
     scales = campaign_scales(fit.campaign)
-    probes = absent_effects(fitted.model, scales, excluded)
+    probes = absent_effects(fitted.model, scales, (*excluded, *meaningless(fit.campaign.fit_records)))
     progress(f"score test of {len({probe.name for probe in probes})} absent effects")
     test = score_test(fitted, scales, probes)
     first = fitted.excess if first_excess is None else first_excess
@@ -207,7 +208,7 @@ def _by_evidence(refits: list[Refit]) -> list[Refit]:
     usable = sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
     most = bic(usable[0].estimate, inflation) + _close(usable[0].estimate)
 
-    def simplicity(refit: Refit) -> tuple[float, float]:
+    def simplicity(refit: Refit) -> tuple[int, int]:
         return len(refit.estimate.places), refit.estimate.model.internal_states
 
     first = min((one for one in usable if bic(one.estimate, inflation) <= most), key=simplicity)

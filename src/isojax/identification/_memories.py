@@ -48,11 +48,11 @@ def _along(
     def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
         internal, first, total = carry
         index, now, ahead = table
-        first = tuple(jnp.where(index == begin, s, kept) for s, kept in zip(internal, first, strict=True))
+        started, past = (index == begin)[None], (index >= begin)[None]
+        first = tuple(jnp.where(started, s, kept) for s, kept in zip(internal, first, strict=True))
         # Not the square: a memory that ran away may be too large for it.
         total = tuple(
-            jnp.where(index >= begin, part + jnp.abs(s), part)
-            for s, part in zip(internal, total, strict=True)
+            jnp.where(past, part + jnp.abs(s), part) for s, part in zip(internal, total, strict=True)
         )
         for step in range(_STEPS):
             t0, t1 = step / _STEPS, (step + 1) / _STEPS
@@ -63,7 +63,7 @@ def _along(
     rest = tuple(jnp.zeros((len(family.places), lanes)) for family in families for _ in range(family.states))
     now, ahead = (tuple(values[part] for values in motion) for part in (slice(None, -1), slice(1, None)))
     (_, first, total), _ = jax.lax.scan(body, (rest, rest, rest), (jnp.arange(length - 1), now, ahead))
-    count = jnp.maximum(length - 1 - begin, 1)
+    count = jnp.maximum(length - 1 - begin, 1)[None]
     return first, tuple(part / count for part in total)
 
 

@@ -83,12 +83,13 @@ def absent_effects(
     Returns:
         Elements at zero strength.
     """
-    present = {element.name for element in model.elements} | set(excluded)
+    held = {element.name for element in model.elements}
+    present = held | set(excluded)
     present |= {name for element in model.elements for name in element.absorbs}
     return tuple(
         probe
         for name, kind in sorted(CATALOGUE.items())
-        if name not in present
+        if name not in present and held.issuperset(kind.needs)
         for probe in kind.grid(scales)
     )
 

@@ -1,0 +1,203 @@
+"""Signals made from a record beside its drive, and the effects that follow them."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import signal, stats
+from scipy.integrate import solve_ivp
+
+from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness
+from isojax.identification import diagnose, fit
+from isojax.identification._channels import channel_table, drive_harmonic, output_line
+from isojax.models import Isolator
+from isojax.records import Record
+
+RATE = 50.0
+MASS, STIFFNESS, DAMPING = 800.0, 1.1e6, 9e3
+BASE = Isolator(MASS, (LinearStiffness(1.05e6), LinearDamping(1e4)))
+
+
+def record(drive, output, name="one", **fields) -> Record:
+    time = np.arange(drive.size) / RATE
+    return Record(name, Path(f"{name}.npz"), time, RATE, drive, output, drive, output, **fields)
+
+
+def multisine(seed: int, periods: int = 3, size: int = 400) -> np.ndarray:
+    """Random phases up to a quarter of the sampling rate."""
+    rng = np.random.default_rng(seed)
+    spectrum = np.zeros(size // 2 + 1, complex)
+    spectrum[8 : size // 4] = np.exp(2j * np.pi * rng.random(size // 4 - 8))
+    one = np.fft.irfft(spectrum, size)
+    return np.tile(150.0 * one / np.std(one), periods)
+
+
+def displacements(noise: float) -> dict[str, object]:
+    """How the output channel is declared."""
+    return {"quantity": "displacement", "column": "y", "unit": "m", "noise": noise}
+
+
+def solve(field, size: int) -> np.ndarray:
+    """Displacement at the samples, let go at rest two seconds before, by SciPy."""
+    times = np.arange(size) / RATE
+    return solve_ivp(
+        field, (-2.0, times[-1]), [0.0, 0.0], t_eval=times, method="DOP853", rtol=1e-9, atol=1e-12
+    ).y[0]
+
+
+def oscillator() -> tuple[np.ndarray, np.ndarray]:
+    return np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]]), np.array([[0.0], [1.0 / MASS]])
+
+
+def held_response(drive: np.ndarray, kind: str) -> np.ndarray:
+    """Displacement of the oscillator, by SciPy's exact discretisation of a hold."""
+    matrix, push = oscillator()
+    system = signal.cont2discrete((matrix, push, [[1.0, 0.0]], [[0.0]]), 1.0 / RATE, method=kind)
+    # Periodic: three periods before the record.
+    _, y, _ = signal.dlsim((*system[:4], 1.0 / RATE), np.tile(drive, 2)[:, None])
+    return y[drive.size :, 0]
+
+
+@pytest.mark.parametrize(("kind", "order"), [("zoh", 0.0), ("foh", 1.0)])
+def test_a_hold_other_than_declared_is_named_with_a_share_of_one(campaign_of, kind, order):
+    rng = np.random.default_rng(1)
+    noise = 2e-7
+    drives = [multisine(seed) for seed in (1, 2)]
+    records = tuple(
+        record(drive, held_response(drive, kind) + noise * rng.standard_normal(drive.size), f"r{place}")
+        for place, drive in enumerate(drives)
+    )
+    declared = {"zoh": "linear", "foh": "band_limited"}[kind]
+    campaign = campaign_of(
+        records,
+        input={"hold": declared},
+        output=displacements(noise),
+    )
+    verdict = diagnose(fit(BASE, campaign))
+    assert verdict.finding is not None
+    assert verdict.finding.effect == "input_hold"
+    assert float(verdict.refit.model["input_hold.order"]) == order
+    share = float(verdict.refit.model["input_hold.share"])
+    place = verdict.refit.names.index("input_hold.share")
+    assert abs(share - 1.0) < 4.0 * float(verdict.refit.uncertainty.standard_error[place]) + 2e-3
+
+
+def test_harmonics_of_a_sine_are_cosines_of_multiples_of_its_phase():
+    phase = 2 * np.pi * 3.0 * np.arange(500) / RATE + 0.4
+    found = [
+        drive_harmonic(record(7.0 * np.cos(phase), phase), order, part)
+        for order in (2, 3)
+        for part in ("cosine", "sine")
+    ]
+    expected = [7.0 * law(order * phase) for order in (2, 3) for law in (np.cos, np.sin)]
+    np.testing.assert_allclose(np.array(found), np.array(expected), atol=1e-9)
+
+
+def test_a_line_is_found_beside_a_large_drive_with_amplitude_and_phase():
+    time = np.arange(6000) / 250.0
+    output = 3.0 * np.cos(2 * np.pi * 4.7 * time) + 2e-3 * np.cos(2 * np.pi * 50.0 * time + 0.7)
+    line = output_line(dataclasses.replace(record(output, output), rate=250.0), 50.0)
+    assert abs(line) == pytest.approx(2e-3, rel=1e-3)
+    assert np.angle(line) == pytest.approx(0.7, abs=1e-3)
+
+
+def test_the_clock_runs_through_a_record_from_its_beginning_to_its_end():
+    one = record(np.arange(100.0), np.arange(100.0), clock=(0.25, 0.5))
+    table = channel_table("clock", one, "band_limited", 1, 0.0)
+    assert table.shape == (100, 3)
+    np.testing.assert_allclose(table[[0, 50, 99], 0], [0.25, 0.375, 0.25 + 0.25 * 0.99])
+    np.testing.assert_allclose(table[:-1, 2], table[1:, 0])
+
+
+def test_an_unknown_signal_is_refused():
+    with pytest.raises(ValueError, match="must name a signal of a record, but is 'tide'"):
+        channel_table("tide", record(np.arange(9.0), np.arange(9.0)), "linear", 1, 0.0)
+
+
+def driven(seed: int, noise: float, *, change=0.0, hum=0.0, begin=0.0, share=0.5) -> np.ndarray:
+    """Displacement of the oscillator with a drifting stiffness and hum, by SciPy."""
+    drive = multisine(seed)
+    size = drive.size
+    lines = np.fft.rfft(drive) / size
+    places = np.flatnonzero(np.abs(lines) > 1e-9 * np.abs(lines).max())
+    omega = 2 * np.pi * places * RATE / size
+
+    def force(t):
+        return 2.0 * np.sum((lines[places] * np.exp(1j * omega * t)).real)
+
+    def field(t, z):
+        stiffness = STIFFNESS + change * (begin + share * max(t, 0.0) * RATE / size)
+        return z[1], (force(t) - stiffness * z[0] - DAMPING * z[1]) / MASS
+
+    times = np.arange(size) / RATE
+    rng = np.random.default_rng(100 + seed)
+    output = solve(field, size) + noise * rng.standard_normal(size)
+    return output + hum * np.cos(2 * np.pi * 20.0 * times + 2 * math.pi * rng.random())
+
+
+def test_a_stiffness_that_drifts_over_two_records_is_named(campaign_of):
+    noise = 2e-7
+    records = tuple(
+        record(
+            multisine(seed),
+            driven(seed, noise, change=1.2e4, begin=begin),
+            f"r{seed}",
+            clock=(begin, begin + 0.5),
+        )
+        for seed, begin in ((1, 0.0), (2, 0.5))
+    )
+    campaign = campaign_of(records, output=displacements(noise))
+    verdict = diagnose(fit(BASE, campaign))
+    assert verdict.finding is not None
+    assert verdict.finding.effect == "stiffness_drift"
+    change = float(verdict.refit.model["stiffness_drift.change"])
+    error = float(
+        verdict.refit.uncertainty.standard_error[verdict.refit.names.index("stiffness_drift.change")]
+    )
+    assert abs(change - 1.2e4) < 4.0 * error
+
+
+def test_the_score_of_a_chosen_phase_is_normal_where_there_is_only_noise():
+    # Six records' amplitudes of a line of noise, as output_line gives them, against the mean and scatter
+    # that the score takes off.
+    from isojax.identification._score import _RAYLEIGH
+
+    rng = np.random.default_rng(5)
+    amplitudes = np.array(
+        [
+            [abs(output_line(record(values, values), 12.0)) for values in rng.standard_normal((6, 512))]
+            for _ in range(400)
+        ]
+    )
+    window = signal.windows.blackmanharris(512)
+    one = np.sqrt(2.0 * np.sum(window**2)) / np.sum(window)
+    scores = (np.sum(amplitudes / one, axis=1) / math.sqrt(6.0) - _RAYLEIGH[0] * math.sqrt(6.0)) / _RAYLEIGH[
+        1
+    ]
+    assert stats.kstest(scores, "norm").pvalue > 1e-3
+    assert abs(np.mean(scores)) < 0.2
+
+
+def test_a_cubic_spring_is_still_a_cubic_spring(campaign_of):
+    # The effects that follow a record's signals take nothing from the laws of the motion.
+    drive = multisine(3)
+    size = drive.size
+    lines = np.fft.rfft(drive) / size
+    places = np.flatnonzero(np.abs(lines) > 1e-9 * np.abs(lines).max())
+    omega = 2 * np.pi * places * RATE / size
+
+    def field(t, z):
+        force = 2.0 * np.sum((lines[places] * np.exp(1j * omega * t)).real)
+        return z[1], (force - STIFFNESS * z[0] - 3e11 * z[0] ** 3 - DAMPING * z[1]) / MASS
+
+    noise = 2e-7
+    output = solve(field, size) + noise * np.random.default_rng(9).standard_normal(size)
+    campaign = campaign_of(
+        (record(drive, output),),
+        output=displacements(noise),
+    )
+    verdict = diagnose(fit(BASE, campaign))
+    assert verdict.finding is not None
+    assert verdict.finding.effect == CubicStiffness.name
