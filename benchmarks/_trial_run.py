@@ -101,7 +101,8 @@ def _facts(drawn: Sketch, hidden: tuple[Secret, ...], share: float) -> Row:
                 "effect": secret.name,
                 "size": secret.size,
                 "limits": abs(secret.size) / secret.limit,
-                "shape": secret.shape or {key: float(number) for key, number in vars(secret.law).items()},
+                "shape": secret.shape
+                or {key: np.asarray(number).tolist() for key, number in vars(secret.law).items()},
             }
             for secret in hidden
         ],

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal, stats
 from scipy.integrate import solve_ivp
 
-from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness
+from isojax.elements import CubicStiffness, DriveHarmonics, LinearDamping, LinearStiffness, MainsHum
 from isojax.identification import diagnose, fit
 from isojax.identification._channels import channel_table, drive_harmonic, output_line
 from isojax.models import Isolator
@@ -201,3 +201,45 @@ def test_a_cubic_spring_is_still_a_cubic_spring(campaign_of):
     verdict = diagnose(fit(BASE, campaign))
     assert verdict.finding is not None
     assert verdict.finding.effect == CubicStiffness.name
+
+
+def steady_record(name: str, law, *, frequency=5.0, hum=0.0) -> Record:
+    """Whole cycles of a sine in the steady state, by the closed form of the linear oscillator's response."""
+    rate, noise = 250.0, 1e-7
+    time = np.arange(int(4.0 * rate)) / rate
+    theta = 2 * np.pi * frequency * time
+    amplitude = 120.0
+    answer = np.zeros(time.size)
+    for order, part, phase in law:
+        omega = 2 * np.pi * order * frequency
+        receptance = 1.0 / (STIFFNESS - MASS * omega**2 + 1j * DAMPING * omega)
+        answer += amplitude * part * (receptance * np.exp(1j * (order * theta + phase))).real
+    output = answer + hum * np.cos(2 * np.pi * 50.0 * time + len(name))
+    output = output + noise * np.random.default_rng(len(name)).standard_normal(time.size)
+    drive = amplitude * np.cos(theta)
+    return Record(name, Path(f"{name}.npz"), time, rate, drive, output, drive, output)
+
+
+def fitted_value(campaign_of, records, element, name: str) -> tuple[float, float]:
+    """A coefficient of an effect beside the oscillator, and its error."""
+    campaign = campaign_of(records, output=displacements(1e-7))
+    found = fit(Isolator(MASS, (*BASE.elements, element)), campaign)
+    place = found.estimate.names.index(name)
+    return float(found.model[name]), float(found.estimate.uncertainty.standard_error[place])
+
+
+def test_a_third_harmonic_of_the_drive_is_recovered(campaign_of):
+    law = ((1, 1.0, 0.0), (3, 0.04, 0.6))
+    records = tuple(steady_record(f"at {f} Hz", law, frequency=f) for f in (4.5, 5.5, 7.0))
+    start = DriveHarmonics(0.01, 0.0, 3.0)
+    share, error = fitted_value(campaign_of, records, start, "drive_harmonics.share")
+    assert abs(share - 0.04) < 4.0 * error + 1e-4
+
+
+def test_hum_of_two_records_is_recovered(campaign_of):
+    records = tuple(
+        steady_record(f"{f:.2f} Hz" + "." * place, ((1, 1.0, 0.0),), frequency=f, hum=4e-6)
+        for place, f in enumerate((4.5, 5.5, 7.0))
+    )
+    amplitude, error = fitted_value(campaign_of, records, MainsHum(1e-6, 50.0), "mains_hum.amplitude")
+    assert abs(amplitude - 4e-6) < 4.0 * error + 4e-8

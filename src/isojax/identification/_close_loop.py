@@ -7,7 +7,7 @@ from typing import Any
 from .._results import RESULTS, is_successful
 from ..records import Campaign
 from ._classical_guess import classical_guess
-from ._diagnose import GOOD, MOST_OF_IT, diagnose, is_good
+from ._diagnose import MOST_OF_IT, diagnose, is_clean, is_good
 from ._findings import Extension, Loop, Verdict, VerdictWord
 from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
 from ._look_ahead import find_superfluous
@@ -167,6 +167,6 @@ def _overall(before: Fit, final: Fit, any_found: bool, last: Verdict) -> Verdict
     if not any_found or not is_successful(final.result):
         return last.verdict
     explained = 1.0 - found.excess / max(first.excess, 1.0)
-    if good and (first.chi2 / first.dof <= GOOD or explained >= MOST_OF_IT):
+    if good and (is_clean(first, found) or explained >= MOST_OF_IT):
         return "found"
     return "partly_explained" if explained >= MOST_OF_IT else "unexplained"

@@ -35,6 +35,9 @@ from ._transfer import transferred_share
 GOOD = 1.05
 """chi2/dof up to which a fit is good."""
 
+CLEAN = 1.02
+"""chi2/dof up to which what is left is as little as a bench repeats, whatever there was to explain."""
+
 LEFT_OVER = 0.03
 """Share of the first excess that may be left where the noise is small beside every model error."""
 
@@ -73,6 +76,19 @@ def is_good(chi2_per_dof: float, excess: float, first_excess: float) -> bool:
         True if chi2/dof is near one, or hardly any of the first excess is left.
     """
     return chi2_per_dof <= GOOD or excess < LEFT_OVER * first_excess
+
+
+def is_clean(before: Estimate, after: Estimate) -> bool:
+    """Say whether so little was to explain, or is left, that no share of it need be asked for.
+
+    Args:
+        before: the estimate without what was found.
+        after: the estimate with it.
+
+    Returns:
+        True if either holds.
+    """
+    return before.chi2 / before.dof <= GOOD or after.chi2 / after.dof <= CLEAN
 
 
 def diagnose(
@@ -318,9 +334,7 @@ def _found(
         separating_experiment(name, together),
     )
     good = is_good(best.estimate.chi2 / best.estimate.dof, best.estimate.excess, first_excess)
-    # Where there was little to explain, that the fit is good is all that can be asked.
-    small = fitted.chi2 / fitted.dof <= GOOD
-    if good and (small or explained >= MOST_OF_IT):
+    if good and (is_clean(fitted, best.estimate) or explained >= MOST_OF_IT):
         verdict = "found"
     elif explained >= MOST_OF_IT:
         verdict = "partly_explained"

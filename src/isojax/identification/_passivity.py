@@ -79,7 +79,9 @@ def work_per_cycle(
     before, force = forces[-2 * STEPS : -STEPS], forces[-STEPS:]
     phase = 2.0 * np.pi * np.arange(STEPS) / STEPS
     power = (forces * np.cos(np.tile(phase, CYCLES))[:, None]).reshape(CYCLES, STEPS, -1)
-    works = 2.0 * np.pi * amplitude * np.mean(power, axis=1)
+    # A memory that ran away is too large to add up, and is told by that.
+    with np.errstate(over="ignore", invalid="ignore"):
+        works = 2.0 * np.pi * amplitude * np.mean(power, axis=1)
     reach = np.ptp(force, axis=0)
     rings = np.max(np.abs(force - before), axis=0) > SETTLED * reach
     return np.where(rings, np.mean(works, axis=0), works[-1]), 0.5 * reach * amplitude

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy import stats
 
 from .._parameters import find_parameter
@@ -168,7 +168,8 @@ def score_test(
     z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(by_record.shape[0])) / _RAYLEIGH[1], z)
     correlation = information / np.outer(safe, safe)
     inflation = np.sqrt(max(1.0, fitted.chi2 / fitted.dof))
-    family = _family_wise(correlation[np.ix_(seen, seen)], np.abs(z[order]) / inflation, seed)
+    either = np.array([probe.signed for probe in probes], dtype=bool)[seen]
+    family = _family_wise(correlation[np.ix_(seen, seen)], np.abs(z[order]) / inflation, either, seed)
     scores, steps, moved = [], [], []
     owner = fitted.bench.prepared(model, carried).record
     for column, p_value in zip(order, family, strict=True):
@@ -199,14 +200,21 @@ def score_test(
 
 
 def _family_wise(
-    correlation: Float[np.ndarray, "score score"], sizes: Float[np.ndarray, " family"], seed: int
+    correlation: Float[np.ndarray, "score score"],
+    sizes: Float[np.ndarray, " family"],
+    either: Bool[np.ndarray, " score"],
+    seed: int,
 ) -> Float[np.ndarray, " family"]:
-    """Give the chance that the largest score exceeds each size: by drawing, and by Bonferroni far out."""
+    """Give the chance that the largest score exceeds each size: by drawing, and by Bonferroni far out.
+
+    Of an effect that has but one sign only that sign counts.
+    """
     if sizes.size == 0:
         return sizes
     values, vectors = np.linalg.eigh(correlation)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = np.abs(np.random.default_rng(seed).standard_normal((DRAWS, root.shape[0])) @ root.T).max(axis=1)
+    draws = np.random.default_rng(seed).standard_normal((DRAWS, root.shape[0])) @ root.T
+    draws = np.where(either, np.abs(draws), draws).max(axis=1)
     drawn = np.mean(draws[:, None] >= sizes, axis=0)
-    bound = np.minimum(1.0, 2.0 * correlation.shape[0] * stats.norm.sf(sizes))
+    bound = np.minimum(1.0, (either.size + either.sum()) * stats.norm.sf(sizes))
     return np.where(drawn > 50 / DRAWS, drawn, bound)
