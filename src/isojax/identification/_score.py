@@ -144,6 +144,9 @@ def score_test(
     seen = visibility > SMALLEST_VISIBILITY
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)
     z = score / safe
+    # A phase that each record chose for itself makes the sum of as many Rayleigh amplitudes of noise.
+    chosen = np.array([probe.phased for probe in probes], dtype=bool)
+    z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(by_record.shape[0])) / _RAYLEIGH[1], z)
     # Each record's own share of the projected score: its scatter is the honest standard deviation.
     shares = by_record[:, count:-1, -1] - by_record[:, count:-1, :count] @ absorbed[:, -1]
     shares -= np.einsum(
@@ -163,9 +166,6 @@ def score_test(
         if seen[column] and (probe.name not in best or weight[column] > weight[best[probe.name]]):
             best[probe.name] = column
     order = sorted(best.values(), key=lambda column: -abs(z[column]))
-    # A phase that each record chose for itself makes the sum of as many Rayleigh amplitudes of noise.
-    chosen = np.array([probe.phased for probe in probes], dtype=bool)
-    z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(by_record.shape[0])) / _RAYLEIGH[1], z)
     correlation = information / np.outer(safe, safe)
     inflation = np.sqrt(max(1.0, fitted.chi2 / fitted.dof))
     either = np.array([probe.signed for probe in probes], dtype=bool)[seen]
