@@ -1,4 +1,4 @@
-"""The blind trial: its draws and its arithmetic; and a small sample of it, which the diagnosis must pass."""
+"""The blind trial: its draws and its arithmetic."""
 
 import math
 import sys
@@ -18,11 +18,9 @@ from _trial_campaign import kind_of, sketch
 from _trial_effects import COMMONEST, EFFECTS, Motion, element_of, generator, shuffled_effects
 from _trial_judge import table, wilson
 from _trial_outside import OUTSIDE
-from _trial_run import run_one
 
 MOTION = Motion(40.0, 1e-3, 1.0, 31.0, 1.08e6, 1.03e4)
 SCALES = Scales(800.0, 150.0, 1e-3, 0.031, 1.0, 31.0, 0.004, 0.01, 1.0)
-SAMPLE = range(1000, 1020)
 
 
 def test_the_interval_of_a_share_is_wilsons():
@@ -186,15 +184,3 @@ def test_the_table_counts_what_it_says():
     assert _figure(rows, "inadmissible sign").passed is True
     rows[2]["findings"][0] |= {"signed": False, "strength": -1.0}
     assert _figure(rows, "inadmissible sign").passed is False
-
-
-@pytest.mark.slow
-def test_a_small_sample_is_judged_right():
-    """Twenty campaigns: too few for the marks of the whole trial, enough to see that nothing is broken."""
-    rows = [run_one(seed, ("none", "one")[seed % 2], "loop") for seed in SAMPLE]
-    assert not [row["error"] for row in rows if "error" in row]
-    false, right = _figure(rows, "an effect named"), _figure(rows, "right family")
-    assert false.interval[0] <= 0.05, false.failing
-    assert right.judged >= 5
-    assert right.figure >= 0.8, right.failing
-    assert _figure(rows, "inadmissible sign").passed
