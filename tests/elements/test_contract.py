@@ -69,8 +69,10 @@ def follows(element: AbstractElement, x, v, u) -> tuple:
     """What signals of a record add, these as large as the drive."""
     channels = {name: math.cos(1.0 + place) * u for place, name in enumerate(element.channels)}
     if not channels:
-        return (jnp.zeros(()),) * 3
+        return (jnp.zeros(()),) * 4
+    base = element.channel_base(channels)
     added = (
+        0.0 if base is None else base,
         element.channel_drive(channels),
         element.channel_force(x, v, channels),
         element.channel_reading(channels),

@@ -10,6 +10,13 @@ import pytest
 from isojax.records import read_campaign
 
 RECORD = r'role = "fit"'
+FLOOR = """\
+[floor]
+quantity = "acceleration"
+column = "floor"
+unit = "m/s^2"
+
+[model]"""
 MISTAKES = {
     "a missing section": (r"\[output\](.|\n)*?\n\n", "", r"section \[output\] is missing.*`quantity`"),
     "an unknown section": (r"\[model\]", "[modell]", r"unknown section `modell`; did you mean `model`"),
@@ -69,6 +76,26 @@ MISTAKES = {
     "a knot for a kilonewton": ('unit = "N"', 'unit = "kn"', r"does not measure a force.*did you mean `kN`"),
     "gram for an acceleration's unit": ('"m/s\\^2"', '"kg"', r"does not measure an acceleration"),
     "a unit with a number": ('"m/s\\^2"', '"2 m/s^2"', r"is not a unit"),
+    "a floor without its unit": (
+        r"\[model\]",
+        FLOOR.replace('unit = "m/s^2"', ""),
+        r"\[floor\] lacks the field `unit`",
+    ),
+    "a floor measured in newtons": (
+        r"\[model\]",
+        FLOOR.replace("m/s^2", "N"),
+        r'\[floor\] unit = "N" .* does not measure an acceleration',
+    ),
+    "a floor that does not move": (
+        r"\[model\]",
+        FLOOR.replace("m/s^2", 'm/s^2"\ngain = "0'),
+        r"\[floor\] gain = '0' must be a finite number other than 0",
+    ),
+    "a floor that is the output": (
+        r"\[model\]",
+        FLOOR.replace('"floor"', '"acceleration"'),
+        r'\[output\] and \[floor\] both name column = "acceleration"',
+    ),
     "noise below zero": (
         '"m/s\\^2"',
         '"m/s^2"\nnoise = -0.1',

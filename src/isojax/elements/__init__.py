@@ -17,6 +17,7 @@ from ._dahl_friction import DahlFriction as DahlFriction
 from ._drive_harmonics import DriveHarmonics as DriveHarmonics
 from ._dual_chamber import DualChamber as DualChamber
 from ._end_stop import EndStop as EndStop
+from ._floor_motion import FloorMotion as FloorMotion
 from ._fractional_damping import FractionalDamping as FractionalDamping
 from ._freeplay import Freeplay as Freeplay
 from ._input_delay import InputDelay as InputDelay

@@ -262,6 +262,19 @@ class AbstractElement(eqx.Module):
         """
         return 0.0
 
+    def channel_base(self, channels: Channels) -> Lanes | None:
+        """Give the acceleration that the ground under the isolator has by signals of the record.
+
+        The coordinate then moves with the ground, and an acceleration reading is the absolute one.
+
+        Args:
+            channels: the signals, by name.
+
+        Returns:
+            Acceleration [m/s^2]; None where the element leaves the ground alone.
+        """
+        return None
+
     def channel_reading(self, channels: Channels) -> Lanes | float:
         """Give what signals of the record add to the reading.
 

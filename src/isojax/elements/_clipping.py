@@ -13,7 +13,8 @@ class Clipping(AbstractElement):
     """The response channel saturates: what goes beyond a level is not recorded.
 
     `y -> y - share (y - clip(y, -L, L))`; share = 1 is a full stop at the level, less a channel that is only
-    less sensitive beyond it. The reading is integrated by nothing, so that its corners need no rounding.
+    less sensitive beyond it. The bound leaves room above 1, so that a full stop has an error bar like any
+    other number. The reading is integrated by nothing, so that its corners need no rounding.
 
     Attributes:
         share: of the reading beyond the level that is lost [1].
@@ -26,7 +27,7 @@ class Clipping(AbstractElement):
     words: ClassVar[str] = "saturation of the response channel"
     strength: ClassVar[str] = "share"
 
-    share: Scalar = parameter(symbol="share", unit="1", lower=0.0, upper=1.0)
+    share: Scalar = parameter(symbol="share", unit="1", lower=0.0, upper=1.5)
     level: Scalar = parameter(symbol="L", unit="SI unit of the output", lower=0.0)
 
     @classmethod

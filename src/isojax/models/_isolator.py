@@ -161,12 +161,45 @@ class Isolator(eqx.Module):
         Returns:
             The drive that acted, in the same unit.
         """
+        return self.acting(u, u_rate, channels)[0]
+
+    def acting(
+        self, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS
+    ) -> tuple[Lanes, Lanes]:
+        """Give the drive that acted, and its rate.
+
+        Args:
+            u: recorded drive, already shifted [N, or m/s^2 for base excitation].
+            u_rate: its time derivative.
+            channels: see `drive`.
+
+        Returns:
+            The drive that acted and its time derivative, in the same unit.
+        """
         rate = jnp.asarray(u_rate, dtype=float)
         for element in self._following(channels):
             u = u + element.channel_drive(channels)
         for element in self.elements:
             u, rate = element.drive(u, rate)
-        return u
+        return u, rate
+
+    def base(self, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS) -> Lanes | None:
+        """Give the acceleration of what the coordinate moves with.
+
+        Args:
+            u: recorded drive, already shifted [N, or m/s^2 for base excitation].
+            u_rate: its time derivative.
+            channels: see `drive`.
+
+        Returns:
+            Acceleration of the base, or of the floor [m/s^2]; None where it stands still.
+        """
+        total = self.drive(u, u_rate, channels) if self.excitation == "base_acceleration" else None
+        for element in self._following(channels):
+            moved = element.channel_base(channels)
+            if moved is not None:
+                total = moved if total is None else total + moved
+        return total
 
     def kinks(self, state: State) -> State:
         """Give the functions at whose zeros some law is not smooth.
@@ -230,18 +263,18 @@ class Isolator(eqx.Module):
             channels: see `drive`.
 
         Returns:
-            Acceleration [m/s^2]; relative to the base under base excitation.
+            Acceleration [m/s^2]; relative to a base or floor that moves.
         """
         inertia = self.mass
         for element in self.elements:
             inertia = inertia + element.inertia()
-        drive = self.drive(u, u_rate, channels)
         force = self.restoring_force(state, sides)
         for element in self._following(channels):
             force = force + element.channel_force(state[0], state[1], channels)
-        if self.excitation == "base_acceleration":
-            return -drive - force / inertia
-        return (drive - force) / inertia
+        drive = 0.0 if self.excitation == "base_acceleration" else self.drive(u, u_rate, channels)
+        base = self.base(u, u_rate, channels)
+        absolute = (drive - force) / inertia
+        return absolute if base is None else absolute - base
 
     def motion(
         self,
@@ -261,16 +294,16 @@ class Isolator(eqx.Module):
             channels: see `drive`.
 
         Returns:
-            Acceleration [m/s^2] (absolute under base excitation), velocity [m/s] or displacement [m].
+            Acceleration [m/s^2], absolute; velocity [m/s] or displacement [m], relative to a base or floor
+            that moves.
         """
         if quantity == "displacement":
             return state[0]
         if quantity == "velocity":
             return state[1]
         acceleration = self.acceleration(state, u, u_rate, channels=channels)
-        if self.excitation == "base_acceleration":
-            return acceleration + self.drive(u, u_rate, channels)
-        return acceleration
+        base = self.base(u, u_rate, channels)
+        return acceleration if base is None else acceleration + base
 
     def reading(
         self,
@@ -292,11 +325,34 @@ class Isolator(eqx.Module):
         Returns:
             The reading [SI unit of the quantity].
         """
+        y = self.sensed(state, u, u_rate, quantity, channels)
+        for element in self._following(channels):
+            y = y + element.channel_reading(channels)
+        return y
+
+    def sensed(
+        self,
+        state: State,
+        u: Lanes,
+        u_rate: Lanes | float,
+        quantity: Quantity,
+        channels: Channels = NO_CHANNELS,
+    ) -> Lanes:
+        """Give the reading before what signals of the record add to it.
+
+        Args:
+            state: displacement, velocity and internal states.
+            u: recorded drive, already shifted.
+            u_rate: its time derivative.
+            quantity: what the sensor measures.
+            channels: see `drive`.
+
+        Returns:
+            The reading [SI unit of the quantity].
+        """
         y = self.motion(state, u, u_rate, quantity, channels)
         for element, internal in zip(self.elements, self._internal(state), strict=True):
             y = element.reading(y, internal)
-        for element in self._following(channels):
-            y = y + element.channel_reading(channels)
         return y
 
     def rates(
@@ -326,14 +382,15 @@ class Isolator(eqx.Module):
         internal_rates: list[Lanes] = []
         if self.internal_states:
             y = self.motion(state, u, u_rate, quantity, channels)
+            base = self.base(u, u_rate, channels)
             beside = [None] * len(self.elements) if sides is None else self._sides(state, sides)
             for element, internal, own in zip(self.elements, self._internal(state), beside, strict=True):
                 if own is None:
                     law = element.state_rate(x, v, internal)
                 else:
                     law = element.state_rate_beside(x, v, internal, own)
-                if self.excitation == "base_acceleration":
-                    moved = element.base_rate(self.drive(u, u_rate, channels), internal)
+                if base is not None:
+                    moved = element.base_rate(base, internal)
                     law = tuple(a + b for a, b in zip(law, moved, strict=True))
                 sensed = element.reading_rate(y, internal)
                 internal_rates.extend(a + b for a, b in zip(law, sensed, strict=True))

@@ -7,6 +7,7 @@ from ._band import ringing_frequency as ringing_frequency
 from ._blow import driven_samples as driven_samples
 from ._campaign import Campaign as Campaign
 from ._campaign import Filter as Filter
+from ._campaign import FloorChannel as FloorChannel
 from ._campaign import InputChannel as InputChannel
 from ._campaign import OutputChannel as OutputChannel
 from ._declaration import Declaration as Declaration
@@ -20,8 +21,14 @@ from ._health import data_health as data_health
 from ._integrate import integrate_acceleration as integrate_acceleration
 from ._integrate import measured_state as measured_state
 from ._kind import detect_kind as detect_kind
+from ._mains import HumLine as HumLine
+from ._mains import MainsCollision as MainsCollision
+from ._mains import hum_lines as hum_lines
+from ._mains import mains_collisions as mains_collisions
 from ._noise import NoiseEstimate as NoiseEstimate
 from ._noise import estimate_noise as estimate_noise
+from ._noise_peak import NoisePeak as NoisePeak
+from ._noise_peak import noise_peak as noise_peak
 from ._read import read_campaign as read_campaign
 from ._receptance import FilterComparison as FilterComparison
 from ._receptance import Receptance as Receptance

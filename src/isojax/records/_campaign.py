@@ -56,8 +56,25 @@ class OutputChannel:
 
 
 @dataclass(frozen=True)
+class FloorChannel:
+    """What was measured on the floor under the isolator.
+
+    Attributes:
+        quantity: Acceleration, velocity or displacement.
+        column: Its name in the file.
+        unit: Its unit in the file.
+        gain: Motion in SI = gain * column in SI.
+    """
+
+    quantity: OutputQuantity
+    column: str
+    unit: str
+    gain: float = 1.0
+
+
+@dataclass(frozen=True)
 class Filter:
-    """Low-pass filter on both channels alike.
+    """Low-pass filter on all channels alike.
 
     Attributes:
         kind: "butterworth".
@@ -89,6 +106,7 @@ class Campaign:
         damping: Catalogue names of the damping terms, as written in [model].
         elements: Further catalogue names.
         records: The records in the order of the test in time.
+        floor: The channel of the floor's motion, or None.
     """
 
     title: str
@@ -103,6 +121,7 @@ class Campaign:
     damping: tuple[str, ...]
     elements: tuple[str, ...]
     records: tuple[Record, ...]
+    floor: FloorChannel | None = None
 
     @property
     def fit_records(self) -> tuple[Record, ...]:

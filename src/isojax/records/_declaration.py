@@ -61,6 +61,11 @@ def _number(default: float | None = None) -> Field:
     return Field("a finite number", _is_number, default=default, convert=float)
 
 
+def _factor() -> Field:
+    accepts = lambda value: _is_number(value) and value != 0  # noqa: E731
+    return Field("a finite number other than 0", accepts, default=1.0, convert=float)
+
+
 def _positive(required: bool = False) -> Field:
     accepts = lambda value: _is_number(value) and value > 0  # noqa: E731
     return Field("a finite number above 0", accepts, required, convert=float)
@@ -87,9 +92,7 @@ _SECTIONS: Mapping[str, Mapping[str, Field]] = {
         ),
         "column": _text(required=True),
         "unit": _text(required=True),
-        "gain": Field(
-            "a finite number other than 0", lambda v: _is_number(v) and v != 0, default=1.0, convert=float
-        ),
+        "gain": _factor(),
         "gain_free": _flag(),
         "offset_free": _flag(),
         "hold": _choice("band_limited", "linear", "zero_order", default="band_limited"),
@@ -101,6 +104,12 @@ _SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "unit": _text(required=True),
         "offset_free": _flag(),
         "noise": _positive(),
+    },
+    "floor": {
+        "quantity": _choice("acceleration", "velocity", "displacement", required=True),
+        "column": _text(required=True),
+        "unit": _text(required=True),
+        "gain": _factor(),
     },
     "sampling": {"rate": _positive(), "time": _text()},
     "filter": {
@@ -129,6 +138,8 @@ _RECORD: Mapping[str, Field] = {
     "kind": _choice(*get_args(Kind)),
 }
 _REQUIRED_SECTIONS = ("campaign", "input", "output")
+_ABSENT_SECTIONS = ("floor", "filter")
+"""Sections that are None where the file has none; of the others every field is then at its default."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +148,8 @@ class Declaration:
 
     Attributes:
         file: The campaign.toml.
-        sections: Section name to field name to value; "filter" is None where the file has none.
+        sections: Section name to field name to value; "filter" and "floor" are None where the
+            file has none.
         records: One mapping per [[record]], in order.
     """
 
@@ -176,7 +188,9 @@ def read_declaration(path: str | Path) -> Declaration:
             )
         absent = name not in table
         sections[name] = (
-            None if absent and name == "filter" else _checked(file, f"[{name}]", table.get(name, {}), fields)
+            None
+            if absent and name in _ABSENT_SECTIONS
+            else _checked(file, f"[{name}]", table.get(name, {}), fields)
         )
     entries = table.get("record", [])
     if not isinstance(entries, list):
@@ -248,15 +262,29 @@ def _check_together(file: Path, sections: Mapping[str, Any], records: tuple[Mapp
             f'{file}: [input] moving_mass = {mass} belongs to quantity = "reaction_mass_acceleration" only, '
             f'but quantity = "{drive}"'
         )
-    if sections["input"]["column"] == sections["output"]["column"]:
+    if drive == "base_acceleration" and sections["floor"] is not None:
         raise ValueError(
-            f'{file}: [input] and [output] both name column = "{sections["input"]["column"]}"; '
-            "they must be two different channels"
+            f'{file}: [floor] belongs to an isolator on a floor, but [input] quantity = "base_acceleration" '
+            "says that the base itself is driven; its motion is the input"
         )
+    _check_columns(file, sections)
     for number, record in enumerate(records, start=1):
         _check_kind(f"{file}: [[record]] number {number}", record)
     if not any(record["role"] == "fit" for record in records):
         raise ValueError(f'{file}: no [[record]] has role = "fit"; at least one record is needed to fit')
+
+
+def _check_columns(file: Path, sections: Mapping[str, Any]) -> None:
+    named: dict[str, str] = {}
+    for name in ("input", "output", "floor"):
+        column = None if sections[name] is None else sections[name]["column"]
+        if column in named:
+            raise ValueError(
+                f'{file}: [{named[column]}] and [{name}] both name column = "{column}"; '
+                "they must be two different channels"
+            )
+        if column is not None:
+            named[column] = name
 
 
 def _check_kind(where: str, record: Mapping[str, Any]) -> None:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float
 
+from ._basis import harmonic_basis as harmonic_basis
+from ._basis import meeting_order
+from ._mains import hum_lines
 from ._record import Dwell, Record
 
 
@@ -22,6 +25,7 @@ class DwellHarmonics:
         output: The same of the output.
         input_residual: rms of what the harmonics leave of the input, per degree of freedom.
         output_residual: The same of the output.
+        masked: Orders that a line of the mains, seen in the record, falls on; they are 0.
     """
 
     frequency: float
@@ -30,26 +34,7 @@ class DwellHarmonics:
     output: Complex[np.ndarray, " harmonic"]
     input_residual: float
     output_residual: float
-
-
-def harmonic_basis(
-    time: Float[np.ndarray, " time"], frequency: float, harmonics: int
-) -> Float[np.ndarray, "time column"]:
-    """Gives the columns 1, cos wt, -sin wt, cos 2wt, ...; coefficients are Re and Im of the complex
-    amplitudes.
-
-    Args:
-        time: Seconds, (time,).
-        frequency: [Hz].
-        harmonics: Highest order.
-
-    Returns:
-        (time, 1 + 2 harmonics).
-    """
-    turns = np.exp(2j * np.pi * frequency * time)[:, None] ** np.arange(1, harmonics + 1)
-    basis = np.ones((time.size, 1 + 2 * harmonics))
-    basis[:, 1::2], basis[:, 2::2] = turns.real, -turns.imag
-    return basis
+    masked: tuple[int, ...] = ()
 
 
 def settled_window(dwell: Dwell, rate: float, settled_cycles: float | None = None) -> tuple[int, int]:
@@ -110,6 +95,13 @@ def dwell_harmonics(
     time = (np.arange(start, stop) - dwell.start) / record.rate
     drive, drive_rest = fit_harmonics(record.input[start:stop], time, dwell.frequency, fitted)
     response, response_rest = fit_harmonics(record.output[start:stop], time, dwell.frequency, fitted)
+    meeting = [
+        meeting_order(dwell.frequency, line.frequency, (stop - start) / record.rate)
+        for line in hum_lines(record)
+    ]
+    masked = tuple(order for order in meeting if order is not None and order <= fitted)
+    for order in masked:
+        drive[order] = response[order] = 0.0
     missing = np.zeros(harmonics - fitted, dtype=np.complex128)
     return DwellHarmonics(
         frequency=dwell.frequency,
@@ -118,4 +110,5 @@ def dwell_harmonics(
         output=np.concatenate([response, missing]),
         input_residual=drive_rest,
         output_residual=response_rest,
+        masked=masked,
     )

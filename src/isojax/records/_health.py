@@ -8,6 +8,7 @@ import scipy.stats
 from ._blow import blow_samples
 from ._campaign import Campaign
 from ._harmonics import dwell_harmonics, harmonic_basis
+from ._noise_peak import NoisePeak, noise_peak
 from ._record import Dwell, Record
 from ._repeats import repeat_groups
 
@@ -74,12 +75,14 @@ class DataHealth:
         unsettled: Those that never settled.
         repeats: Pairs of repeats.
         brief_blows: Records whose blow lasts fewer than four samples.
+        noise_peak: Resonance peak in the scatter, or None; not looked for where a floor is measured.
     """
 
     dwells: int
     unsettled: tuple[UnsettledDwell, ...]
     repeats: tuple[RepeatDifference, ...]
     brief_blows: tuple[BriefBlow, ...] = ()
+    noise_peak: NoisePeak | None = None
 
     @property
     def repeatability(self) -> float:
@@ -88,7 +91,7 @@ class DataHealth:
 
 
 def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth:
-    """Gives the dwells that never settled, the blows that are too brief and the differences between repeats.
+    """Gives unsettled dwells, blows that are too brief, differences of repeats, a resonance in the scatter.
 
     A dwell is unsettled if the F-test on the scatter between its last six cycles is significant at 0.001 over
     all dwells, and if the change exceeds `smallest_change` of the output's rms.
@@ -108,7 +111,8 @@ def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth
     ]
     limit = 1e-3 / max(len(tested), 1)
     unsettled = tuple(one for one in tested if one.p_value < limit and one.change > smallest_change)
-    return DataHealth(len(tested), unsettled, _repeat_differences(campaign), brief_blows(campaign))
+    peak = noise_peak(campaign) if campaign.floor is None else None
+    return DataHealth(len(tested), unsettled, _repeat_differences(campaign), brief_blows(campaign), peak)
 
 
 def brief_blows(campaign: Campaign) -> tuple[BriefBlow, ...]:

@@ -1,6 +1,5 @@
 """The noise of the output channel: the rms per sample that the residual of a perfect model would have."""
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -10,17 +9,15 @@ import scipy.stats
 from jaxtyping import Float
 
 from ._band import spectral_floor
+from ._basis import drifting_harmonics
 from ._blow import ring_down
 from ._campaign import Campaign
-from ._harmonics import harmonic_basis
+from ._mains import MOST_HARMONICS, dwell_window, hum_lines
 from ._noise_band import NoiseBand
 from ._record import Dwell, Record
 from ._repeats import repeat_difference, repeat_groups
 
 NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency"]
-_MOST_HARMONICS = 120
-"""Those of dry friction fall as 1/n: the fortieth may still stand above the noise."""
-
 _QUANTILE = 0.25
 _UNSETTLED = 1e-3
 """Chance of a settled dwell to scatter as much as one that does not count."""
@@ -71,8 +68,9 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     Per record, the first that applies: the declared one (of the column as the file holds it); the scatter
     about the harmonics of settled dwells; the scatter between periods; the difference of repeats at equal
     level and direction, where it is not explained by the records themselves; the floor of the spectrum above
-    the excited band. Forces and stiffness that change from repeat to repeat move harmonics, not the scatter
-    about them, so stepped sines never need the repeats.
+    the excited band. The last alone counts where the building's floor was measured: the scatter that it makes
+    is for a model to explain. Forces and stiffness that change from repeat to repeat move harmonics, not the
+    scatter about them, so stepped sines never need the repeats.
 
     Args:
         campaign: The campaign.
@@ -123,6 +121,9 @@ def _estimate_each(records: tuple[Record, ...], band: NoiseBand) -> list[tuple[f
             ("periods", lambda record=record: period_scatter(record)),
             ("repeats", lambda record=record, group=group: _repeat_scatter(record, group, band)),
         ]
+        if record.floor is not None:
+            # what a measured floor does from cycle to cycle scatters, but a model can explain it: no noise
+            tries = []
         for method, estimate in tries:
             value = estimate()
             if np.isfinite(value):
@@ -137,9 +138,10 @@ def cycle_scatter(record: Record, band: NoiseBand) -> float:
     """Gives the rms about the harmonics of the last quarter of each dwell, at least four cycles; NaN if none
     is long.
 
-    As many harmonics are taken as the band holds, up to 120, and the fundamental may drift linearly. Dwells
-    that never settle, near a fold or in modulation, do not count: beyond the chance of one in a thousand, by
-    chi-square, from the level that the lower quartile of the dwells shows.
+    As many harmonics are taken as the band holds, up to 120, and the fundamental may drift linearly. Lines of
+    the mains that stand out of the record are no noise either: a model can explain them. Dwells that never
+    settle, near a fold or in modulation, do not count: beyond the chance of one in a thousand, by chi-square,
+    from the level that the lower quartile of the dwells shows.
 
     Args:
         record: The record.
@@ -165,34 +167,19 @@ def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float,
     """Gives mean square about the harmonics of a dwell's end and its degrees of freedom; None if it is too
     short.
     """
-    cycle = record.rate / dwell.frequency
-    window = round(max(dwell.cycles / 4.0, 4.0) * cycle)
-    if window > 0.7 * (dwell.stop - dwell.start):
+    window = dwell_window(record, dwell)
+    if window is None:
         return None
     signal = record.output[dwell.stop - window : dwell.stop]
-    orders = min(_MOST_HARMONICS, int(0.9 * band.highest / dwell.frequency), max(1, window // 8))
-    design, inverse = _drifting_harmonics(window, record.rate, dwell.frequency, orders)
+    orders = min(MOST_HARMONICS, int(0.9 * band.highest / dwell.frequency), max(1, window // 8))
+    lines = tuple(line.frequency for line in hum_lines(record))
+    design, inverse = drifting_harmonics(window, record.rate, dwell.frequency, orders, lines)
     # noise of a narrow band has fewer degrees of freedom than samples; the harmonics take theirs from them
     freedom = window * band.share - design.shape[1]
     if freedom < design.shape[1]:
         return None
     rest = signal - design @ (inverse @ (design.T @ signal))
     return float(rest @ rest) * band.share / freedom, float(freedom)
-
-
-@functools.lru_cache(maxsize=64)
-def _drifting_harmonics(
-    window: int, rate: float, frequency: float, orders: int
-) -> tuple[Float[np.ndarray, "time column"], Float[np.ndarray, "column column"]]:
-    """Gives harmonics whose fundamental drifts linearly, and the inverse of their products.
-
-    The records of a campaign dwell at the same frequencies: all but the first find both ready.
-    """
-    time = (np.arange(window) - 0.5 * (window - 1)) / rate
-    basis = harmonic_basis(time, frequency, orders)
-    slope = (time / time[-1])[:, None]
-    design = np.concatenate([basis, slope * basis[:, :3]], axis=1)
-    return design, np.linalg.inv(design.T @ design)
 
 
 def period_scatter(record: Record) -> float:

@@ -10,10 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from ._band import ringing_frequency
-from ._campaign import Campaign, Filter, InputChannel, OutputChannel
+from ._campaign import Campaign, Filter, FloorChannel, InputChannel, OutputChannel
 from ._columns import read_columns
 from ._declaration import Declaration, read_declaration
 from ._filter import zero_phase_butterworth
+from ._floor import floor_acceleration
 from ._kind import detect_kind
 from ._record import Dwell, Kind, Record
 from ._schedule import read_schedule, scheduled_dwells
@@ -55,11 +56,13 @@ def read_campaign(path: str | Path) -> Campaign:
     file, sections = declared.file, declared.sections
     drive = InputChannel(**sections["input"])
     response = OutputChannel(**sections["output"])
+    floor = None if sections["floor"] is None else FloorChannel(**sections["floor"])
     reader_filter = None if sections["filter"] is None else Filter(**sections["filter"])
     sign = -drive.moving_mass if drive.moving_mass is not None else 1.0
     factors = (
         sign * drive.gain * si_factor(drive.unit, _INPUT_MEASURES[drive.quantity], f"{file}: [input] unit"),
         si_factor(response.unit, response.quantity, f"{file}: [output] unit"),
+        1.0 if floor is None else floor.gain * si_factor(floor.unit, floor.quantity, f"{file}: [floor] unit"),
     )
     names = _record_names(declared)
     records = tuple(
@@ -87,6 +90,7 @@ def read_campaign(path: str | Path) -> Campaign:
         damping=tuple(sections["model"]["damping"]),
         elements=tuple(sections["model"]["elements"]),
         records=_clocked(records),
+        floor=floor,
     )
 
 
@@ -114,7 +118,11 @@ def _clocked(records: tuple[Record, ...]) -> tuple[Record, ...]:
 
 
 def _read_record(
-    declared: Declaration, number: int, name: str, factors: tuple[float, float], reader_filter: Filter | None
+    declared: Declaration,
+    number: int,
+    name: str,
+    factors: tuple[float, float, float],
+    reader_filter: Filter | None,
 ) -> Record:
     entry, sections = declared.records[number], declared.sections
     where = f"{declared.file}: [[record]] number {number + 1}"
@@ -124,11 +132,18 @@ def _read_record(
         sections["output"]["column"],
         sections["sampling"]["time"],
     )
-    columns = read_columns(file, list(dict.fromkeys([drive, response] + ([clock] if clock else []))))
+    ground = sections["floor"] or {}
+    wanted = (drive, response, ground.get("column"), clock)
+    columns = read_columns(file, list(dict.fromkeys(one for one in wanted if one)))
     total = columns[drive].samples.size
     start, stop = _span(where, file, entry, total)
     raw_input = _channel(file, drive, columns[drive].samples[start:stop], start) * factors[0]
     raw_output = _channel(file, response, columns[response].samples[start:stop], start) * factors[1]
+    floor = None
+    if ground:
+        column = ground["column"]
+        floor = _channel(file, column, columns[column].samples[start:stop], start) * factors[2]
+        _check_not_constant(file, column, floor)
     time = columns[clock].samples[start:stop] if clock else None
     stated = next((column.rate for column in columns.values() if column.rate is not None), None)
     rate = find_rate(file, sections["sampling"]["rate"], stated, time, clock, start)
@@ -148,6 +163,8 @@ def _read_record(
                 zero_phase_butterworth(one, rate, reader_filter.order, reader_filter.cutoff_hz)
                 for one in (raw_input, raw_output)
             )
+            if floor is not None:
+                floor = zero_phase_butterworth(floor, rate, reader_filter.order, reader_filter.cutoff_hz)
     dwells, kind = _excitation(where, declared, entry, rate, (start, stop, total), shown_input, shown_output)
     if kind != "free_decay" and not np.any(raw_input):
         raise ValueError(
@@ -173,6 +190,7 @@ def _read_record(
         settle=entry["settle"],
         dwells=dwells,
         kind=kind,
+        floor=floor if floor is None else floor_acceleration(floor, rate, ground["quantity"]),
     )
 
 

@@ -53,6 +53,7 @@ class Record:
         dwells: Dwells of a stepped sine, else empty.
         kind: What the excitation is.
         clock: Beginning and end of the record as shares of the whole test, 0 to 1.
+        floor: Measured acceleration of the floor about its mean [m/s^2], or None.
     """
 
     name: str
@@ -72,6 +73,7 @@ class Record:
     dwells: tuple[Dwell, ...] = ()
     kind: Kind = "broadband"
     clock: tuple[float, float] = (0.0, 1.0)
+    floor: Float[np.ndarray, " time"] | None = None
 
     @property
     def rings_down(self) -> bool:

@@ -1,0 +1,77 @@
+"""Columns of least squares for a dwell: harmonics of its frequency, and lines of the mains beside them."""
+
+import functools
+
+import numpy as np
+from jaxtyping import Float
+
+_APART = 0.25
+"""Turns that a line and a harmonic must part by over a window, so that it can tell them apart."""
+
+
+def harmonic_basis(
+    time: Float[np.ndarray, " time"], frequency: float, harmonics: int
+) -> Float[np.ndarray, "time column"]:
+    """Gives the columns 1, cos wt, -sin wt, cos 2wt, ...; coefficients are Re and Im of the complex
+    amplitudes.
+
+    Args:
+        time: Seconds, (time,).
+        frequency: [Hz].
+        harmonics: Highest order.
+
+    Returns:
+        (time, 1 + 2 harmonics).
+    """
+    turns = np.exp(2j * np.pi * frequency * time)[:, None] ** np.arange(1, harmonics + 1)
+    basis = np.ones((time.size, 1 + 2 * harmonics))
+    basis[:, 1::2], basis[:, 2::2] = turns.real, -turns.imag
+    return basis
+
+
+def meeting_order(frequency: float, line: float, seconds: float) -> int | None:
+    """Gives the harmonic that a window cannot tell from a line, such as the tenth of 5 Hz from 50 Hz.
+
+    Args:
+        frequency: Of the dwell [Hz].
+        line: Of the mains [Hz].
+        seconds: Length of the window.
+
+    Returns:
+        Its order, 2 or more, or None: the fundamental is far above any line.
+    """
+    order = round(line / frequency)
+    return order if order >= 2 and abs(order * frequency - line) * seconds < _APART else None
+
+
+@functools.lru_cache(maxsize=64)
+def drifting_harmonics(
+    window: int, rate: float, frequency: float, orders: int, lines: tuple[float, ...] = ()
+) -> tuple[Float[np.ndarray, "time column"], Float[np.ndarray, "column column"]]:
+    """Gives harmonics whose fundamental drifts linearly, lines beside them, the inverse of their products.
+
+    A line that the window cannot tell from a harmonic lets that one drift too. The records of a campaign
+    dwell at the same frequencies: all but the first find both ready.
+
+    Args:
+        window: Samples.
+        rate: Samples per second [Hz].
+        frequency: Of the dwell [Hz].
+        orders: Highest harmonic.
+        lines: Of the mains [Hz].
+
+    Returns:
+        Columns (time, column) and the inverse of their products.
+    """
+    time = (np.arange(window) - 0.5 * (window - 1)) / rate
+    basis = harmonic_basis(time, frequency, orders)
+    slope = (time / time[-1])[:, None]
+    columns = [basis, slope * basis[:, :3]]
+    for line in lines:
+        order = meeting_order(frequency, line, window / rate)
+        if order is None:
+            columns.append(harmonic_basis(time, line, 1)[:, 1:])
+        elif order <= orders:
+            columns.append(slope * basis[:, 2 * order - 1 : 2 * order + 1])
+    design = np.concatenate(columns, axis=1)
+    return design, np.linalg.inv(design.T @ design)
