@@ -12,7 +12,8 @@ class Balance:
     """Force balance of one plant.
 
     The state is (x, v, internal states of the first law that has any, of the second, ...). The sides are one
-    sign per switch: those of the first law, of the second, ...
+    sign per switch: those of the first law, of the second, ... Where a law moves the floor, x is the motion
+    relative to it.
 
     Args:
         plant: the plant.
@@ -26,11 +27,14 @@ class Balance:
         self._laws: list[tuple[Any, slice, slice]] = []
         self.watches: list[tuple[Switch, slice, list[int]]] = []
         self.sides = 0
+        self._floors = [law.floor for law in plant.laws if law.moves_floor]
+        self._speeds: list[int] = []
         for law in plant.laws:
             states = slice(self.order, self.order + law.inner)
             sides = slice(self.sides, self.sides + len(law.switches))
             for switch in law.switches:
                 self._watch(switch, states)
+            self._speeds += [self.order + place for place in law.speeds]
             self.order += law.inner
             self._laws.append((law, states, sides))
             self._friction.append(law.holding != (0.0, 0.0))
@@ -59,28 +63,40 @@ class Balance:
         x, v = y[0], y[1]
         net = push
         for force, own in self._plain:
-            net -= force(t, x, v, (), sides[own])
-        if not self._inner:
-            return v, net / self.mass
+            net = net - force(t, x, v, (), sides[own])
         inner = ()
         for force, rate, states, own in self._inner:
             z, s = y[states], sides[own]
-            net -= force(t, x, v, z, s)
+            net = net - force(t, x, v, z, s)
             inner += rate(t, x, v, z, s)
-        return v, net / self.mass, *inner
+        if not self._floors:
+            return v, net / self.mass, *inner
+        ground, rates = self.ground(t), [v, net / self.mass, *inner]
+        for place in (1, *self._speeds):
+            rates[place] = rates[place] - ground
+        return tuple(rates)
+
+    @no_type_check
+    def ground(self, t):
+        """Acceleration of the floor, m/s^2."""
+        return sum((floor(t) for floor in self._floors), 0.0)
 
     @no_type_check
     def rates_stuck(self, t, y, push, sides):
         """Rates of the state while stuck: the internal states go on relaxing."""
-        inner = (0.0, 0.0)
+        rates = [0.0, 0.0]
         for _, rate, states, own in self._inner:
-            inner += rate(t, y[0], 0.0, y[states], sides[own])
-        return inner
+            rates += rate(t, y[0], 0.0, y[states], sides[own])
+        if self._floors:
+            ground = self.ground(t)
+            for place in self._speeds:
+                rates[place] = rates[place] - ground
+        return tuple(rates)
 
     @no_type_check
     def net_at_rest(self, t, y, push, sides):
         """Force that friction must hold if the plant is to stay at rest, N; floats or arrays."""
-        net = push
+        net = push - self.mass * self.ground(t) if self._floors else push
         for (law, states, own), friction in zip(self._laws, self._friction, strict=True):
             if not friction:
                 net = net - law.force(t, y[0], 0.0, y[states], sides[own])
@@ -88,5 +104,13 @@ class Balance:
 
     @no_type_check
     def acceleration(self, t, y, push, sides, stuck):
-        """Acceleration (time,), m/s^2, from states (state, time), sides (switch, time) and stuck (time,)."""
-        return np.where(stuck, 0.0, self.rates(t, y, push, sides)[1])
+        """Absolute acceleration (time,), m/s^2.
+
+        Args:
+            t: instants, s.
+            y: states (state, time).
+            push: force (time,), N.
+            sides: (switch, time).
+            stuck: (time,).
+        """
+        return self.ground(t) + np.where(stuck, 0.0, self.rates(t, y, push, sides)[1])

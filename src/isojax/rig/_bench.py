@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from ._balance import Balance
 from ._excitation import Piece, forces_of
+from ._law import Stretch
 from ._plan import Direction, Plan, Role, Trial
 from ._plant import Plant
 from ._sampling import anti_alias_taps, decimated, oversampling
@@ -66,6 +67,7 @@ class SimulatedRecord:
         period: of a periodic force, samples.
         settle: samples at the start.
         stiffness_scale: by which the linear stiffness had drifted.
+        floor: recorded acceleration of the floor, m/s^2; None where it is not measured.
     """
 
     name: str
@@ -81,6 +83,7 @@ class SimulatedRecord:
     period: int | None
     settle: int
     stiffness_scale: float
+    floor: Float[np.ndarray, " time"] | None = None
 
 
 def response(
@@ -100,7 +103,8 @@ def response(
         tolerance: local error of the integration.
 
     Returns:
-        "displacement", "velocity", "acceleration" and "force", (time,) each, SI.
+        "displacement", "velocity", "acceleration" and "force", (time,) each, SI; where the floor moves the
+        first two are relative to it.
     """
     balance = Balance(plant)
     path = Integrator(balance, tolerance).run(pieces, [displacement] + [0.0] * (balance.order - 1))
@@ -133,12 +137,18 @@ def run(
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"Argument `plan` must name each record once, but {name!r} comes up twice.")
-    return tuple(_record(plant, trial, bench, [seed, 0, index]) for index, trial in enumerate(trials))
+    ends = np.cumsum([0.0, *(trial.seconds for trial in trials)])
+    shares = (ends / ends[-1]).tolist()
+    records = []
+    for index, trial in enumerate(trials):
+        stretch = Stretch(shares[index], shares[index + 1], trial.seconds)
+        placed = plant.placed(stretch, np.random.default_rng([seed, 2, index]))
+        records.append(_record(placed, trial, bench, np.random.default_rng([seed, 0, index])))
+    return tuple(records)
 
 
-def _record(plant: Plant, trial: Trial, bench: Bench, seed: list[int]) -> SimulatedRecord:
+def _record(plant: Plant, trial: Trial, bench: Bench, draw: np.random.Generator) -> SimulatedRecord:
     """Simulate one trial and measure it."""
-    draw = np.random.default_rng(seed)
     scale = 1 + bench.drift * float(draw.standard_normal())
     count = int(trial.seconds * bench.rate * (1 + 1e-12))
     factor = oversampling(bench.rate) if bench.anti_alias else 1
@@ -148,13 +158,18 @@ def _record(plant: Plant, trial: Trial, bench: Bench, seed: list[int]) -> Simula
     end = max(float(times[-1]), trial.pieces[-1].stop) + abs(plant.lag) + 1 / bench.rate
     pieces = [*trial.pieces[:-1], trial.pieces[-1].lasting_until(end)]
 
-    acting = [piece.delayed(plant.lag) for piece in pieces]
+    acting = pieces
+    for instrument in plant.instruments:
+        acting = instrument.acting(acting, bench.rate)
+    acting = [piece.delayed(plant.lag) for piece in acting]
     motion = response(plant.drifted(scale), acting, times, trial.displacement, bench.tolerance)
     force, output = forces_of(pieces, times), motion[bench.output]
     for instrument in plant.instruments:
         force = instrument.recorded_force(times, force)
         output = instrument.recorded_output(times, output)
     force, output = decimated(force, taps, factor), decimated(output, taps, factor)
+    shown = [law.floor_sensor(times) for law in plant.laws if law.moves_floor]
+    sensed = [decimated(one, taps, factor) for one in shown if one is not None]
     return SimulatedRecord(
         name=trial.name,
         time=np.arange(count) / bench.rate,
@@ -169,4 +184,5 @@ def _record(plant: Plant, trial: Trial, bench: Bench, seed: list[int]) -> Simula
         period=None if trial.period is None else round(trial.period * bench.rate),
         settle=round(trial.settle * bench.rate),
         stiffness_scale=scale,
+        floor=sum(sensed[1:], sensed[0]) if sensed else None,
     )

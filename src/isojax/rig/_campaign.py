@@ -18,6 +18,8 @@ from ._plant import Plant
 
 _UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}
 
+_FLOOR = ("", "[floor]", 'quantity = "acceleration"', 'column = "floor"', 'unit = "m/s^2"')
+
 
 def write_campaign(
     folder: str | Path,
@@ -46,10 +48,12 @@ def write_campaign(
     records = run(plant, plan, seed, bench)
     folder.mkdir(parents=True, exist_ok=True)
     for record in records:
-        columns = {
+        columns: dict[str, Any] = {
             "force": record.force.astype(np.float32),
             bench.output: record.output.astype(np.float32),
         }
+        if record.floor is not None:
+            columns["floor"] = record.floor.astype(np.float32)
         content = _npz(columns) if file_format == "npz" else _csv(columns)
         _write(folder / f"{record.name}.{file_format}", content)
         if record.schedule:
@@ -73,7 +77,12 @@ def truth(plant: Plant, bench: Bench) -> dict[str, Any]:
 
 
 def _spec(effect: Law | Instrument) -> dict[str, Any]:
-    return {"kind": effect.name, "q": [float(value) for value in vars(effect).values()]}
+    return {
+        "kind": effect.name,
+        "q": [
+            np.asarray(value, dtype=float).tolist() for name, value in vars(effect).items() if name[0] != "_"
+        ],
+    }
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -83,9 +92,9 @@ def _write(path: Path, content: bytes) -> None:
     os.replace(partial, path)
 
 
-def _npz(columns: dict[str, np.ndarray]) -> bytes:
+def _npz(columns: dict[str, Any]) -> bytes:
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **columns)
+    np.savez_compressed(buffer, **columns)
     return buffer.getvalue()
 
 
@@ -128,6 +137,7 @@ def _toml(
         f'quantity = "{bench.output}"',
         f'column = "{bench.output}"',
         f'unit = "{_UNITS[bench.output]}"',
+        *(_FLOOR if records[0].floor is not None else ()),
         "",
         "[sampling]",
         f"rate = {float(bench.rate)!r}",

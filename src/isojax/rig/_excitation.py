@@ -41,6 +41,14 @@ class Piece(ABC):
     def delayed(self, delay: float) -> "Piece":
         """The piece, acting later by `delay` seconds."""
 
+    def with_harmonic(self, order: int, share: float, phase: float) -> "Piece":
+        """The piece A cos(theta), and whatever it holds beside that, plus share A cos(order theta + phase).
+
+        Raises:
+            ValueError: if the piece is no sine or sweep, so that its theta is not known.
+        """
+        raise ValueError(f"Harmonics belong to a sine or a sweep, but the force is {self}.")
+
 
 @dataclass(frozen=True)
 class Tones(Piece):
@@ -93,6 +101,69 @@ class Tones(Piece):
         return replace(self, stop=stop)
 
     def delayed(self, delay: float) -> "Piece":
+        """The piece, acting later by `delay` seconds."""
+        return replace(self, start=self.start + delay, stop=self.stop + delay, origin=self.origin + delay)
+
+    def with_harmonic(self, order: int, share: float, phase: float) -> "Tones":
+        """The tones and one more; the first of them is the sine, and the others must be harmonics of it.
+
+        Raises:
+            ValueError: if they are not.
+        """
+        if not self.amplitudes:
+            return self
+        sine = self.angular_frequencies[0]
+        orders = [angular / sine for angular in self.angular_frequencies]
+        if any(abs(one - round(one)) > 1e-9 for one in orders):
+            raise ValueError(
+                f"Harmonics belong to a sine or a sweep, but the orders of the tones are {orders}."
+            )
+        theta = self.phases[0] - math.pi / 2
+        return replace(
+            self,
+            amplitudes=(*self.amplitudes, share * self.amplitudes[0]),
+            angular_frequencies=(*self.angular_frequencies, order * sine),
+            phases=(*self.phases, order * theta + phase + math.pi / 2),
+        )
+
+
+@dataclass(frozen=True)
+class Line(Piece):
+    """Force value + slope (t - origin).
+
+    Args:
+        start: s.
+        stop: s.
+        origin: s.
+        value: N.
+        slope: N/s.
+    """
+
+    start: float
+    stop: float
+    origin: float
+    value: float
+    slope: float = 0.0
+
+    @property
+    def longest_step(self) -> float:
+        """The length of the piece, s: a line hides no swing."""
+        return self.stop - self.start
+
+    @no_type_check
+    def force(self, t):
+        """Force at the instant `t`, N."""
+        return self.value + self.slope * (t - self.origin)
+
+    def forces(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+        """Force at each instant, N."""
+        return self.value + self.slope * (times - self.origin)
+
+    def lasting_until(self, stop: float) -> "Line":
+        """The piece with another end."""
+        return replace(self, stop=stop)
+
+    def delayed(self, delay: float) -> "Line":
         """The piece, acting later by `delay` seconds."""
         return replace(self, start=self.start + delay, stop=self.stop + delay, origin=self.origin + delay)
 
@@ -157,6 +228,11 @@ class Chirp(Piece):
     def delayed(self, delay: float) -> "Piece":
         """The piece, acting later by `delay` seconds."""
         return replace(self, start=self.start + delay, stop=self.stop + delay, origin=self.origin + delay)
+
+    def with_harmonic(self, order: int, share: float, phase: float) -> "Chirp":
+        """The sweep with one more harmonic."""
+        shift = (1 - order) * math.pi / 2 + phase
+        return replace(self, harmonics=(*self.harmonics, (order, share, shift)))
 
 
 def forces_of(pieces: Sequence[Piece], times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:

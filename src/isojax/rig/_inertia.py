@@ -37,6 +37,7 @@ class SecondMode(Law):
 
     name: ClassVar[str] = "second_mode"
     inner: ClassVar[int] = 2
+    speeds: ClassVar[tuple[int, ...]] = (1,)
     mass: float
     frequency: float
     ratio: float

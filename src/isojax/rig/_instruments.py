@@ -5,6 +5,7 @@ and recorded output = (1 + gain deviation) x output + offset, less what coupling
 """
 
 from abc import ABC
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,6 +13,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
+
+from ._excitation import Piece
+from ._law import Stretch
 
 
 class Instrument(ABC):
@@ -24,6 +28,14 @@ class Instrument(ABC):
     def lag(self) -> float:
         """Time by which the acting force lags the recorded one, s."""
         return 0.0
+
+    def placed(self, stretch: Stretch, draw: np.random.Generator) -> "Instrument":
+        """The instrument in one record of a test; `draw` gives the record's random numbers."""
+        return self
+
+    def acting(self, pieces: Sequence[Piece], rate: float) -> Sequence[Piece]:
+        """The force that acts where these pieces are recorded, `rate` samples a second; see `lag`."""
+        return pieces
 
     def recorded_force(
         self, times: Float[np.ndarray, " time"], force: Float[np.ndarray, " time"]

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar, no_type_check
 
 Switch = Callable[[Any, Any, Any], Any]
@@ -20,6 +21,21 @@ def velocity(x, v, z):
     return v
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """The part of a test that a record is.
+
+    Args:
+        begin: share of the test, 0 to 1, that is over when the record begins.
+        end: the same when it ends.
+        seconds: length of the record; its time starts at 0.
+    """
+
+    begin: float
+    end: float
+    seconds: float
+
+
 class Law(ABC):
     """One physical effect in the force balance.
 
@@ -36,6 +52,10 @@ class Law(ABC):
     """Catalogue name, as in campaign.toml."""
     inner: ClassVar[int] = 0
     """Number of internal states."""
+    speeds: ClassVar[tuple[int, ...]] = ()
+    """Which of the internal states are speeds of masses, so that a floor that moves pushes them, too."""
+    moves_floor: ClassVar[bool] = False
+    """Whether the law moves the floor under the plant; the state is then relative to the floor."""
 
     @property
     def switches(self) -> tuple[Switch, ...]:
@@ -69,6 +89,26 @@ class Law(ABC):
     def rate(self, t, x, v, z, s):
         """Time derivative of each internal state, a tuple as long as `inner`."""
         return ()
+
+    @no_type_check
+    def floor(self, t):
+        """Acceleration of the floor, m/s^2."""
+        return 0.0
+
+    @no_type_check
+    def floor_sensor(self, t):
+        """What an accelerometer on the floor shows, m/s^2; None where there is none."""
+        return None
+
+    @no_type_check
+    def placed(self, stretch, draw):
+        """The law in one record of a test.
+
+        Args:
+            stretch: the `Stretch` of the test that the record is.
+            draw: random numbers of the record.
+        """
+        return self
 
     @no_type_check
     def drifted(self, scale):

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ._dampers import AbsQuadraticDamping, CubicDamping, LinearDamping
 from ._instruments import Instrument
-from ._law import Law
+from ._law import Law, Stretch
 from ._springs import AbsQuadraticStiffness, CubicStiffness, LinearStiffness
 
 BASE_NAMES = (
@@ -80,6 +82,14 @@ class Plant:
     def drifted(self, scale: float) -> "Plant":
         """The plant with its linear stiffness multiplied by `scale`."""
         return replace(self, laws=tuple(law.drifted(scale) for law in self.laws))
+
+    def placed(self, stretch: Stretch, draw: np.random.Generator) -> "Plant":
+        """The plant in one record of a test: what has a time or a chance of its own has it there."""
+        return replace(
+            self,
+            laws=tuple(law.placed(stretch, draw) for law in self.laws),
+            instruments=tuple(instrument.placed(stretch, draw) for instrument in self.instruments),
+        )
 
     @property
     def base_coefficients(self) -> list[float]:
