@@ -24,6 +24,8 @@ from ._lyapunov import LyapunovExponent as LyapunovExponent
 from ._lyapunov import largest_lyapunov_exponent as largest_lyapunov_exponent
 from ._map import StabilityMap as StabilityMap
 from ._map import stability_map as stability_map
+from ._nearest_folds import NearestFolds as NearestFolds
+from ._nearest_folds import find_nearest_folds as find_nearest_folds
 from ._orbit import Orbit as Orbit
 from ._orbit import find_periodic_orbit as find_periodic_orbit
 from ._phase_portrait import PhasePortrait as PhasePortrait
