@@ -2,6 +2,8 @@
 
 import gc
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +11,13 @@ import jax
 import pytest
 from jaxtyping import install_import_hook
 
+_ALREADY = os.environ.get("JAX_COMPILATION_CACHE_DIR")
+_COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
+"""Compiled code of this run: its workers, their modules and the processes that tests start share it."""
+
+os.environ["JAX_COMPILATION_CACHE_DIR"] = _COMPILED
+jax.config.update("jax_compilation_cache_dir", _COMPILED)
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 install_import_hook("isojax", "beartype.beartype")
@@ -27,6 +36,12 @@ def _let_compiled_code_go() -> Iterator[None]:
     if mappings.exists() and len(mappings.read_bytes().splitlines()) > _MOST_MAPPINGS:
         jax.clear_caches()
         gc.collect()
+
+
+def pytest_sessionfinish() -> None:
+    """Clear the compiled code away, in the process that made its folder: workers inherit it."""
+    if _ALREADY is None:
+        shutil.rmtree(_COMPILED, ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

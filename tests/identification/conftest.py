@@ -40,6 +40,7 @@ def _as_record(one: rig.SimulatedRecord) -> Record:
         settle=one.settle,
         dwells=dwells,
         kind=kind,
+        floor=one.floor,
     )
 
 

@@ -69,11 +69,13 @@ def test_a_line_of_the_table_is_one_effect_for_the_rig_and_for_the_model(name):
     assert effect.signed <= absent.signed
     assert all(other in CATALOGUE for other in (*effect.exact, *effect.near, *effect.known_by))
     if isinstance(law, rig.Law) and not law.inner and not law.inertia:
+        law = law.placed(rig.Stretch(0.5, 1.0, 2.0), np.random.default_rng(0))
+        clock = {"clock": jnp.asarray(0.625)} if element.channels else {}
         for x, v in ((9e-4, 0.02), (-9e-4, 0.03), (3e-5, -0.025), (-3e-5, -0.01)):
             sides = tuple(math.copysign(1.0, switch(x, v, ())) for switch in law.switches)
-            assert law.force(0.0, x, v, (), sides) == pytest.approx(
-                float(element.force(jnp.asarray(x), jnp.asarray(v), ())), rel=1e-4, abs=1e-6
-            )
+            state = jnp.asarray(x), jnp.asarray(v)
+            told = element.force(*state, ()) + (element.channel_force(*state, clock) if clock else 0.0)
+            assert law.force(0.5, x, v, (), sides) == pytest.approx(float(told), rel=1e-4, abs=1e-6)
 
 
 INSTRUMENTS = ("ac_coupling",)

@@ -9,9 +9,18 @@ import pytest
 from scipy import signal, stats
 from scipy.integrate import solve_ivp
 
-from isojax.elements import CubicStiffness, DriveHarmonics, LinearDamping, LinearStiffness, MainsHum
-from isojax.identification import diagnose, fit
+from isojax import rig
+from isojax.elements import (
+    CubicStiffness,
+    DriveHarmonics,
+    InputHold,
+    LinearDamping,
+    LinearStiffness,
+    MainsHum,
+)
+from isojax.identification import diagnose, fit, scales
 from isojax.identification._channels import channel_table, drive_harmonic, output_line
+from isojax.identification._score import score_test
 from isojax.models import Isolator
 from isojax.records import Record
 
@@ -243,3 +252,18 @@ def test_hum_of_two_records_is_recovered(campaign_of):
     )
     amplitude, error = fitted_value(campaign_of, records, MainsHum(1e-6, 50.0), "mains_hum.amplitude")
     assert abs(amplitude - 4e-6) < 4.0 * error + 4e-8
+
+
+def test_a_held_drive_is_scored_with_its_share_where_one_step_spans_a_sample(simulated):
+    # Both courses agree at every sample: what is between them must count.
+    plant = rig.Plant((rig.LinearStiffness(STIFFNESS), rig.LinearDamping(DAMPING)), MASS)
+    bench = rig.Bench(
+        rate=250.0, output="displacement", noise=1e-7, force_noise=0.0, drift=0.0, anti_alias=False
+    )
+    plan = rig.Multisine((60.0,), 2.0, 12.0, 4.0, 3)
+    campaign = simulated(plant.plus(rig.InputHold(0.0)), plan, bench=bench)
+    truth = Isolator(MASS, (LinearStiffness(STIFFNESS), LinearDamping(DAMPING)))
+    found = fit(truth, campaign)
+    (score,) = score_test(found.estimate, scales(campaign), (InputHold(0.0, 0.0),)).scores
+    assert score.strength == pytest.approx(1.0, abs=0.05)
+    assert score.error < 0.02

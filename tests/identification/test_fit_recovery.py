@@ -63,6 +63,7 @@ ELSEWHERE = {
         "second_mode",
     ),
     "test_channels.py": ("drive_harmonics", "input_hold", "mains_hum", "stiffness_drift"),
+    "test_moving_floor.py": ("floor_motion",),
 }
 """Effects whose recovery has a file of its own."""
 

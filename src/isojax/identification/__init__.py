@@ -1,6 +1,7 @@
 """From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop."""
 
 from ._base_model import base_model as base_model
+from ._ceiling import Ceiling as Ceiling
 from ._circle_fit import CircleFit as CircleFit
 from ._circle_fit import fit_circle as fit_circle
 from ._classical_guess import ClassicalGuess as ClassicalGuess
@@ -10,8 +11,14 @@ from ._close_loop import extend as extend
 from ._covariance import Uncertainty as Uncertainty
 from ._covariance import uncertainty as uncertainty
 from ._diagnose import diagnose as diagnose
+from ._drift_budget import DriftBudget as DriftBudget
+from ._drift_budget import Share as Share
+from ._drift_budget import drift_budget as drift_budget
+from ._dwell_remainder import DwellRemainder as DwellRemainder
 from ._errors import Errors as Errors
 from ._errors import Run as Run
+from ._exponents import Exponents as Exponents
+from ._find_separation import find_separating_experiment as find_separating_experiment
 from ._findings import Candidate as Candidate
 from ._findings import Extension as Extension
 from ._findings import Finding as Finding
@@ -31,7 +38,13 @@ from ._harmonic_balance import normalised_law as normalised_law
 from ._linear_response import linear_response as linear_response
 from ._paper_table import PaperTable as PaperTable
 from ._paper_table import paper_table as paper_table
+from ._pursuit import PursuedLaw as PursuedLaw
+from ._pursuit import Pursuit as Pursuit
 from ._read_campaign import read_campaign as read_campaign
+from ._remainder import ForceMap as ForceMap
+from ._remainder import Remainder as Remainder
+from ._remainder import explain_remainder as explain_remainder
+from ._remainder import loop_remainder as loop_remainder
 from ._residual import residual as residual
 from ._scales import scales as scales
 from ._units import OUTPUT_UNITS as OUTPUT_UNITS

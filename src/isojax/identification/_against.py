@@ -40,7 +40,9 @@ class Against:
         with np.errstate(over="ignore", invalid="ignore"):
             free_runs = run_freely(everything, found.model)
             if everything.records == fitted.records and everything.segments == fitted.segments:
-                restarts = restart_records(found.bench, found.model, nuisances.stiffness_spread, nuisances)
+                restarts = restart_records(
+                    found.bench, found.model, nuisances.stiffness_spread, nuisances, found.places
+                )
             else:
                 restarts = restart_records(Bench(everything), found.model, nuisances.stiffness_spread)
         if not is_successful(found.result):

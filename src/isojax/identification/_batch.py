@@ -135,6 +135,7 @@ def prepare(
     shift: float = 0.0,
     based: bool = False,
     channels: tuple[str, ...] = (),
+    room: tuple[Segment, ...] = (),
 ) -> Prepared:
     """Lay segments side by side.
 
@@ -147,13 +148,15 @@ def prepare(
         shift: time by which the drive acts later than it was recorded [s].
         based: whether the drive is the acceleration of the base.
         channels: names of the signals of the records that are wanted beside the drive.
+        room: segments for which there shall be room, too: tables of one shape share their compiled code.
 
     Returns:
         The batches and what belongs to their lanes.
     """
-    length = max(segment.stop - segment.start for segment in segments)
-    threads = min(workers(), len(segments))
-    lanes = -(-len(segments) // threads) * threads
+    length = max(segment.stop - segment.start for segment in (*segments, *room))
+    most = max(len(segments), len(room))
+    threads = min(workers(), most)
+    lanes = -(-most // threads) * threads
     stages = 2 * substeps + 1
     # Filled lane by lane, then turned: writing across the lanes would touch a cache line a sample.
     drive, rates = np.zeros((lanes, length, stages)), np.zeros((lanes, length, stages))

@@ -3,11 +3,10 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from .._parameters import list_parameters
 from ..models import Isolator
 from ..records import Record, ringing_frequency
 from ._elimination import Nuisances, step_nuisances
-from ._problem import Bench, Point, Problem
+from ._problem import Bench, Point, Problem, one_hot
 from ._segments import Segment
 
 ROUNDS = 3
@@ -35,7 +34,13 @@ SMALL_STEP = 1e-4
 """Step of a state, over its range, that no longer counts."""
 
 
-def best_nuisances(bench: Bench, model: Isolator, spread: float, known: Nuisances | None = None) -> Point:
+def best_nuisances(
+    bench: Bench,
+    model: Isolator,
+    spread: float,
+    known: Nuisances | None = None,
+    places: tuple[int, ...] = (),
+) -> Point:
     """Find the nuisances at given coefficients.
 
     Args:
@@ -43,15 +48,17 @@ def best_nuisances(bench: Bench, model: Isolator, spread: float, known: Nuisance
         model: the isolator.
         spread: prior standard deviation of each record's linear stiffness.
         known: where to begin; at the measured states if omitted.
+        places: coefficients that have columns at the point; they stay as they are. A search for the same ones
+            shares the compiled code.
 
     Returns:
-        The point; no coefficient has a column.
+        The point.
     """
     released = any(record.kind == "free_decay" for record in bench.problem.records)
     begin = bench.settle(known, model, len(model.elements), spread)
     if released and known is None:
         begin = _first_swings(bench, model, begin)
-    return _settle_from(bench, model, begin, released)
+    return _settle_from(bench, model, begin, released, places)
 
 
 def _first_swings(bench: Bench, model: Isolator, begin: Nuisances) -> Nuisances:
@@ -70,22 +77,29 @@ def _first_swings(bench: Bench, model: Isolator, begin: Nuisances) -> Nuisances:
     own, scales = short.starts(model, short.prepared(model, carried))
     starts, units = bench.starts(model, bench.prepared(model, carried))
     states = own + scales * found.nuisances.states.T
-    return begin._replace(states=((states - starts) / units).T)
+    # Either bench may carry lanes beyond the segments, which hold nothing.
+    used = slice(len(problem.segments))
+    moved = begin.states.copy()
+    moved[used] = ((states[:, used] - starts[:, used]) / units[:, used]).T
+    return begin._replace(states=moved)
 
 
-def _settle_from(bench: Bench, model: Isolator, begin: Nuisances, released: bool) -> Point:
+def _settle_from(
+    bench: Bench, model: Isolator, begin: Nuisances, released: bool, places: tuple[int, ...] = ()
+) -> Point:
     """Take Gauss-Newton steps of the nuisances until they stand."""
-    nothing = np.zeros((len(list_parameters(model)), 0))
+    directions = one_hot(model, places, [1.0] * len(places))
+    still = np.zeros(len(places))
     carried = len(model.elements)
-    point = bench.evaluate(model, nothing, begin)
+    point = bench.evaluate(model, directions, begin)
     owner = bench.prepared(model, carried).record
     for _ in range(RELEASED_ROUNDS if released else ROUNDS):
         if not point.is_finite:
             break
-        moved = step_nuisances(point.reduced, owner, point.nuisances, np.zeros(0))
-        before, point = point, bench.evaluate(model, nothing, moved)
+        moved = step_nuisances(point.reduced, owner, point.nuisances, still)
+        before, point = point, bench.evaluate(model, directions, moved)
         if released:
-            point = _shortened(bench, before, point, owner)
+            point = _shortened(bench, directions, before, point, owner)
         # chi2 is that at the end of the step, as if the response were linear; of a release also the step must
         # be small, since its motion is not.
         is_small = not released or np.max(np.abs(moved.states - before.nuisances.states)) < SMALL_STEP
@@ -96,9 +110,14 @@ def _settle_from(bench: Bench, model: Isolator, begin: Nuisances, released: bool
     return point
 
 
-def _shortened(bench: Bench, before: Point, after: Point, owner: Int[np.ndarray, " lanes"]) -> Point:
+def _shortened(
+    bench: Bench,
+    directions: Float[np.ndarray, "parameter column"],
+    before: Point,
+    after: Point,
+    owner: Int[np.ndarray, " lanes"],
+) -> Point:
     """Halve the step of each record whose error it raised; where that does not help, stay."""
-    nothing = np.zeros((len(list_parameters(before.model)), 0))
     known, share = before.reduced.by_record[:, -1, -1], np.ones(before.samples.size)
     old, new, found = before.nuisances, after.nuisances, after
     for halving in range(HALVINGS + 1):
@@ -111,7 +130,7 @@ def _shortened(bench: Bench, before: Point, after: Point, owner: Int[np.ndarray,
             states=old.states + np.where(moved > 0.0, moved * (new.states - old.states), 0.0),
             stiffness=old.stiffness + np.where(share > 0.0, share * (new.stiffness - old.stiffness), 0.0),
         )
-        found = bench.evaluate(before.model, nothing, between)
+        found = bench.evaluate(before.model, directions, between)
     return found
 
 

@@ -7,6 +7,9 @@ from ..elements import AbstractElement
 from ._estimate import Estimate
 from ._score import ScoreTest
 
+GOOD = 1.05
+"""chi2/dof up to which a fit is good."""
+
 
 def strength_unit(element: AbstractElement) -> str:
     """Give the unit of an element's strength.
@@ -24,7 +27,7 @@ def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[s
     """Say how large each effect that was not found could still be.
 
     A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
-    linear step from there says nothing of any strength: ask only where the fit is good.
+    linear step from there says nothing of any strength: nothing is said there.
 
     Args:
         test: the score test.
@@ -32,8 +35,10 @@ def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[s
         found: catalogue name of the effect that was found, or None.
 
     Returns:
-        `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name.
+        `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name; empty unless the fit is good.
     """
+    if fitted.chi2 / fitted.dof > GOOD:
+        return {}
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {
         score.element.name: (

@@ -1,4 +1,4 @@
-"""Signals of a record beside its drive, which some effects follow: clock, other holds, harmonics, hum."""
+"""Signals of a record beside its drive, which some effects follow: clock, holds, harmonics, hum, floor."""
 
 from typing import cast, get_args
 
@@ -7,17 +7,13 @@ from jaxtyping import Float
 from scipy.signal import hilbert
 from scipy.signal.windows import blackmanharris
 
+from ..elements import CATALOGUE
 from ..excitations import Hold, tabulate
 from ..records import Record
 
-_MAINS = 60.0
-"""Highest frequency of the mains [Hz]."""
-
 
 def meaningless(records: tuple[Record, ...]) -> tuple[str, ...]:
-    """Name the effects whose signals mean nothing in some of these records.
-
-    The phase of a drive is that of a sine or a sweep; hum must lie below half the sampling rate.
+    """Name the effects that follow a signal which some of these records do not have.
 
     Args:
         records: the records.
@@ -25,12 +21,30 @@ def meaningless(records: tuple[Record, ...]) -> tuple[str, ...]:
     Returns:
         Catalogue names.
     """
-    names = []
-    if not all(record.kind in ("stepped_sine", "swept") for record in records):
-        names.append("drive_harmonics")
-    if any(record.rate <= 2.0 * _MAINS for record in records):
-        names.append("mains_hum")
-    return tuple(names)
+    followed = {name for kind in CATALOGUE.values() for name in kind.channels}
+    absent = {name for name in followed if not all(carries(record, name) for record in records)}
+    return tuple(name for name, kind in CATALOGUE.items() if absent.intersection(kind.channels))
+
+
+def carries(record: Record, name: str) -> bool:
+    """Say whether a signal means anything in a record.
+
+    The phase of a drive is that of a sine or a sweep; a line must lie below half the sampling rate; a floor
+    must have been measured.
+
+    Args:
+        record: the record.
+        name: of the signal, as in `channel_table`.
+
+    Returns:
+        Whether there is such a signal.
+    """
+    kind, _, rest = name.partition("_")
+    if kind == "drive":
+        return record.kind in ("stepped_sine", "swept")
+    if kind == "hum":
+        return record.rate > 2.0 * float(rest)
+    return kind != "floor" or record.floor is not None
 
 
 def channel_table(
@@ -44,7 +58,8 @@ def channel_table(
             one's.
             "drive_cosine_2", "drive_sine_2" and so on: the drive's amplitude times the cosine and sine of so
             many times its phase. "hum_50", "hum_60": a cosine of that frequency [Hz] and of amplitude one,
-            with the phase that the record's output has there.
+            with the phase that the record's output has there. "floor": measured acceleration of the floor
+            [m/s^2], band-limited between its samples.
         record: the record.
         hold: what its drive does between samples.
         substeps: integration steps a sample.
@@ -54,8 +69,14 @@ def channel_table(
         The signal; `2 substeps + 1` equidistant times from one sample to the next.
 
     Raises:
-        ValueError: if there is no such signal.
+        ValueError: if there is no such signal, or this record has none.
     """
+    if name == "floor":
+        if record.floor is None:
+            raise ValueError(
+                f"Record {record.name} must hold the motion of the floor, but no [floor] is declared."
+            )
+        return tabulate(record.floor, record.rate, "band_limited", substeps)[0]
     kind, _, rest = name.partition("_")
     if kind == "hold" and rest in get_args(Hold):
         other, _ = tabulate(record.input, record.rate, cast(Hold, rest), substeps, shift)

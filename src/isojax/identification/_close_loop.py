@@ -5,14 +5,20 @@ from collections.abc import Callable
 from typing import Any
 
 from .._results import RESULTS, is_successful
+from ..elements import CATALOGUE
 from ..records import Campaign
 from ._classical_guess import classical_guess
 from ._diagnose import MOST_OF_IT, diagnose, is_clean, is_good
+from ._find_separation import with_separating_experiment
 from ._findings import Extension, Loop, Verdict, VerdictWord
 from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
 from ._look_ahead import find_superfluous
 from ._refit import bic
 from ._scales import scales as campaign_scales
+
+MOST_AT_ONCE = 2
+"""Effects that explain all a campaign lacks. More are rather the parts by which they imitate one law that the
+catalogue does not have, so that no more than "partly explained" is said of them."""
 
 
 def extend(before: Fit, verdict: Verdict) -> Extension:
@@ -41,6 +47,7 @@ def close_loop(
     campaign: Campaign,
     *,
     max_iterations: int = 3,
+    excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
 ) -> Loop:
@@ -51,6 +58,7 @@ def close_loop(
     Args:
         campaign: the measurements.
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
+        excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.
         progress: told a line a step.
 
@@ -58,18 +66,25 @@ def close_loop(
         The loop: fits before and after, the findings, and the verdict over all.
 
     Raises:
-        ValueError: if `max_iterations` is negative, or as `classical_guess` and `fit` raise it.
+        ValueError: if `max_iterations` is negative, if `excluded` holds what is no catalogue name, or as
+            `classical_guess` and `fit` raise it.
     """
     if max_iterations < 0:
         raise ValueError(f"Argument `max_iterations` must be 0 or more, but is {max_iterations}.")
+    unknown = [name for name in excluded if name not in CATALOGUE]
+    if unknown:
+        raise ValueError(f"Argument `excluded` must hold catalogue names, but {unknown[0]!r} is none.")
     begin = time.perf_counter()
     progress("classical guess")
     guess = classical_guess(campaign)
     progress("fit of the declared model")
     before = current = fit(guess.model, campaign, solver=solver, progress=progress)
     first = before.estimate.excess
-    extensions, verdict = _grow(before, first, (), max_iterations, solver, progress)
-    extensions, verdict = _revise(before, first, extensions, verdict, max_iterations, solver, progress)
+    extensions, verdict = _grow(before, first, excluded, max_iterations, solver, progress)
+    extensions, verdict = _revise(
+        before, first, extensions, verdict, excluded, max_iterations, solver, progress
+    )
+    extensions = tuple(map(with_separating_experiment, extensions))
     current = extensions[-1].after if extensions else before
     if not is_successful(current.result):
         verdict = _without_evidence(current)
@@ -85,7 +100,7 @@ def close_loop(
         before,
         extensions,
         current,
-        _overall(before, current, bool(extensions), verdict),
+        _overall(before, current, len(extensions), verdict),
         verdict,
         verdict.bounds,
         time.perf_counter() - begin,
@@ -134,6 +149,7 @@ def _revise(
     first_excess: float,
     extensions: tuple[Extension, ...],
     verdict: Verdict,
+    excluded: tuple[str, ...],
     max_iterations: int,
     solver: Any,
     progress: Callable[[str], None],
@@ -151,7 +167,7 @@ def _revise(
     if doubtful is None:
         return extensions, verdict
     progress(f"{doubtful} is not needed beside the later findings: search again without it")
-    again, last = _grow(before, first_excess, (doubtful,), max_iterations, solver, progress)
+    again, last = _grow(before, first_excess, (*excluded, doubtful), max_iterations, solver, progress)
     if not again:
         return extensions, verdict
     new, old = again[-1].after.estimate, final.estimate
@@ -159,14 +175,14 @@ def _revise(
     return (again, last) if bic(new, inflation) <= bic(old, inflation) else (extensions, verdict)
 
 
-def _overall(before: Fit, final: Fit, any_found: bool, last: Verdict) -> VerdictWord:
+def _overall(before: Fit, final: Fit, findings: int, last: Verdict) -> VerdictWord:
     """Give the verdict over all iterations."""
     found = final.estimate
     first = before.estimate
     good = is_good(found.chi2 / found.dof, found.excess, first.excess)
-    if not any_found or not is_successful(final.result):
+    if not findings or not is_successful(final.result):
         return last.verdict
     explained = 1.0 - found.excess / max(first.excess, 1.0)
-    if good and (is_clean(first, found) or explained >= MOST_OF_IT):
+    if good and findings <= MOST_AT_ONCE and (is_clean(first, found) or explained >= MOST_OF_IT):
         return "found"
     return "partly_explained" if explained >= MOST_OF_IT else "unexplained"

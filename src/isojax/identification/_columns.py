@@ -1,13 +1,15 @@
 """Many columns at once: how readings answer small forces, from one simulation and one linear solve.
 
 The derivatives of `information` cost a full step of the model a column. For dozens of absent effects the
-motion is simulated once, with the memories of the absent effects following it; the force that each effect
-would add and the linearised force balance are worked out along the motion, all samples at once; and one
-linear, time-varying solve, which knows nothing of the effects, carries all columns.
+motion is simulated once; what each effect would add is worked out along it, all samples at once; and one
+linear, time-varying solve, which knows nothing of the effects, carries all columns. Compiled code depends on
+the model, on the kind of an effect, or on neither, and never on which effects ride along with which model.
 """
 
+import itertools
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NamedTuple
 
 import diffrax
 import equinox as eqx
@@ -17,159 +19,40 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._parameters import list_parameters, own_parameters
-from ..elements import AbstractElement
-from ..models import RK4, Isolator, Quantity, State
+from ..models import RK4, Isolator, State
 from ._batch import Batch, Prepared, workers
-from ._families import Family, find_families, follow_motion, share_states, stack_states
-from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, scaled_model, share_lanes
+from ._families import Family, find_families, in_turn, stack_states
+from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, share_lanes
+from ._ports import port_columns
+from ._slopes import Change, Slopes, cubic_middle, follow_path, nodes_of, slopes_along
 
-
-def _nodes(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lanes"]:
-    """Split each sample into its integration steps, three stages each."""
-    time, stages, lanes = table.shape
-    steps = (stages - 1) // 2
-    ends = jnp.stack([table[:, 2 * step : 2 * step + 3] for step in range(steps)], axis=1)
-    return ends.reshape(time * steps, 3, lanes)
-
-
-_ENTRIES = 1.5e7
+_ENTRIES = 2e7
 """Numbers that one table of columns along the motion may hold."""
 
+_ROOM = 120
+"""Columns for which a table has room at least: few columns then share the compiled code of many."""
 
-@eqx.filter_jit
-def _path(
-    model: Isolator,
-    families: tuple[Family, ...],
-    scale: Array,
-    states: State,
-    memories: State,
-    batch: Batch,
-    quantity: Quantity,
-    sample_time: float,
-) -> tuple[State, State, Array, Array, dict[str, Array]]:
-    """Simulate, the memories of absent effects following.
-
-    Returns:
-        At the start of each integration step: the states; those memories; drive, its rate and channels.
-    """
-    values = tuple(entry.value for entry in list_parameters(model))
-    current = scaled_model(model, values, scale)
-    drive, rate = _nodes(batch.drive), _nodes(batch.drive_rate)
-    channels = {name: _nodes(values) for name, values in batch.channels.items()}
-    step = sample_time * batch.drive.shape[0] / drive.shape[0]
-    solver, size = RK4(), len(states)
-
-    def field(t: float, state: State, args: tuple[Any, Any, Any]) -> State:
-        place = round(2.0 * t)
-        u, du, beside = args[0][place], args[1][place], {name: at[place] for name, at in args[2].items()}
-        own = state[:size]
-        rates = current.rates(own, u, du, quantity, channels=beside)
-        y = current.reading(own, u, du, quantity, beside)
-        base = current.drive(u, du, beside) if current.excitation == "base_acceleration" else None
-        followed: list[Array] = []
-        for family, internal in zip(families, share_states(families, state[size:]), strict=True):
-            if not family.states:
-                continue
-
-            def follow(element: AbstractElement, s: State) -> State:
-                return follow_motion(element, own[0], own[1], y, base, s)
-
-            followed.extend(jax.vmap(follow)(family.elements, internal))
-        return tuple(step * value for value in (*rates, *followed))
-
-    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
-
-    def body(state: State, table: tuple) -> tuple[State, State]:
-        moved, *_ = solver.step(term, 0.0, 1.0, state, table, None, False)
-        return moved, state
-
-    _, path = jax.lax.scan(body, (*states, *memories), (drive, rate, channels))
-    starts = {name: values[:, 0] for name, values in channels.items()}
-    return path[:size], path[size:], drive[:, 0], rate[:, 0], starts
-
-
-_Change = tuple[tuple[Array, ...], Array]
-"""Change of the rates of the carried states but the first, whose rate is the velocity; and of the reading."""
-
-
-@eqx.filter_jit
-def _partials(
-    model: Isolator,
-    families: tuple[Family, ...],
-    moving: tuple[int, ...],
-    scale: Array,
-    path: State,
-    memories: State,
-    u: Array,
-    du: Array,
-    channels: dict[str, Array],
-    quantity: Quantity,
-) -> tuple[Array, list[_Change], list[_Change], list[_Change]]:
-    """Differentiate rates and reading along the path.
-
-    Returns:
-        The reading; the changes with each parameter that moves; with the strength of each absent effect; with
-        the stiffness scale, where there is one, and each state.
-    """
-    values = tuple(entry.value for entry in list_parameters(model))
-
-    def along(current: Isolator, state: State, internal: State = ()) -> _Change:
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        full, acted = (*state, *internal), u - late * du
-        rates = current.rates(full, acted, du, quantity, channels=channels)[1 : len(state)]
-        return rates, current.reading(full, acted, du, quantity, channels)
-
-    def both(values: tuple[Array, ...], scale: Array, state: State) -> _Change:
-        return along(scaled_model(model, values, scale), state)
-
-    (_, reading) = both(values, scale, path)
-    by_parameter = []
-    for place in moving:
-
-        def with_number(number: Array, place: int = place) -> _Change:
-            return both((*values[:place], number, *values[place + 1 :]), scale, path)
-
-        by_parameter.append(jax.jvp(with_number, (values[place],), (jnp.ones(()),))[1])
-
-    present = scaled_model(model, values, scale)
-    by_probe: dict[int, _Change] = {}
-    for family, own in zip(families, share_states(families, memories), strict=True):
-
-        def by_strength(element: AbstractElement, strength: Array, internal: State) -> _Change:
-            def with_strength(number: Array) -> _Change:
-                probe = eqx.tree_at(lambda e: getattr(e, e.strength), element, number)
-                extended = Isolator(present.mass, (*present.elements, probe), present.excitation)
-                return along(extended, path, internal)
-
-            return jax.jvp(with_strength, (strength,), (jnp.ones(()),))[1]
-
-        # Along the path the members of a family come after time.
-        internal = tuple(jnp.moveaxis(values, 1, 0) for values in own)
-        changes = jax.vmap(by_strength)(family.elements, family.strengths, internal)
-        for member, place in enumerate(family.places):
-            by_probe[place] = jax.tree_util.tree_map(lambda values, member=member: values[member], changes)
-
-    by_state = []
-    if has_stiffness_scale(model):
-        by_state.append(jax.jvp(lambda s: both(values, s, path), (scale,), (jnp.ones_like(scale),))[1])
-    for index in range(len(path)):
-
-        def shifted(number: Array, index: int = index) -> _Change:
-            return both(values, scale, (*path[:index], number, *path[index + 1 :]))
-
-        by_state.append(jax.jvp(shifted, (path[index],), (jnp.ones_like(path[index]),))[1])
-    return reading, by_parameter, [by_probe[place] for place in sorted(by_probe)], by_state
+_TOGETHER = 24
+"""Columns that one linear solve carries: the last one is filled up, so that all have one shape."""
 
 
 @eqx.filter_jit
 def _respond(
-    slopes: Float[Array, "node row state lanes"],
-    forcing: Float[Array, "node row column lanes"],
+    by_state: tuple[Change, ...],
+    forcing: Float[Array, "row column node lanes"],
+    direct: Float[Array, "column time lanes"],
     starts: Float[Array, "state column lanes"],
+    weight: Float[Array, "time lanes"],
     step: float,
-) -> Float[Array, "node state column lanes"]:
-    """Solve `d' = A(t) d + b(t)` for all columns; between nodes A and b follow cubics through four."""
+) -> Float[Array, "lanes column time"]:
+    """Solve `d' = A(t) d + b(t)` for some columns; between nodes A and b follow cubics through four.
+
+    Returns:
+        What the weighted reading does.
+    """
     size = starts.shape[0]
+    steps = forcing.shape[2] // weight.shape[0]
+    slopes = jnp.stack([jnp.stack([entry.rates[row] for entry in by_state], 1) for row in range(size - 1)], 1)
     solver = RK4()
 
     def field(t: float, d: tuple[Array, ...], table: tuple[tuple[Array, ...], ...]) -> tuple[Array, ...]:
@@ -185,25 +68,61 @@ def _respond(
 
     term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
 
-    def middle(before: Array, left: Array, right: Array, after: Array) -> Array:
-        return (9.0 * (left + right) - before - after) / 16.0
-
     def body(carry: tuple, ahead: tuple[Array, Array]) -> tuple[tuple, tuple[Array, ...]]:
         d, a, b = carry
-        a, b = (*a, ahead[0]), (*b, ahead[1])
-        table = (
-            (a[1], middle(a[0], a[1], a[2], a[3]), a[2]),
-            (b[1], middle(b[0], b[1], b[2], b[3]), b[2]),
-        )
+        a, b = (a[0], a[1], a[2], ahead[0]), (b[0], b[1], b[2], ahead[1])
+        table = (a[1], cubic_middle(*a), a[2]), (b[1], cubic_middle(*b), b[2])
         moved, *_ = solver.step(term, 0.0, 1.0, d, table, None, False)
         return (moved, a[1:], b[1:]), d
 
     def ahead(values: Array) -> Array:
         return jnp.concatenate([values[2:], values[-1:], values[-1:]])
 
-    first = (slopes[0], slopes[0], slopes[1]), (forcing[0], forcing[0], forcing[1])
+    pushed = jnp.transpose(forcing, (2, 0, 1, 3))
+    first = (slopes[0], slopes[0], slopes[1]), (pushed[0], pushed[0], pushed[1])
     start = (tuple(starts[index] for index in range(size)), *first)
-    return jnp.stack(jax.lax.scan(body, start, (ahead(slopes), ahead(forcing)))[1], axis=1)
+    path = jax.lax.scan(body, start, (ahead(slopes), ahead(pushed)))[1]
+    rows = sum(
+        d[::steps] * entry.reading[::steps, None] for d, entry in zip(path, by_state, strict=True)
+    ) + jnp.swapaxes(direct, 0, 1)
+    return jnp.transpose(rows * weight[:, None], (2, 1, 0))
+
+
+class _Layout(NamedTuple):
+    """Which columns there are.
+
+    Attributes:
+        model: the carried elements alone.
+        families: the absent effects, kind by kind.
+        probes: the absent effects.
+        moving: parameters of the model with a column.
+        units: size of one unit of each column but those of the states.
+        places: column of each of `moving`, of each probe (-1 without one).
+    """
+
+    model: Isolator
+    families: tuple[Family, ...]
+    probes: tuple[Any, ...]
+    moving: tuple[int, ...]
+    units: tuple[float, ...]
+    places: tuple[tuple[int, ...], tuple[int, ...]]
+
+
+def _layout(unknowns: Unknowns, carried: int) -> _Layout:
+    whole = unknowns.model
+    model = Isolator(whole.mass, whole.elements[:carried], whole.excitation)
+    probes = whole.elements[carried:]
+    places = [int(np.flatnonzero(column)[0]) for column in unknowns.directions.T]
+    units = [float(unknowns.directions[place, index]) for index, place in enumerate(places)]
+    known = len(list_parameters(model))
+    owner = np.repeat(np.arange(len(probes)), [len(own_parameters(probe)) for probe in probes])
+    of_probe = [-1] * len(probes)
+    for column, place in enumerate(places):
+        if place >= known:
+            of_probe[owner[place - known]] = column
+    own = [column for column, place in enumerate(places) if place < known]
+    moving = tuple(places[column] for column in own)
+    return _Layout(model, find_families(probes), probes, moving, tuple(units), (tuple(own), tuple(of_probe)))
 
 
 def column_information(
@@ -224,31 +143,18 @@ def column_information(
         A^T A of each lane, lanes first.
     """
     parts = len(prepared.batches)
-    whole = unknowns.model
-    model = Isolator(whole.mass, whole.elements[:carried], whole.excitation)
-    probes = whole.elements[carried:]
-    families = find_families(probes)
-    size = 2 + model.internal_states
-    moving = tuple(int(np.flatnonzero(column)[0]) for column in unknowns.directions.T)
-    units = [float(unknowns.directions[place, index]) for index, place in enumerate(moving)]
-    known = len(list_parameters(model))
-    own = tuple(place for place in moving if place < known)
-    # Which probe each further direction belongs to.
-    owner = np.repeat(np.arange(len(probes)), [len(own_parameters(probe)) for probe in probes])
-    columns = [own.index(place) if place < known else len(own) + owner[place - known] for place in moving]
-    scaled, wanted = has_stiffness_scale(model), has_stiffness_scale(whole)
-    if wanted:
-        units.append(STIFFNESS_SCALE_UNIT)
+    layout = _layout(unknowns, carried)
+    size = 2 + layout.model.internal_states
+    columns = len(layout.units) + int(has_stiffness_scale(unknowns.model)) + size + 1
 
     def one(part: int) -> np.ndarray:
-        batch = prepared.batches[part].following(whole)
+        batch = prepared.batches[part].following(unknowns.model)
         scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
         states = share_lanes(unknowns.states, part, parts)
         scales = share_lanes(unknowns.state_scales[:size], part, parts)
         lanes = scale.shape[0]
         # A table of all columns along all lanes may not fit the memory: a few lanes at a time.
-        entries = batch.drive.shape[0] * (batch.drive.shape[1] // 2) * (len(units) + whole.internal_states)
-        blocks = -(-lanes // max(1, int(_ENTRIES / entries)))
+        blocks = -(-lanes // max(1, int(_ENTRIES / (batch.drive.shape[0] * max(columns, _ROOM)))))
         width = -(-lanes // blocks)
         done = []
         for first in range(0, lanes, width):
@@ -256,72 +162,139 @@ def column_information(
             some = jax.tree_util.tree_map(
                 lambda values, chosen=chosen: values[..., chosen], (batch, scale, states, scales)
             )
-            done.append(block(*some)[: lanes - first])
+            done.append(_block(layout, prepared, columns, part, *some)[: lanes - first])
         return np.concatenate(done)
-
-    def block(batch: Batch, scale: Array, states: State, scales: State) -> np.ndarray:
-        memories = stack_states(families, probes, states[size:])
-        path, memories, u, du, channels = _path(
-            model, families, scale, states[:size], memories, batch, prepared.quantity, prepared.sample_time
-        )
-        lanes, nodes = scale.shape[0], u.shape[0]
-        steps = nodes // batch.measured.shape[0]
-        wide = jnp.broadcast_to(scale, u.shape)
-        reading, by_parameter, by_probe, by_state = _partials(
-            model, families, own, wide, path, memories, u, du, channels, prepared.quantity
-        )
-        del memories
-        by_parameter = [[*by_parameter, *by_probe][column] for column in columns]
-        if wanted:
-            nothing = jax.tree_util.tree_map(jnp.zeros_like, by_state[0])
-            by_parameter.append(by_state[0] if scaled else nothing)
-        by_state = by_state[-size:]
-        rest = [jnp.zeros_like(u)] * size
-        forcing = jnp.stack(
-            [
-                jnp.stack(
-                    [unit * entry[0][row] for unit, entry in zip(units, by_parameter, strict=True)] + rest,
-                    axis=1,
-                )
-                for row in range(size - 1)
-            ],
-            axis=1,
-        )
-        slopes = jnp.stack(
-            [jnp.stack([entry[0][row] for entry in by_state], axis=1) for row in range(size - 1)], axis=1
-        )
-        count = len(units)
-        starts = np.zeros((size, count + size, lanes))
-        for index in range(size):
-            starts[index, count + index] = np.asarray(scales[index])
-        response = _respond(slopes, forcing, jnp.asarray(starts), prepared.sample_time / steps)
-        del forcing, slopes
-        readings_by_parameter = [entry[1] for entry in by_parameter]
-        readings_by_state = [entry[1] for entry in by_state]
-        return np.asarray(
-            _products(
-                response, reading, jnp.asarray(units), readings_by_parameter, readings_by_state, batch, steps
-            )
-        )
 
     with ThreadPoolExecutor(workers()) as pool:
         return np.concatenate(list(pool.map(one, range(parts))))
 
 
-@eqx.filter_jit
-def _products(
-    response: Float[Array, "node state column lanes"],
-    reading: Float[Array, "node lanes"],
-    units: Float[Array, " parameter"],
-    by_parameter: list[Array],
-    by_state: list[Array],
+def _block(
+    layout: _Layout,
+    prepared: Prepared,
+    columns: int,
+    part: int,
     batch: Batch,
-    steps: int,
-) -> Float[Array, "lanes entry entry"]:
-    """Form the readings' columns and multiply them out, lane by lane."""
-    rows = sum(response[::steps, index] * slope[::steps, None] for index, slope in enumerate(by_state))
-    direct = jnp.stack([slope[::steps] for slope in by_parameter], axis=1) * units[None, :, None]
-    rows = rows + jnp.pad(direct, ((0, 0), (0, len(by_state)), (0, 0)))
-    last = (batch.measured - reading[::steps])[:, None]
-    table = jnp.concatenate([rows, last], axis=1) * batch.weight[:, None]
-    return jnp.einsum("tcl,tdl->lcd", table, table)
+    scale: Array,
+    states: State,
+    scales: State,
+) -> Float[np.ndarray, "lanes column column"]:
+    """Work out the columns of a few lanes, and multiply them out."""
+    model, size = layout.model, 2 + layout.model.internal_states
+    own = batch.following(model)
+    path = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
+    slopes = slopes_along(model, layout.moving, scale, path, own, prepared.quantity)
+    lanes, nodes, time = scale.shape[0], path[0].shape[0], batch.measured.shape[0]
+    step = prepared.sample_time * time / nodes
+    table = np.empty((lanes, columns, time))
+    weight = np.asarray(batch.weight)
+    error = (np.asarray(batch.measured) - np.asarray(slopes.reading)[:: nodes // time]) * weight
+    table[:, -1] = error.T
+
+    group = _Group(size, nodes, time, lanes)
+    for column, forcing, direct in _sources(layout, prepared, batch, slopes, states[size:], columns, part):
+        group.add(column, forcing, direct)
+        if group.is_full:
+            group.solve(table, slopes.states, batch.weight, step)
+    for index in range(size):
+        group.start(columns - 1 - size + index, index, np.asarray(scales[index]))
+        if group.is_full:
+            group.solve(table, slopes.states, batch.weight, step)
+    group.solve(table, slopes.states, batch.weight, step)
+    # A probe whose memory ran away is told by its infinite products.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return table @ np.swapaxes(table, 1, 2)
+
+
+def _sources(
+    layout: _Layout,
+    prepared: Prepared,
+    batch: Batch,
+    slopes: Slopes,
+    memories: State,
+    columns: int,
+    part: int,
+) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Give each coefficient's column, change of the rates (row node lanes), of the reading (time lanes)."""
+    size = 2 + layout.model.internal_states
+    steps = slopes.reading.shape[0] // batch.measured.shape[0]
+
+    def ready(unit: float, change: Change) -> tuple[np.ndarray, np.ndarray]:
+        forcing = unit * np.stack([np.asarray(row) for row in change.rates])
+        return forcing, unit * np.asarray(change.reading)[::steps]
+
+    for column, change in zip(layout.places[0], slopes.parameters, strict=True):
+        yield column, *ready(layout.units[column], change)
+    scaled = columns - 1 - size
+    if scaled > len(layout.units):
+        change = slopes.states[0] if slopes.scale is None else slopes.scale
+        # A model without a spring has no stiffness to scale, whatever a probe would bring.
+        unit = 0.0 if slopes.scale is None else STIFFNESS_SCALE_UNIT
+        yield scaled - 1, *ready(unit, change)
+    starts = stack_states(layout.families, layout.probes, memories)
+    followed = {name: np.asarray(nodes_of(values)) for name, values in batch.channels.items()}
+    step = prepared.sample_time / steps
+    ports = {name: ready(1.0, change) for name, change in slopes.ports.items()}
+    ends = np.cumsum([0, *(family.elements.internal_states for family in layout.families)])
+    own = dict(zip((family.places for family in layout.families), itertools.pairwise(ends), strict=True))
+    for family in in_turn(layout.families, part):
+        begin, end = own[family.places]
+        own_channels = {name: followed[name] for name in family.elements.channels}
+        pushing = {name: jnp.asarray(_across_jumps(values)) for name, values in own_channels.items()}
+        added = port_columns(family, slopes.motion._replace(channels=pushing), starts[begin:end], step)
+        read = added
+        if own_channels:
+            # A reading is that of the sample itself, at whose beginning every hold agrees with the record.
+            reading = {name: jnp.asarray(values[:, 0]) for name, values in own_channels.items()}
+            read = port_columns(family, slopes.motion._replace(channels=reading), starts[begin:end], step)
+        does = [(np.asarray(added[name]), np.asarray(read[name]), ports[name]) for name in added]
+        for member, probe in enumerate(family.places):
+            column = layout.places[1][probe]
+            if column >= 0:
+                unit = layout.units[column]
+                forcing = sum(unit * values[member] * rates for values, _, (rates, _) in does)
+                direct = sum(unit * values[member, ::steps] * reading for _, values, (_, reading) in does)
+                yield column, np.asarray(forcing), np.asarray(direct)
+
+
+def _across_jumps(values: Float[np.ndarray, "node 3 lanes"]) -> Float[np.ndarray, "node lanes"]:
+    """Give a signal at the start of each step, where it jumps the mean of both sides.
+
+    What another hold would give agrees with the record at every sample: all of it lies between them.
+    """
+    ended = np.concatenate([values[:1, 0], values[:-1, 2]])
+    return 0.5 * (ended + values[:, 0])
+
+
+class _Group:
+    """Columns that wait for one linear solve."""
+
+    def __init__(self, size: int, nodes: int, time: int, lanes: int):
+        self.forcing = np.zeros((size - 1, _TOGETHER, nodes, lanes))
+        self.direct = np.zeros((_TOGETHER, time, lanes))
+        self.starts = np.zeros((size, _TOGETHER, lanes))
+        self.columns: list[int] = []
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no more columns fit."""
+        return len(self.columns) == _TOGETHER
+
+    def add(self, column: int, forcing: np.ndarray, direct: np.ndarray) -> None:
+        """Put a column that is pushed along the motion."""
+        place = len(self.columns)
+        self.forcing[:, place], self.direct[place], self.starts[:, place] = forcing, direct, 0.0
+        self.columns.append(column)
+
+    def start(self, column: int, state: int, size: np.ndarray) -> None:
+        """Put a column that starts elsewhere."""
+        self.add(column, np.zeros(1), np.zeros(1))
+        self.starts[state, len(self.columns) - 1] = size
+
+    def solve(self, table: np.ndarray, by_state: tuple[Change, ...], weight: Array, step: float) -> None:
+        """Solve, and put what the readings do into the table."""
+        if self.columns:
+            forcing, direct, starts = map(jnp.asarray, (self.forcing, self.direct, self.starts))
+            rows = _respond(by_state, forcing, direct, starts, weight, step)
+            table[:, self.columns] = np.asarray(rows)[:, : len(self.columns)]
+        self.columns = []

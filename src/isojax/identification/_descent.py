@@ -199,6 +199,9 @@ def descend(
 
 def _in_physical_units(point: Point, slopes: list[float]) -> Point:
     """Rescale the columns of a point from unbounded variables to physical coefficients."""
-    factor = np.append(1.0 / np.asarray(slopes), 1.0)
+    # At the very end of an interval nothing moves with the variable: no column, and no error bar.
+    still = np.asarray(slopes) == 0.0
+    factor = np.append(np.where(still, 0.0, 1.0 / np.where(still, 1.0, slopes)), 1.0)
     by_record = point.reduced.by_record * np.outer(factor, factor)
-    return point._replace(reduced=point.reduced._replace(by_record=by_record))
+    stiffness_map = point.reduced.stiffness_map * factor
+    return point._replace(reduced=point.reduced._replace(by_record=by_record, stiffness_map=stiffness_map))

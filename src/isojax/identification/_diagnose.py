@@ -11,8 +11,7 @@ from .._results import RESULTS
 from ..elements import CATALOGUE, Scales
 from ._admissible import find_violation
 from ._balance_start import find_balance_start
-from ._bounds import strength_unit, upper_bounds
-from ._channels import meaningless
+from ._bounds import GOOD, strength_unit, upper_bounds
 from ._estimate import Estimate
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
@@ -25,15 +24,13 @@ from ._refit import (
     polish,
     refit_candidate,
     refit_from,
+    rivals,
     strength_place,
 )
 from ._scales import scales as campaign_scales
 from ._score import Score, ScoreTest, absent_effects, score_test
 from ._separate import separating_experiment
 from ._transfer import transferred_share
-
-GOOD = 1.05
-"""chi2/dof up to which a fit is good."""
 
 CLEAN = 1.02
 """chi2/dof up to which what is left is as little as a bench repeats, whatever there was to explain."""
@@ -122,7 +119,7 @@ def diagnose(
         reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[fit.result]}"
         return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
     scales = campaign_scales(fit.campaign)
-    probes = absent_effects(fitted.model, scales, (*excluded, *meaningless(fit.campaign.fit_records)))
+    probes = absent_effects(fitted.model, scales, excluded)
     progress(f"score test of {len({probe.name for probe in probes})} absent effects")
     test = score_test(fitted, scales, probes)
     first = fitted.excess if first_excess is None else first_excess
@@ -253,39 +250,43 @@ def _judge(
 ) -> Verdict:
     """Weigh the refits, and word the verdict."""
     fitted = fit.estimate
-    usable = _by_evidence(refits)
-    inflation = _inflation(usable)
+    inflation = _inflation(_by_evidence(refits))
     good = is_good(fitted.chi2 / fitted.dof, fitted.excess, first_excess)
-    ranking = _ranking(test, refits, usable, inflation)
-    bounds = upper_bounds(test, fitted, None) if fitted.chi2 / fitted.dof <= GOOD else {}
-    if usable:
+    reason = "no absent effect is both significant and physical"
+    refits = list(refits)
+    while usable := _by_evidence(refits):
         best = usable[0]
-        gain = fitted.chi2 - best.estimate.chi2
-        extra = len(best.estimate.places) - len(fitted.places)
+        gain = fitted.misfit - best.estimate.misfit
         needed = max(SMALLEST_GAIN, _needed_share(fitted) * fitted.excess / fitted.dof)
-        enough = gain / fitted.dof >= needed
         clear = bic(fitted, inflation) - bic(best.estimate, inflation) > CLOSE_BIC
-        share = transferred_share(fit, best.estimate, scales, solver, progress) if enough and clear else 0.0
-        if enough and clear and share > 0.0:
+        too_little = _too_little(best, gain, fitted)
+        if gain / fitted.dof < needed or not clear:
+            reason = too_little
+            break
+        share = transferred_share(fit, best.estimate, scales, solver, progress)
+        if share > 0.0:
+            ranking = _ranking(test, refits, usable, inflation)
             usable[0] = best._replace(estimate=polish(best.estimate, scales, solver, progress))
             return _found(fit, test, usable, ranking, first_excess, share, inflation)
-        reason = _too_little(best, gain, fitted, extra) + (
-            ", but it does not carry over to data left out of its refit" if enough and clear else ""
-        )
-    else:
-        reason = "no absent effect is both significant and physical"
+        # What imitates the missing effect on the records of its refit alone must not hide that effect.
+        reason = f"{too_little}, but it does not carry over to data left out of its refit"
+        place = next(index for index, one in enumerate(refits) if one is best)
+        refits[place] = best._replace(violation="it does not carry over to data left out of its refit")
+    ranking = _ranking(test, refits, _by_evidence(refits), inflation)
+    bounds = upper_bounds(test, fitted, None)
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
 
 
-def _too_little(best: Refit, gain: float, fitted: Estimate, extra: int) -> str:
+def _too_little(best: Refit, gain: float, fitted: Estimate) -> str:
     """Word what the best effect would gain: of chi2/dof where little but noise is left, else a share."""
     gained = (
         f"takes {gain / fitted.dof:.2g} off chi2/dof"
         if fitted.chi2 / fitted.dof <= GOOD
         else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of what is left beyond the noise"
     )
+    extra = len(best.estimate.places) - len(fitted.places)
     more = "1 more coefficient" if extra == 1 else f"{extra} more coefficients"
     return f"adding {best.score.element.name} {gained} with {more}"
 
@@ -311,7 +312,7 @@ def _found(
     """Word a finding."""
     fitted, best = fit.estimate, usable[0]
     name = best.score.element.name
-    explained = (fitted.chi2 - best.estimate.chi2) / max(fitted.excess, 1.0)
+    explained = (fitted.misfit - best.estimate.misfit) / max(fitted.excess, 1.0)
     together = tuple(
         entry.effect
         for entry in ranking
@@ -332,6 +333,7 @@ def _found(
         share,
         ranking,
         separating_experiment(name, together),
+        rivals(test.scores, usable, together),
     )
     good = is_good(best.estimate.chi2 / best.estimate.dof, best.estimate.excess, first_excess)
     if good and (is_clean(fitted, best.estimate) or explained >= MOST_OF_IT):
@@ -343,7 +345,7 @@ def _found(
     left = best.estimate.excess / max(fitted.excess, 1.0)
     before, after = fitted.chi2 / fitted.dof, best.estimate.chi2 / best.estimate.dof
     reason = f"Adding {best.score.element.words} takes chi2/dof from {before:.4g} to {after:.4g}."
-    bounds = upper_bounds(test, fitted, name) if fitted.chi2 / fitted.dof <= GOOD else {}
+    bounds = upper_bounds(test, fitted, name)
     return Verdict(
         verdict, finding, ranking, together, float(max(left, 0.0)), test.hidden, bounds, best.estimate, reason
     )

@@ -54,7 +54,7 @@ class Restarts(NamedTuple):
 
     Attributes:
         runs: each record, its segments joined.
-        point: the equations at the best nuisances; no coefficient has a column.
+        point: the equations at the best nuisances.
     """
 
     runs: tuple[Run, ...]
@@ -90,7 +90,13 @@ def _simulate_lanes(
     return [simulated[: part.stop - part.start, lane] for lane, part in enumerate(prepared.segments)]
 
 
-def restart_records(bench: Bench, model: Isolator, spread: float, known: Nuisances | None = None) -> Restarts:
+def restart_records(
+    bench: Bench,
+    model: Isolator,
+    spread: float,
+    known: Nuisances | None = None,
+    places: tuple[int, ...] = (),
+) -> Restarts:
     """Restart every segment from its best initial state; no coefficient is touched.
 
     Args:
@@ -98,12 +104,13 @@ def restart_records(bench: Bench, model: Isolator, spread: float, known: Nuisanc
         model: the isolator.
         spread: prior standard deviation of each record's linear stiffness.
         known: nuisances to begin with; the measured states if omitted.
+        places: see `best_nuisances`.
 
     Returns:
         The records against their restarted simulations.
     """
     problem = bench.problem
-    point = best_nuisances(bench, model, spread, known)
+    point = best_nuisances(bench, model, spread, known, places)
     simulated = [np.full(record.output.size, np.nan) for record in problem.records]
     counted = [np.zeros(record.output.size) for record in problem.records]
     for part, values in zip(problem.segments, _simulate_lanes(bench, model, point.nuisances), strict=True):

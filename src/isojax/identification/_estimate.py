@@ -67,6 +67,14 @@ class Estimate(NamedTuple):
         return max(1.0, self.point.free_samples - len(self.places))
 
     @property
+    def misfit(self) -> float:
+        """chi2 and the degrees of freedom that the nuisances took: alike for models of more and fewer states.
+
+        Each initial state that a model adds to a segment lowers chi2 by what it takes, law or no law.
+        """
+        return self.chi2 + float(np.sum(self.point.reduced.eliminated))
+
+    @property
     def excess(self) -> float:
         """What the model leaves unexplained beyond the noise: chi2 - dof."""
         return self.chi2 - self.dof

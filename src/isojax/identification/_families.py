@@ -1,12 +1,10 @@
 """Elements of one kind side by side: their memories and their forces are traced once a kind."""
 
-import itertools
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from .._types import Internal, Lanes
 from ..elements import AbstractElement
@@ -18,15 +16,11 @@ class Family(NamedTuple):
 
     Attributes:
         elements: their numbers stacked.
-        strengths: the strength of each.
         places: where each stands among all elements given.
-        states: internal states of each.
     """
 
     elements: AbstractElement
-    strengths: Float[Array, " member"]
     places: tuple[int, ...]
-    states: int
 
 
 def find_families(probes: tuple[AbstractElement, ...]) -> tuple[Family, ...]:
@@ -45,9 +39,23 @@ def find_families(probes: tuple[AbstractElement, ...]) -> tuple[Family, ...]:
     for places in groups.values():
         members = [probes[place] for place in places]
         stacked = jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *members)
-        strength = getattr(stacked, stacked.strength)
-        families.append(Family(stacked, strength, tuple(places), stacked.internal_states))
+        families.append(Family(stacked, tuple(places)))
     return tuple(families)
+
+
+def in_turn(families: tuple[Family, ...], part: int) -> tuple[Family, ...]:
+    """Give families in the order in which a worker takes them: two workers begin at either end.
+
+    Each kind is compiled by itself; workers that took them in one order would wait for each other.
+
+    Args:
+        families: the families.
+        part: number of the worker.
+
+    Returns:
+        The same families.
+    """
+    return families if part % 2 == 0 else families[::-1]
 
 
 def stack_states(families: tuple[Family, ...], probes: tuple[AbstractElement, ...], rows: State) -> State:
@@ -65,22 +73,8 @@ def stack_states(families: tuple[Family, ...], probes: tuple[AbstractElement, ..
     return tuple(
         jnp.stack([rows[ends[place] + state] for place in family.places])
         for family in families
-        for state in range(family.states)
+        for state in range(family.elements.internal_states)
     )
-
-
-def share_states(families: tuple[Family, ...], states: State) -> list[State]:
-    """Share stacked internal states out among the families.
-
-    Args:
-        families: the families.
-        states: as `stack_states` gives them.
-
-    Returns:
-        The states of each family.
-    """
-    ends = np.cumsum([0, *(family.states for family in families)])
-    return [states[begin:end] for begin, end in itertools.pairwise(ends)]
 
 
 def follow_motion(

@@ -5,10 +5,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..elements import AbstractElement
 from ..records import Campaign
 from ._classical_guess import ClassicalGuess
 from ._estimate import Estimate
 from ._fit import Fit
+from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
 
@@ -57,6 +59,8 @@ class Finding(NamedTuple):
         transfer: share of the excess that it removed on records (or halves) that its refit did not see.
         ranking: all candidates, best first.
         separating_experiment: what test would part the indistinguishable ones, in words.
+        rivals: the indistinguishable effects, with the shapes that imitate the finding best.
+        separation: the candidate tests, weighed by simulation; None where none was simulated.
     """
 
     effect: str
@@ -66,6 +70,8 @@ class Finding(NamedTuple):
     transfer: float
     ranking: tuple[Candidate, ...]
     separating_experiment: str
+    rivals: tuple[AbstractElement, ...] = ()
+    separation: Separation | None = None
 
 
 class Verdict(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Float
 
+from .._parameters import list_parameters, replace_parameters
 from .._results import RESULTS
 from .._types import check_float64
 from ..models import Integrator, Isolator
@@ -15,7 +16,7 @@ from ..records import Campaign, NoiseEstimate, estimate_noise
 from ._against import Against
 from ._errors import Errors, Restarts, Run
 from ._estimate import Estimate, estimate, free_places
-from ._problem import Bench
+from ._problem import Bench, element_names
 from ._scales import scales as campaign_scales
 from ._setup import build_problem
 from ._steps import find_integrator
@@ -164,18 +165,41 @@ def fit(
             f"{campaign.file}: the noise of the output must be above 0, but the records, so short or so "
             f"clean, show {noise.sigma:g}; declare it: [output] noise = its rms"
         )
-    bench = bench_for(model, campaign, noise.white, integrator, noise.share)
-    found = estimate(
-        bench,
-        model,
-        places,
-        campaign_scales(campaign),
-        nuisances=None,
-        solver=solver,
-        max_steps=max_steps,
-        progress=progress,
-    )
+    scales = campaign_scales(campaign)
+
+    def search(start: Isolator) -> Estimate:
+        bench = bench_for(start, campaign, noise.white, integrator, noise.share)
+        return estimate(
+            bench,
+            start,
+            places,
+            scales,
+            nuisances=None,
+            solver=solver,
+            max_steps=max_steps,
+            progress=progress,
+        )
+
+    found = search(model)
+    if found.result == RESULTS.not_finite:
+        progress("the start runs away: again from its linear part")
+        again = search(_linear_part(model, places))
+        found = found if again.result == RESULTS.not_finite else again
     return complete(found, model, campaign, noise)
+
+
+def _linear_part(model: Isolator, places: tuple[int, ...]) -> Isolator:
+    """Give the model with every effect absent that is free and not linear: its motion stays within bounds."""
+    strengths = {
+        f"{name}.{element.strength}"
+        for name, element in zip(element_names(model), model.elements, strict=True)
+        if element.name not in ("linear_stiffness", "linear_damping")
+    }
+    numbers = [
+        0.0 * entry.value if place in places and entry.name in strengths else entry.value
+        for place, entry in enumerate(list_parameters(model))
+    ]
+    return replace_parameters(model, numbers)
 
 
 def _check_excitation(model: Isolator, campaign: Campaign) -> None:

@@ -1,87 +1,41 @@
 """Internal states along measured motions: what a memory holds where a segment begins."""
 
-import diffrax
-import equinox as eqx
-import jax
+from concurrent.futures import ThreadPoolExecutor
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..elements import AbstractElement
-from ..models import RK4, Isolator, State
+from ..models import Isolator
 from ..records import Record
-from ._batch import Prepared, coordinate_motion
-from ._families import Family, find_families, follow_motion, share_states
-
-_STEPS = 2
-"""Integration steps a sample where internal states follow a measured motion."""
+from ._batch import Prepared, coordinate_motion, workers
+from ._families import Family, find_families, in_turn
+from ._ports import follow
 
 
-@eqx.filter_jit
-def _along(
-    families: tuple[Family, ...],
-    motion: tuple[Array, ...],
-    begin: Array,
-    based: bool,
-    sample_time: float,
-) -> tuple[State, State]:
-    """Integrate internal states along motions, straight between samples.
-
-    Returns:
-        The states at each lane's beginning, and their mean size from there on; members first, lanes last.
-    """
-    solver = RK4()
-
-    def field(t: float, internal: State, ends: tuple[tuple[Array, ...], tuple[Array, ...]]) -> State:
-        x, v, y, u = (one + t * (other - one) for one, other in zip(*ends, strict=True))
-        rates: list[Array] = []
-        for family, own in zip(families, share_states(families, internal), strict=True):
-
-            def follow(element: AbstractElement, s: State) -> State:
-                return follow_motion(element, x, v, y, u if based else None, s)
-
-            rates.extend(jax.vmap(follow)(family.elements, own))
-        return tuple(sample_time * rate for rate in rates)
-
-    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
-
-    def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
-        internal, first, total = carry
-        index, now, ahead = table
-        started, past = (index == begin)[None], (index >= begin)[None]
-        first = tuple(jnp.where(started, s, kept) for s, kept in zip(internal, first, strict=True))
-        # Not the square: a memory that ran away may be too large for it.
-        total = tuple(
-            jnp.where(past, part + jnp.abs(s), part) for s, part in zip(internal, total, strict=True)
-        )
-        for step in range(_STEPS):
-            t0, t1 = step / _STEPS, (step + 1) / _STEPS
-            internal, *_ = solver.step(term, t0, t1, internal, (now, ahead), None, False)
-        return (internal, first, total), None
-
-    length, lanes = motion[0].shape
-    rest = tuple(jnp.zeros((len(family.places), lanes)) for family in families for _ in range(family.states))
-    now, ahead = (tuple(values[part] for values in motion) for part in (slice(None, -1), slice(1, None)))
-    (_, first, total), _ = jax.lax.scan(body, (rest, rest, rest), (jnp.arange(length - 1), now, ahead))
-    count = jnp.maximum(length - 1 - begin, 1)[None]
-    return first, tuple(part / count for part in total)
+def _stages(values: Float[np.ndarray, "time lanes"], steps: int) -> Float[Array, "node 3 lanes"]:
+    """Give values at start, middle and end of each integration step, straight between samples."""
+    share = (np.arange(steps)[:, None] + np.array([0.0, 0.5, 1.0])) / steps
+    now, ahead = values[:-1, None, None], values[1:, None, None]
+    return jnp.asarray((now + share[..., None] * (ahead - now)).reshape(-1, 3, values.shape[1]))
 
 
 def internal_starts(
-    model: Isolator, records: tuple[Record, ...], prepared: Prepared
+    model: Isolator, records: tuple[Record, ...], prepared: Prepared, carried: int | None = None
 ) -> tuple[Float[np.ndarray, "internal lanes"], Float[np.ndarray, "internal lanes"]]:
     """Run the internal states of a model along the measured motion.
 
     Each lane sets out from rest, as long before its segment as the longest segment lasts, or at the start of
-    its record; memories of sensors follow the measured output.
+    its record; memories of sensors follow the measured output. Between samples the motion is straight.
 
     Args:
         model: the isolator; its memories are taken along, its force balance is not.
         records: the records of the segments.
         prepared: the segments.
+        carried: count of elements that move the state, whose sizes are wanted; all if omitted.
 
     Returns:
-        Internal states at each lane's first sample, and their mean size over the lane.
+        Internal states at each lane's first sample, and their mean size over the lane (1 where not wanted).
     """
     lanes = prepared.record.size
     starts = np.zeros((model.internal_states, lanes))
@@ -89,14 +43,9 @@ def internal_starts(
     with_memory = tuple(element for element in model.elements if element.internal_states)
     if not with_memory:
         return starts, spread
+    acting = sum(bool(element.internal_states) for element in model.elements[:carried])
     based = model.excitation == "base_acceleration"
-    before = max(segment.stop - segment.start for segment in prepared.segments)
-    lead = [min(before, segment.start) for segment in prepared.segments]
-    length = 1 + max(
-        segment.stop - segment.start + ahead for segment, ahead in zip(prepared.segments, lead, strict=True)
-    )
-    motion = np.zeros((4, length, lanes))
-    begin = np.zeros(lanes, dtype=int)
+    length, stages = prepared.batches[0].drive.shape[:2]
     known = {
         place: (
             *coordinate_motion(records[place], prepared.quantity, based),
@@ -105,21 +54,45 @@ def internal_starts(
         )
         for place in {segment.record for segment in prepared.segments}
     }
-    for lane, (segment, ahead) in enumerate(zip(prepared.segments, lead, strict=True)):
-        window = slice(segment.start - ahead, segment.stop)
+    # Before its record begins a lane is at rest, where memories stay as they are.
+    before, over = np.zeros((4, length + 1, lanes)), np.zeros((4, length + 1, lanes))
+    for lane, segment in enumerate(prepared.segments):
+        lead = min(length, segment.start)
         for row, values in enumerate(known[segment.record]):
-            piece = values[window]
-            motion[row, : piece.size, lane] = piece
-            motion[row, piece.size :, lane] = piece[-1]
-        begin[lane] = ahead
+            before[row, length - lead :, lane] = values[segment.start - lead : segment.start + 1]
+            piece = values[segment.start : segment.stop]
+            over[row, : piece.size, lane] = piece
+            over[row, piece.size :, lane] = piece[-1]
+    steps, parts = (stages - 1) // 2, len(prepared.batches)
+    inside = np.ones((length, lanes), dtype=bool)
+    for lane, segment in enumerate(prepared.segments):
+        inside[segment.stop - segment.start :, lane] = False
     families = find_families(with_memory)
-    tables = tuple(jnp.asarray(values) for values in motion)
-    found = _along(families, tables, jnp.asarray(begin), based, prepared.sample_time)
     ends = np.cumsum([0, *(element.internal_states for element in with_memory)])
-    first, size = (share_states(families, values) for values in found)
-    for family, own, sizes in zip(families, first, size, strict=True):
-        for state in range(family.states):
-            rows = [int(ends[place]) + state for place in family.places]
-            starts[rows] = np.asarray(own[state])
-            spread[rows] = np.maximum(np.asarray(sizes[state]), 1e-300)
+
+    def along(task: tuple[Family, int]) -> None:
+        family, part = task
+        own = slice(part * (lanes // parts), (part + 1) * (lanes // parts))
+        rows = 4 if based else 3
+        tables = (tuple(_stages(row, steps) for row in motion[:rows, :, own]) for motion in (before, over))
+        step = prepared.sample_time / steps
+        rest = (jnp.zeros((len(family.places), lanes // parts)),) * family.elements.internal_states
+        first, _ = follow(family.elements, next(tables), rest, step)
+        places = [[int(ends[place]) + state for place in family.places] for state in range(len(rest))]
+        for state, values in zip(places, first, strict=True):
+            starts[state, own] = np.asarray(values)
+        if min(family.places) >= acting:
+            return
+        _, path = follow(family.elements, next(tables), first, step)
+        for state, values in zip(places, path, strict=True):
+            # Not the square: a memory that ran away may be too large for it.
+            size = np.where(inside[:, None, own], np.abs(np.asarray(values)[::steps]), 0.0)
+            mean = size.sum(axis=0) / inside[:, own].sum(axis=0)
+            spread[state, own] = np.maximum(mean, 1e-300)
+
+    # Each kind is compiled by itself, once whatever it rides along with: every core begins with another.
+    orders = [in_turn(families, part) for part in range(parts)]
+    tasks = [(order[turn], part) for turn in range(len(families)) for part, order in enumerate(orders)]
+    with ThreadPoolExecutor(workers()) as pool:
+        list(pool.map(along, tasks))
     return starts, spread

@@ -108,17 +108,20 @@ class Bench:
     model only; both are remade when those change and at no other time.
     """
 
-    def __init__(self, problem: Problem, at_rest: bool = False):
+    def __init__(self, problem: Problem, at_rest: bool = False, like: "Bench | None" = None):
         """Keep the problem; nothing is simulated yet.
 
         Args:
             problem: the records.
             at_rest: whether internal states start at zero and are no nuisances.
+            like: bench whose shapes are taken where they are large enough, so that the compiled code serves
+                both.
         """
+        self._segments = problem.segments if like is None else like._segments
         self.problem = problem
         self.at_rest = at_rest
         self._heads = Bench(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
-        self._prepared: dict[tuple[int, float], tuple[set[str], Prepared]] = {}
+        self._prepared: dict[tuple[int, float], Prepared] = {}
         self._memories: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
         self._last: tuple[tuple[np.ndarray, ...], Float[np.ndarray, "lanes column column"]] | None = None
 
@@ -138,25 +141,22 @@ class Bench:
         )
         key = (steps, float(model.shift()))
         channels = set(model.channels)
-        if key not in self._prepared or not channels <= self._prepared[key][0]:
+        known = set(self._prepared[key].batches[0].channels) if key in self._prepared else set()
+        if key not in self._prepared or not channels <= known:
             # What is known already stays known: the tables serve models with and without their followers.
-            if key in self._prepared:
-                channels |= self._prepared[key][0]
             self._prepared.clear()
-            self._prepared[key] = (
-                channels,
-                prepare(
-                    problem.records,
-                    problem.segments,
-                    quantity=problem.quantity,
-                    hold=problem.hold,
-                    substeps=steps,
-                    shift=key[1],
-                    based=model.excitation == "base_acceleration",
-                    channels=tuple(sorted(channels)),
-                ),
+            self._prepared[key] = prepare(
+                problem.records,
+                problem.segments,
+                quantity=problem.quantity,
+                hold=problem.hold,
+                substeps=steps,
+                shift=key[1],
+                based=model.excitation == "base_acceleration",
+                channels=tuple(sorted(channels | known)),
+                room=self._segments,
             )
-        return self._prepared[key][1]
+        return self._prepared[key]
 
     def starts(
         self, model: Isolator, prepared: Prepared, carried: int | None = None
@@ -175,7 +175,7 @@ class Bench:
         names = element_names(model)
         known = [self._memories.get(name) for name in names[:carried]] + [None] * len(names[carried:])
         if any(memory is None for memory in known):
-            memories = np.stack(internal_starts(model, self.problem.records, prepared))
+            memories = np.stack(internal_starts(model, self.problem.records, prepared, carried))
             ends = np.cumsum([element.internal_states for element in model.elements])
             fresh = np.split(memories, ends[:-1], axis=1)
             # Nuisances are deviations from the starts, which must therefore stay while they are carried on.

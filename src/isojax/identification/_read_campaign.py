@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from ..elements import CATALOGUE
 from ..records import Campaign, read_declaration
 from ..records import read_campaign as read_records
 from ._base_model import catalogue_names
@@ -27,5 +28,11 @@ def read_campaign(path: str | Path) -> Campaign:
     """
     declared = read_declaration(path)
     model = declared.sections["model"]
-    catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"])
+    names = catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"])
+    for name in names:
+        if "floor" in CATALOGUE[name].channels and declared.sections["floor"] is None:
+            raise ValueError(
+                f"{declared.file}: [model] names `{name}`, which follows the measured motion of the "
+                "floor, but section [floor], which says where that was measured, is missing"
+            )
     return read_records(path)

@@ -16,6 +16,7 @@ from ._elimination import Nuisances
 from ._errors import run_freely
 from ._estimate import Estimate, estimate
 from ._information import has_stiffness_scale
+from ._problem import one_hot
 from ._score import Score, ScoreTest
 
 ROUGH = 1.0
@@ -55,6 +56,7 @@ def refit_candidate(
     fitted, score = test.fitted, test.scores[index]
     element = score.element
     best: tuple[float, Isolator, Nuisances] | None = None
+    places = _free_places(fitted, element)
     for share in (1.0, 0.3, 0.03):
         model = _extended(fitted, element, share * score.strength, share * test.steps[index])
         old, new = fitted.point.nuisances, test.nuisances[index]
@@ -62,8 +64,9 @@ def refit_candidate(
         states = _states_of(model, fitted.model, states)
         stiffness = old.stiffness + share * (new.stiffness - old.stiffness)
         nuisances = Nuisances(states, stiffness, old.stiffness_spread)
-        nothing = np.zeros((len(list_parameters(model)), 0))
-        point = fitted.bench.evaluate(model, nothing, nuisances)
+        # The columns are not needed yet, but with them the search shares the compiled code.
+        directions = one_hot(model, places, [1.0] * len(places))
+        point = fitted.bench.evaluate(model, directions, nuisances)
         if point.is_finite and (best is None or point.chi2 < best[0]):
             best = (point.chi2, model, nuisances)
         if best is not None and best[0] < fitted.chi2:
@@ -71,14 +74,6 @@ def refit_candidate(
     if best is None:
         return fitted._replace(result=RESULTS.not_finite)
     _, model, nuisances = best
-    names = {f"{name}" for name in fitted.names}
-    listed = list_parameters(model)
-    first_new = len(listed) - len(own_parameters(element))
-    places = tuple(
-        place
-        for place, entry in enumerate(listed)
-        if entry.name in names or (place >= first_new and entry.spec.fitted)
-    )
     found = estimate(
         fitted.bench,
         model,
@@ -132,7 +127,7 @@ def refit_from(
         old = fitted.point.nuisances
         fresh = old._replace(states=np.zeros((0, 0)))
         # Eliminated by one linear step from far, initial states promise a chi2 that no later step reaches.
-        settled = best_nuisances(fitted.bench, model, old.stiffness_spread, fresh)
+        settled = best_nuisances(fitted.bench, model, old.stiffness_spread, fresh, places)
         nuisances = settled.nuisances if settled.is_finite else fresh
     return estimate(
         fitted.bench,
@@ -155,11 +150,24 @@ def bic(found: Estimate, inflation: float) -> float:
         inflation: chi2/dof of the best model known, at least 1: what model errors add to the noise.
 
     Returns:
-        chi2 / inflation + coefficients ln(samples). A phase found in each record counts as a coefficient.
+        chi2 / inflation + degrees of freedom of the nuisances + coefficients ln(samples). A phase found in
+        each record counts as a coefficient.
     """
     phases = sum(element.phased for element in found.model.elements) * len(found.bench.problem.records)
     samples = float(np.log(found.point.samples.sum()))
-    return found.chi2 / inflation + (len(found.places) + phases) * samples
+    taken = found.misfit - found.chi2
+    return found.chi2 / inflation + taken + (len(found.places) + phases) * samples
+
+
+def _free_places(fitted: Estimate, element: AbstractElement) -> tuple[int, ...]:
+    """Give the free coefficients of the model extended by an effect."""
+    listed = list_parameters(fitted.model.with_elements(element))
+    first_new = len(listed) - len(own_parameters(element))
+    return tuple(
+        place
+        for place, entry in enumerate(listed)
+        if entry.name in fitted.names or (place >= first_new and entry.spec.fitted)
+    )
 
 
 def _extended(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
@@ -279,3 +287,24 @@ def follows_freely(fitted: Estimate, found: Estimate) -> bool:
         for entry in (fitted, found)
     ]
     return bool(squares[1] <= squares[0])
+
+
+def rivals(
+    scores: tuple[Score, ...], refits: list[Refit], names: tuple[str, ...]
+) -> tuple[AbstractElement, ...]:
+    """Give effects as they imitate another: refitted where they were, else with the shape of their score.
+
+    Args:
+        scores: the scores of all absent effects.
+        refits: those that were refitted.
+        names: catalogue names of the effects.
+
+    Returns:
+        One element a name.
+    """
+    shapes = {score.element.name: score.element for score in scores}
+    for refit in refits:
+        element = refit.estimate.model.element(refit.score.element.name)
+        if element is not None:
+            shapes[element.name] = element
+    return tuple(shapes[name] for name in names)

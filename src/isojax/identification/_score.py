@@ -10,6 +10,7 @@ from scipy import stats
 from .._parameters import find_parameter
 from ..elements import CATALOGUE, AbstractElement, Scales
 from ..models import Isolator
+from ._channels import meaningless
 from ._elimination import Nuisances, step_nuisances
 from ._estimate import Estimate
 from ._problem import element_names, one_hot
@@ -106,7 +107,8 @@ def score_test(
     Args:
         fitted: the estimate to test.
         scales: magnitudes of the records.
-        probes: absent effects at zero strength.
+        probes: absent effects at zero strength; those that follow signals which the records lack are left
+            out.
         seed: of the draws for the family-wise p-value.
 
     Returns:
@@ -114,6 +116,8 @@ def score_test(
 
     Source: Rao 1948; Davies 1977 for parameters that mean nothing under the null; Westfall & Young 1993.
     """
+    pointless = meaningless(fitted.bench.problem.records)
+    probes = tuple(probe for probe in probes if probe.name not in pointless)
     # Beside what they contain, not in its place: a probe that absorbs an effect shows what it adds to it.
     model = Isolator(fitted.model.mass, (*fitted.model.elements, *probes), fitted.model.excitation)
     carried = len(fitted.model.elements)

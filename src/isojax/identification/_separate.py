@@ -24,6 +24,26 @@ CLASSES = (
         frozenset({"added_mass", "input_gain", "sensor_gain"}),
         "weigh a known extra mass onto the isolator and repeat one level: a mass error stays in kilograms, a "
         "gain error stays in per cent",
+        needed="added_mass",
+    ),
+    LookAlikes(
+        frozenset({"input_gain", "sensor_gain"}),
+        "calibrate either channel against another instrument: in no motion of the isolator do their gains "
+        "differ",
+    ),
+    LookAlikes(
+        frozenset({"end_stop", "freeplay"}),
+        "look at the rig, or measure the linear stiffness at motion smaller than the gap: a stiffness added "
+        "beyond a gap and one that is missing within it give the same records",
+    ),
+    LookAlikes(
+        frozenset({"asymmetric_friction", "input_offset"}),
+        "read the force channel with the exciter uncoupled: its offset is still there, and friction is not",
+    ),
+    LookAlikes(
+        frozenset({"polytropic_gas", "quadratic_stiffness"}),
+        "repeat at three times the top level: gas hardens with the cube of the motion, by a coefficient tied "
+        "to that of its square, while a parabola goes on as it is",
     ),
     LookAlikes(
         frozenset({"input_delay", "maxwell_branch", "added_mass", "dual_chamber", "fractional_damping"}),
@@ -38,7 +58,8 @@ CLASSES = (
     ),
     LookAlikes(
         frozenset({"quadratic_stiffness", "input_offset", "sensor_offset"}),
-        "measure the mean displacement (a DC-capable sensor), or repeat with a known static load",
+        "measure the mean displacement (a DC-capable sensor); a known static load parts them only where no "
+        "cubic spring shifts along with it",
     ),
     LookAlikes(
         frozenset({"dual_chamber", "maxwell_branch"}),

@@ -16,6 +16,8 @@ _SMOOTH = np.array([0.25, 0.5, 0.25])
 _FEWEST = 1
 """Swings a coefficient that the balance needs at least; each gives a spring and a damper equation."""
 
+_LINEAR = ("linear_stiffness", "linear_damping")
+
 
 def decaying_response(campaign: Campaign, record: Record) -> FrequencyResponse:
     """Give the swings of a free decay as the dwells of a drive that makes up for the decay.
@@ -70,11 +72,20 @@ def start_from_swings(
         records: free decays and blows.
 
     Returns:
-        The fit and its notes; None where the decays are too short to tell so many coefficients.
+        The fit and its notes, of the linear coefficients alone where the decays are too short to tell them
+        all; None where they are too short for those too.
     """
     responses = tuple(decaying_response(campaign, record) for record in records)
-    if sum(one.frequency.size for one in responses) < _FEWEST * len(names):
-        return None
+    swings, few = sum(one.frequency.size for one in responses), ()
+    if swings < _FEWEST * len(names):
+        linear = tuple(name for name in names if name in _LINEAR)
+        if not linear or swings < _FEWEST * len(linear):
+            return None
+        few = (
+            f"The decays have {swings} swings, too few for {len(names)} coefficients: all but the linear "
+            "ones start at zero.",
+        )
+        names = linear
     motion = dwell_motion(base, responses)
     highest, fastest = (float(np.max(np.abs(s))) for s in (motion.displacement, motion.velocity))
     found, notes = sane_fit(lambda chosen: fit_all_dwells(base, chosen, responses), names, highest, fastest)
@@ -84,4 +95,4 @@ def start_from_swings(
         [(2.0 * np.pi * one.frequency) ** 2 * one.displacement[:, 0] for one in responses]
     )
     share = float(np.linalg.norm(made_up) / np.linalg.norm(inertia))
-    return BalanceFit(found.model, found.unexplained * share, found.fitted), notes
+    return BalanceFit(found.model, found.unexplained * share, found.fitted), (*few, *notes)

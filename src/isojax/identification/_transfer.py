@@ -4,23 +4,37 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from .._results import RESULTS
 from ..elements import Scales
-from ._errors import restart_records
+from ._beginning import best_nuisances
 from ._estimate import Estimate, estimate
 from ._fit import Fit
 from ._problem import Bench, Problem, one_hot
 
+VISIBLE = 0.03
+"""Share of its gain that an effect must make at a level for that level to be left out: what sets in above it
+only, such as a stop, is not told there."""
 
-def _split(problem: Problem) -> tuple[Problem, Problem]:
+
+def _split(fitted: Estimate, extended: Estimate) -> tuple[Problem, Problem]:
     """Leave out the records of the highest level but one; without three levels every other segment.
 
-    Two levels are not parted: a law fitted to the lower alone says little of the upper.
+    Two levels are not parted: a law fitted to the lower alone says little of the upper. Nor is a level left
+    out at which the effect is not seen, unless its records are whole segments (releases): every other one of
+    those would leave out the highest.
     """
+    problem = extended.bench.problem
     levels = sorted({record.level for record in problem.records if record.level is not None})
+    out = set()
     if len(levels) >= 3:
         out = {place for place, record in enumerate(problem.records) if record.level == levels[-2]}
+        gains = _misfit_by_record(fitted) - _misfit_by_record(extended)
+        parted = len(problem.segments) > len(problem.records)
+        if parted and not gains[list(out)].sum() > VISIBLE * gains.sum():
+            out = set()
+    if out:
         seen = tuple(part for part in problem.segments if part.record not in out)
         unseen = tuple(part for part in problem.segments if part.record in out)
     elif len(problem.segments) >= 4:
@@ -34,16 +48,21 @@ def _split(problem: Problem) -> tuple[Problem, Problem]:
     return problem._replace(segments=seen, heads=()), problem._replace(segments=unseen, heads=())
 
 
+def _misfit_by_record(found: Estimate) -> Float[np.ndarray, " record"]:
+    """Give chi2 of each record, with what its nuisances took."""
+    return found.point.reduced.by_record[:, -1, -1] + found.point.reduced.eliminated
+
+
 def _excess_unseen(part: Estimate, unseen: Problem, spread: float) -> float:
     """Give chi2 - dof of data that a refit did not see, its coefficients no surer than the refit made them.
 
     With r the whitened error, J its slopes and C the covariance of the coefficients, chi2 is
     `r' (I + J C J')^-1 r = r'r - r'J (C^-1 + J'J)^-1 J'r`.
     """
-    bench = Bench(unseen)
-    nuisances = restart_records(bench, part.model, spread).point.nuisances
+    bench = Bench(unseen, like=part.bench)
     known = part.point.reduced.matrix[:-1, :-1]
     sizes = 1.0 / np.sqrt(np.maximum(np.diag(known), 1e-300))
+    nuisances = best_nuisances(bench, part.model, spread, places=part.places).nuisances
     point = bench.evaluate(part.model, one_hot(part.model, part.places, list(sizes)), nuisances)
     matrix = point.reduced.matrix
     slopes, error = matrix[:-1, :-1], matrix[:-1, -1]
@@ -71,16 +90,16 @@ def transferred_share(
 
     Returns:
         1 - (excess with the effect)/(excess without it) on the unseen part; not positive where it does not
-        carry over.
+        carry over, 1 where the motion without it runs away there.
     """
-    seen, unseen = _split(extended.bench.problem)
+    seen, unseen = _split(fit.estimate, extended)
     excess = []
     for found in (fit.estimate, extended):
         progress("carry-over: refit on a part of the data")
         nuisances = found.point.nuisances
         start = nuisances._replace(states=np.zeros((0, 0)))
         part = estimate(
-            Bench(seen),
+            Bench(seen, like=found.bench),
             found.model,
             found.places,
             scales,
@@ -92,6 +111,9 @@ def transferred_share(
         if part.result == RESULTS.not_finite:
             return 0.0
         excess.append(_excess_unseen(part, unseen, nuisances.stiffness_spread))
-    if not np.all(np.isfinite(excess)):
+    without, with_effect = excess
+    if not np.isfinite(with_effect):
         return 0.0
-    return float(1.0 - excess[1] / max(excess[0], 1.0)) if excess[1] < excess[0] else 0.0
+    # without the effect its coefficients, bent to make up for it, may let the motion run away elsewhere
+    without = without if np.isfinite(without) else np.inf
+    return float(1.0 - with_effect / max(without, 1.0)) if with_effect < without else 0.0

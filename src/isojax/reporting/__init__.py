@@ -13,6 +13,7 @@ from ._classical import plot_receptance as plot_receptance
 from ._closed_loop import ClosedLoop as ClosedLoop
 from ._closed_loop import close_loop as close_loop
 from ._compile_seconds import compile_seconds as compile_seconds
+from ._dwell_stability import plot_dwell_stability as plot_dwell_stability
 from ._evidence import plot_errors as plot_errors
 from ._evidence import plot_ranking as plot_ranking
 from ._evidence import plot_stiffness_scatter as plot_stiffness_scatter
@@ -25,6 +26,11 @@ from ._map_files import write_map as write_map
 from ._map_summary import map_summary as map_summary
 from ._page import render_page as render_page
 from ._record import plot_record as plot_record
+from ._remainder_pictures import plot_ceilings as plot_ceilings
+from ._remainder_pictures import plot_latent_loops as plot_latent_loops
+from ._remainder_pictures import plot_latent_map as plot_latent_map
+from ._remainder_pictures import plot_remainder_map as plot_remainder_map
+from ._remainder_pictures import plot_remainder_parts as plot_remainder_parts
 from ._residuals import plot_correlation as plot_correlation
 from ._residuals import plot_cycle_residual as plot_cycle_residual
 from ._residuals import plot_residual as plot_residual

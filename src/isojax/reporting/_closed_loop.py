@@ -2,9 +2,11 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ..health import CampaignHealth, campaign_health
 from ..identification import DEFAULT_SOLVER, ClassicalGuess, Finding, Fit, Loop, silent
 from ..identification import close_loop as find_loop
 from ..records import Campaign
@@ -57,6 +59,11 @@ class ClosedLoop:
         """Wall time [s]."""
         return self.loop.seconds
 
+    @cached_property
+    def health(self) -> CampaignHealth:
+        """State of the data: dwells beside folds, drift budget; worked out when it is first asked for."""
+        return campaign_health(self.loop)
+
     def report(self, folder: str | Path) -> None:
         """Write report.html, result.json and, unless the last fit failed, model.json.
 
@@ -67,7 +74,7 @@ class ClosedLoop:
             ValueError: if something else than a folder is in the way, or a model that was found is not
                 finite.
         """
-        write_report(self.loop, folder)
+        write_report(self.loop, folder, self.health)
 
     def __str__(self) -> str:
         """Give the summary that the terminal shows."""

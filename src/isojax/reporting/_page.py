@@ -7,8 +7,10 @@ from typing import Any
 import jinja2
 
 from .._parameters import list_parameters
-from ..identification import OUTPUT_UNITS, Candidate, Fit, Loop, plain_unit
-from ..records import Campaign, data_health
+from ..health import CampaignHealth, campaign_health
+from ..identification import OUTPUT_UNITS, Candidate, Fit, Loop, loop_remainder, plain_unit
+from ..records import Campaign
+from ._health_words import budget_rows, budget_words, dwell_words, mains_words
 from ._pictures import draw_pictures
 from ._quantities import (
     typeset_goodness,
@@ -18,6 +20,7 @@ from ._quantities import (
     typeset_unit,
 )
 from ._quantities import typeset_with_error as with_error
+from ._remainder_words import law_rows, remainder_words
 from ._sentences import caveats, effect_words, finding_words, headline, health_words
 from ._summary import error_rows, parameter_words
 
@@ -30,25 +33,28 @@ _VERDICTS = {
 _MOST = 12
 
 
-def render_page(loop: Loop) -> str:
+def render_page(loop: Loop, health: CampaignHealth | None = None) -> str:
     """Give report.html: self-contained, no script, no outside resource.
 
     Args:
         loop: the closed loop.
+        health: of its campaign; worked out here if omitted.
 
     Returns:
         The page.
     """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     source = files("isojax.reporting").joinpath("report.html.jinja").read_text(encoding="utf-8")
-    return environment.from_string(source).render(_content(loop))
+    health = campaign_health(loop) if health is None else health
+    return environment.from_string(source).render(_content(loop, health))
 
 
-def _content(loop: Loop) -> dict[str, Any]:
+def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
     before, after = loop.before, loop.after
     same = before is after
     campaign = loop.campaign
     quantity = campaign.output.quantity
+    remainder = loop_remainder(loop)
     return {
         "title": campaign.title,
         "verdict": loop.verdict,
@@ -88,13 +94,21 @@ def _content(loop: Loop) -> dict[str, Any]:
             )
             for effect, (upper, unit) in loop.bounds.items()
         ],
+        "remainder_lines": () if remainder is None else remainder_words(remainder),
+        "remainder_laws": [] if remainder is None else law_rows(remainder.pursuit),
         "facts": _facts(loop),
-        "health": health_words(data_health(campaign), after),
+        "health": (
+            *health_words(health.data, after),
+            *mains_words(health, OUTPUT_UNITS[quantity]),
+            *dwell_words(health.dwells, campaign.input.quantity),
+            *budget_words(health.budget, after, loop.findings),
+        ),
+        "budget": budget_rows(health.budget, after),
         "guess_notes": loop.guess.notes,
         "caveats": caveats(loop),
         "fit_report_before": str(before),
         "fit_report_after": str(after),
-        **draw_pictures(loop),
+        **draw_pictures(loop, health),
         "version": version("isojax"),
         "seconds": f"{loop.seconds:.0f}",
     }

@@ -10,11 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .._results import is_successful
-from ..identification import ClassicalGuess, Fit, Loop, residual
+from ..health import CampaignHealth
+from ..identification import ClassicalGuess, Fit, Loop, loop_remainder, residual
 from ._classical import centre_frequency, plot_equivalent, plot_receptance, visited_amplitudes
 from ._cycles import trace_cycles
+from ._dwell_stability import plot_dwell_stability
 from ._evidence import plot_errors, plot_ranking, plot_stiffness_scatter
 from ._forces import effect_on_its_own, measured_forces, plot_effect, plot_restoring_force
+from ._remainder_pictures import (
+    plot_ceilings,
+    plot_latent_loops,
+    plot_latent_map,
+    plot_remainder_map,
+    plot_remainder_parts,
+)
 from ._residuals import plot_correlation, plot_cycle_residual, plot_residual, plot_where
 from ._style import pair
 from ._time_history import plot_time_history, worst_window
@@ -53,17 +62,18 @@ def encode(figure: Figure) -> str:
     return base64.b64encode(page.getvalue()).decode("ascii")
 
 
-def draw_pictures(loop: Loop) -> dict[str, tuple[Picture, ...]]:
+def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture, ...]]:
     """Draw the pictures of the report.
 
     Where the fit before failed, only those are drawn that need none.
 
     Args:
         loop: the closed loop.
+        health: of its campaign.
 
     Returns:
-        Section to its pictures: error_pictures, evidence_pictures, record_pictures, force_pictures,
-        health_pictures.
+        Section to its pictures: error_pictures, evidence_pictures, remainder_pictures, record_pictures,
+        force_pictures, health_pictures.
     """
     before = loop.before if is_successful(loop.before.result) else None
     differs = loop.after is not loop.before and is_successful(loop.after.result)
@@ -71,9 +81,10 @@ def draw_pictures(loop: Loop) -> dict[str, tuple[Picture, ...]]:
     return {
         "error_pictures": () if before is None else _error_pictures(before, after),
         "evidence_pictures": _evidence_pictures(loop, before, after),
+        "remainder_pictures": _remainder_pictures(loop),
         "record_pictures": () if before is None else _record_pictures(before, after),
         "force_pictures": _force_pictures(loop.guess, before, after),
-        "health_pictures": () if before is None else _health_pictures(before, after),
+        "health_pictures": () if before is None else _health_pictures(before, after, health),
     }
 
 
@@ -124,6 +135,38 @@ def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tup
         caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force stays."
         pictures += _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
     return tuple(pictures) + _effect_pictures(loop)
+
+
+def _remainder_pictures(loop: Loop) -> tuple[Picture, ...]:
+    """Draw what is left, where something is."""
+    remainder = loop_remainder(loop)
+    if remainder is None:
+        return ()
+    pictures = _draw(
+        "how much could be explained",
+        "Free laws one after the other, and what any law could do on samples that it has not seen.",
+        plot_ceilings,
+        remainder,
+    )
+    if remainder.parts:
+        caption = "Power beyond the noise over all dwells; what the fitted coefficients absorb is gone."
+        pictures += _draw("parts of the missing force", caption, plot_remainder_parts, remainder.parts)
+    if remainder.dwells:
+        caption = "One is the noise. Level and frequency where the model errs."
+        pictures += _draw("map of what is left", caption, plot_remainder_map, remainder.dwells)
+    caption = "Drive less inertia less model, averaged; one value a place if it is a law of x and v."
+    pictures += _draw("missing force over the plane", caption, plot_latent_map, remainder.force_map)
+    if remainder.dwells:
+        caption = "The worst dwell of the lowest, middle and highest level; grey: noise, ±2σ a harmonic."
+        for against in ("displacement", "velocity"):
+            pictures += _draw(
+                f"missing force against {against}",
+                caption,
+                plot_latent_loops,
+                remainder.dwells,
+                against=against,
+            )
+    return pictures
 
 
 def _effect_pictures(loop: Loop) -> tuple[Picture, ...]:
@@ -209,9 +252,19 @@ def _force_pictures(guess: ClassicalGuess, before: Fit | None, after: Fit | None
     return pictures
 
 
-def _health_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
-    """Draw how the stiffness scatters between records."""
-    if len(before.campaign.records) < 2 or not np.any(before.restarts.stiffness):
-        return ()
-    caption = "Scatter is data health; a trend in the order of the test is drift."
-    return _draw("stiffness of each record", caption, plot_stiffness_scatter, before, after, wide=True)
+def _health_pictures(before: Fit, after: Fit | None, health: CampaignHealth) -> tuple[Picture, ...]:
+    """Draw how the stiffness scatters between records, and how the dwells lie on the model's branches."""
+    pictures: tuple[Picture, ...] = ()
+    if len(before.campaign.records) > 1 and np.any(before.restarts.stiffness):
+        caption = "Scatter is data health; a trend in the order of the test is drift."
+        pictures += _draw(
+            "stiffness of each record", caption, plot_stiffness_scatter, before, after, wide=True
+        )
+    known = [one for one in health.dwells if not one.reason]
+    if known:
+        caption = "Each measured dwell on the fitted model's branch, by level; unstable above one."
+        pictures += _draw("multipliers of the dwells", caption, plot_dwell_stability, known)
+    if any(np.isfinite(one.nearness) for one in known):
+        caption = "The fold at which the dwell's own branch ends; near it, drift moves the motion far."
+        pictures += _draw("distance to folds", caption, plot_dwell_stability, known, what="fold")
+    return pictures

@@ -5,21 +5,28 @@ from typing import Any
 
 from .._parameters import list_parameters
 from .._results import is_successful
-from ..identification import Errors, Finding, Fit, Loop, plain_unit
+from ..health import CampaignHealth
+from ..identification import Errors, Finding, Fit, Loop, loop_remainder, plain_unit
+from ._health_words import health_dict
+from ._remainder_words import remainder_dict
 
 SCHEMA = 1
 
 
-def result_dict(loop: Loop) -> dict[str, Any]:
+def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, Any]:
     """Give a closed loop as schema 1 of result.json.
+
+    "remainder" is there only where the verdict is "unexplained" or "partly_explained".
 
     Args:
         loop: the closed loop.
+        health: of its campaign, which adds the key "health"; none if omitted.
 
     Returns:
         Numbers, words, lists and dictionaries that JSON holds; None where a number is not finite, and for the
         coefficients of a fit that failed.
     """
+    remainder = loop_remainder(loop)
     return {
         "schema": SCHEMA,
         "campaign": loop.campaign.title,
@@ -32,6 +39,8 @@ def result_dict(loop: Loop) -> dict[str, Any]:
             for effect, (upper, unit) in loop.bounds.items()
         },
         "seconds": _number(loop.seconds),
+        **({} if health is None else {"health": health_dict(health)}),
+        **({} if remainder is None else {"remainder": remainder_dict(remainder)}),
     }
 
 

@@ -161,6 +161,15 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
     lines = [f"Noise of the output: {sigma} {unit} rms, from {fit.noise.method.replace('_', ' ')}."]
     if fit.noise.note:
         lines.append(f"{_capital(fit.noise.note)}.")
+    if health.noise_peak is not None:
+        peak = health.noise_peak
+        lines.append(
+            "The scatter from cycle to cycle is not white: it peaks at "
+            f"{typeset_number(peak.frequency, 2)} Hz, {typeset_number(peak.height, 2)} times its level at "
+            f"high frequency, and holds {typeset_number(peak.rms, 2)} {unit} rms there. So scatters an "
+            "isolator that something unmeasured shakes, such as a moving floor: measure the floor and "
+            "declare it as [floor]."
+        )
     if health.dwells:
         worst = sorted(health.unsettled, key=lambda one: -one.change)[:3]
         examples = "; ".join(

@@ -20,6 +20,7 @@ from ._quantities import (
     typeset_unit,
 )
 from ._quantities import typeset_with_error as with_error
+from ._remainder_words import remainder_summary
 from ._sentences import effect_words, finding_words, headline
 from ._style import ROLES
 
@@ -185,12 +186,12 @@ def loop_summary(loop: Loop) -> RenderableType:
         loop: the closed loop.
 
     Returns:
-        Headline, errors, coefficients, evidence.
+        Headline, evidence, what is left where something is, errors, coefficients.
     """
     lines = [line for finding in loop.findings for line in finding_words(finding)]
     return Group(
         Text(headline(loop), style="bold"),
-        *(Text(line) for line in lines),
+        *(Text(line) for line in (*lines, *remainder_summary(loop))),
         error_table(loop.before, loop.after),
         parameter_table(loop.before, loop.after),
     )

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from .._results import is_successful
+from ..health import CampaignHealth, campaign_health
 from ..identification import Fit, Loop
 from ..models import model_to_dict, write_whole
 from ._page import render_page
@@ -30,7 +31,7 @@ def check_folder(folder: str | Path) -> Path:
     return folder
 
 
-def write_report(loop: Loop, folder: str | Path) -> None:
+def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None = None) -> None:
     """Write report.html, result.json and model.json; everything is ready before the first is written.
 
     Where the last fit failed there is no model: no model.json is written, and one of before is removed.
@@ -38,15 +39,17 @@ def write_report(loop: Loop, folder: str | Path) -> None:
     Args:
         loop: the closed loop.
         folder: where they go; made if it is not there. Other files in it stay as they are.
+        health: of its campaign; worked out here if omitted.
 
     Raises:
         ValueError: if something else than a folder is in the way, or a model that was found is not finite.
     """
     folder = check_folder(folder)
+    health = campaign_health(loop) if health is None else health
     texts = {
         "model.json": model_text(loop.after),
-        "report.html": render_page(loop),
-        "result.json": json.dumps(result_dict(loop), indent=1, allow_nan=False) + "\n",
+        "report.html": render_page(loop, health),
+        "result.json": json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n",
     }
     write_texts(folder, texts)
 

@@ -1,0 +1,28 @@
+"""A small sample of the blind trial, which the diagnosis must pass."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from _trial_judge import table
+from _trial_run import run_one
+
+SAMPLE = range(1000, 1020)
+
+
+def _mark(rows, criterion):
+    return next(mark for mark in table(rows) if mark.criterion.startswith(criterion))
+
+
+@pytest.mark.slow
+def test_a_small_sample_is_judged_right():
+    """Twenty campaigns: too few for the marks of the whole trial, enough to see that nothing is broken."""
+    rows = [run_one(seed, ("none", "one")[seed % 2], "loop") for seed in SAMPLE]
+    assert not [row["error"] for row in rows if "error" in row]
+    false, right = _mark(rows, "an effect named"), _mark(rows, "right family")
+    assert false.interval[0] <= 0.05, false.failing
+    assert right.judged >= 5
+    assert right.figure >= 0.8, right.failing
+    assert _mark(rows, "inadmissible sign").passed

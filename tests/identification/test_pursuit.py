@@ -1,0 +1,58 @@
+"""Matching pursuit over free force laws, on benches that hide laws of which the catalogue knows nothing."""
+
+import numpy as np
+import pytest
+from strange_laws import BASE, Governor, Grip
+
+from isojax import rig
+from isojax.elements import CATALOGUE
+from isojax.identification import classical_guess, explain_remainder, fit, scales
+from isojax.identification._free_force import free_laws
+
+PLAN = rig.SteppedSine(
+    (40.0, 80.0, 130.0), tuple(np.arange(4.0, 6.6, 0.25)), directions=("forward",), holdout_levels=(100.0,)
+)
+
+
+@pytest.fixture(scope="module")
+def left_by(simulated):
+    """Gives the function that fits the declared model to a plant with hidden laws, and describes the rest."""
+
+    def describe(*hidden):
+        campaign = simulated(rig.Plant(BASE).plus(*hidden), PLAN)
+        return explain_remainder(fit(classical_guess(campaign).model, campaign), refit=False).pursuit
+
+    return describe
+
+
+@pytest.mark.parametrize(("law", "formula"), [(Grip(3e6), "|x| v"), (Governor(6e6), "x |v|")])
+def test_a_law_outside_the_catalogue_is_pursued_with_its_coefficient(left_by, law, formula):
+    pursuit = left_by(law)
+    assert [one.formula for one in pursuit.laws] == [formula]
+    (one,) = pursuit.laws
+    assert one.unit == "N s/m^2"
+    assert abs(one.coefficient - law.coefficient) < 4.0 * one.error + 0.03 * law.coefficient
+    assert one.share > 0.9
+    assert pursuit.chi2_per_dof > 1.1
+    assert pursuit.linear < 1.03
+
+
+def test_relaxation_is_pursued_as_a_memory_that_fades(left_by):
+    pursuit = left_by(rig.MaxwellBranch(4e4, 0.03))
+    first = pursuit.laws[0]
+    assert first.formula.startswith("fade(x; ")
+    assert first.coefficient > 0.0
+    assert first.share > 0.9
+
+
+def test_nothing_is_pursued_in_noise(left_by):
+    pursuit = left_by()
+    assert pursuit.laws == ()
+    assert pursuit.linear == pursuit.chi2_per_dof
+
+
+def test_free_laws_are_no_effects(simulated):
+    laws = free_laws(scales(simulated(rig.Plant(BASE), PLAN)))
+    assert len(laws) > 100
+    assert not {law.name for law in laws} & set(CATALOGUE)
+    assert len({law.wording().formula for law in laws}) == len(laws)
