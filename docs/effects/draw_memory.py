@@ -11,9 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from panels import label, panels
 
 from isojax import elements
-from isojax.reporting._style import AFTER, BEFORE, LEVELS, MEASURED, NEUTRAL, axes_for, entitle
+from isojax.reporting._style import AFTER, BEFORE, LEVELS, MEASURED, NEUTRAL
 
 jax.config.update("jax_enable_x64", True)
 
@@ -60,24 +61,6 @@ def equivalent(element, size: float, omega: float) -> tuple[float, float]:
     """Stiffness [N/m] and damping [N s/m] of the first harmonic."""
     force = loop(element, size, omega)
     return 2.0 * np.mean(force * np.sin(PHASE)) / size, 2.0 * np.mean(force * np.cos(PHASE)) / (size * omega)
-
-
-def panels(left: str, right: str) -> tuple[Figure, Axes, Axes]:
-    """Two axes side by side with their titles."""
-    figure = Figure(figsize=(7.0, 2.9), layout="constrained")
-    first, second = figure.subplots(1, 2)
-    for ax, title in ((first, left), (second, right)):
-        axes_for(ax)
-        entitle(ax, title)
-    return figure, first, second
-
-
-def label(ax: Axes, x: str, y: str) -> None:
-    """Axis labels, and a legend where something has a name."""
-    ax.set_xlabel(x)
-    ax.set_ylabel(y)
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(fontsize=7, frameon=False)
 
 
 def loops(ax: Axes, element, sizes: tuple[float, ...], omega: float) -> None:
