@@ -1,7 +1,9 @@
 """Campaigns of the blind trial, drawn from a seed and filed by the rig simulator."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -46,7 +48,7 @@ class Sketch:
 
     Args:
         seed: of everything.
-        kind: "none", "one", "two" or "outside".
+        kind: "none", "one", "two", "outside", or "coverage" (one effect that a test can see).
         base: the six coefficients of the plant.
         layout: "stepped", "swept" or "mixed".
         levels: force amplitudes of the fitted and of the held-out records, N.
@@ -68,6 +70,11 @@ class Sketch:
     def plant(self) -> rig.Plant:
         """The plant without what is hidden."""
         return rig.Plant(rig.base_laws(*self.base))
+
+    @property
+    def fitted_plans(self) -> tuple[rig.Plan, ...]:
+        """The plans without the one that is held out."""
+        return self.plans[:-1]
 
     @property
     def model(self) -> Isolator:
@@ -145,7 +152,12 @@ def sketch(seed: int, kind: str | None = None, names: tuple[str, ...] | None = N
         shaker=shaker,
         tolerance=1e-9,
     )
-    plans = _plans(layout, levels, tuple((CYCLES * RATE / counts).tolist()), draw)
+    frequencies = tuple((CYCLES * RATE / counts).tolist())
+    plans = _plans(layout, levels, frequencies, draw)
+    if kind == "coverage":
+        # Intervals need no more than the levels that part the six coefficients.
+        layout = "stepped"
+        plans = rig.SteppedSine((levels[0], levels[2]), frequencies, CYCLES, ("forward",)), plans[-1]
     if names is None:
         names = _names(seed, kind)
     return Sketch(seed, kind, base, layout, levels, plans, bench, names)
@@ -180,10 +192,48 @@ def _plans(
     return sines((low, middle, high), ("forward",)), sines((high,), ("backward",)), held_out
 
 
-def twin(drawn: Sketch, folder: Path):
-    """File the campaign that hides nothing, and fit the true structure to it."""
-    path = rig.write_campaign(folder, drawn.plant, drawn.plans, drawn.seed, "twin", drawn.bench)
-    return fit(drawn.model, read_campaign(path))
+@dataclass(frozen=True)
+class Traces:
+    """What the effects would leave in a campaign that hides none of them.
+
+    Args:
+        motion: how the plant moves.
+        shapes: of every effect, as drawn.
+        limits: detection limit of every effect that leaves a trace, in the unit of its strength.
+    """
+
+    motion: Motion
+    shapes: dict[str, Shape]
+    limits: dict[str, float]
+
+
+@lru_cache(maxsize=1)
+def traces(seed: int, kind: str) -> Traces:
+    """Measure the twin that hides nothing, and see what the effects would leave in it.
+
+    One detection limit is 3.5 standard errors of the strength beside the true declared model: 3.5 / |g| with
+    g the whitened trace of the effect less what the six coefficients, the initial states and the stiffness
+    scales imitate. It is read off the score test of the twin, the shape of the effect being known. The seed
+    alone says all of it, so that it serves every effect that is hidden under the same seed.
+
+    Args:
+        seed: of the campaign.
+        kind: its class.
+    """
+    drawn = sketch(seed, kind, ())
+    with TemporaryDirectory() as folder:
+        path = rig.write_campaign(Path(folder), drawn.plant, drawn.fitted_plans, seed, "twin", drawn.bench)
+        innocent = fit(drawn.model, read_campaign(path))
+    motion = motion_of(drawn, innocent)
+    if kind == "outside":
+        return Traces(motion, {}, {})
+    # All effects are tested, so that the shapes, and with them the compiled code, are those of every seed.
+    shapes = {name: effect.shape(generator(seed, "shape", name), motion) for name, effect in EFFECTS.items()}
+    magnitudes = scales(innocent.campaign)
+    probes = tuple(element_of(name, shapes[name], magnitudes) for name in EFFECTS)
+    test = score_test(innocent.estimate, magnitudes, probes)
+    limits = {score.element.name: SIGNIFICANT * score.error for score in test.scores}
+    return Traces(motion, shapes, limits)
 
 
 def motion_of(drawn: Sketch, innocent) -> Motion:
@@ -199,35 +249,23 @@ def motion_of(drawn: Sketch, innocent) -> Motion:
     )
 
 
-def secrets(drawn: Sketch, innocent) -> tuple[Secret, ...]:
-    """Draw how large the hidden effects are.
-
-    One detection limit is 3.5 standard errors of the strength beside the true declared model: 3.5 / |g| with
-    g the whitened trace of the effect less what the six coefficients, the initial states and the stiffness
-    scales imitate. It is read off the score test of the twin campaign, the shape of the effect being known.
+def secrets(drawn: Sketch) -> tuple[Secret, ...]:
+    """Draw how large the hidden effects are, in detection limits.
 
     Args:
         drawn: the campaign.
-        innocent: the fit of its twin.
     """
-    motion = motion_of(drawn, innocent)
+    seen = traces(drawn.seed, drawn.kind)
+    motion, shapes, limits = seen.motion, seen.shapes, seen.limits
     if drawn.kind == "outside":
         draw = generator(drawn.seed, "outside", *drawn.names)
         force = motion.lowest * log_uniform(draw, 0.1, 0.4)
         (name,) = drawn.names
         return (Secret(name, float("nan"), float("nan"), {}, OUTSIDE[name](draw, motion, force)),)
-    # All effects are tested, so that the shapes, and with them the compiled code, are those of every seed.
-    shapes = {
-        name: effect.shape(generator(drawn.seed, "shape", name), motion) for name, effect in EFFECTS.items()
-    }
-    magnitudes = scales(innocent.campaign)
-    probes = tuple(element_of(name, shapes[name], magnitudes) for name in EFFECTS)
-    test = score_test(innocent.estimate, magnitudes, probes)
-    limits = {score.element.name: SIGNIFICANT * score.error for score in test.scores}
     hidden: list[Secret] = []
     for name in drawn.names:
         apart = not any(name in exact_class(other.name) for other in hidden)
-        if len(hidden) < {"one": 1, "two": 2}[drawn.kind] and apart and name in limits:
+        if len(hidden) < (2 if drawn.kind == "two" else 1) and apart and name in limits:
             hidden.append(_secret(drawn, name, shapes[name], limits[name], motion))
     return tuple(hidden)
 
@@ -235,8 +273,9 @@ def secrets(drawn: Sketch, innocent) -> tuple[Secret, ...]:
 def _secret(drawn: Sketch, name: str, shape: Shape, limit: float, motion: Motion) -> Secret:
     effect = EFFECTS[name]
     draw = generator(drawn.seed, "size", name)
-    # The smaller of two effects must be one that a test can see, else there is but one.
-    smallest = 3.0 if drawn.kind == "two" else 1.0
+    # The smaller of two effects must be one that a test can see, else there is but one; the interval of one
+    # that it cannot see ends at the bound of its sign.
+    smallest = 1.0 if drawn.kind == "one" else 3.0
     size = min(limit * log_uniform(draw, smallest, LARGEST), effect.most(motion))
     if effect.fixed is not None:
         size = effect.fixed
@@ -245,7 +284,8 @@ def _secret(drawn: Sketch, name: str, shape: Shape, limit: float, motion: Motion
     return Secret(name, size, limit, shape, effect.law(size, shape))
 
 
-def file_campaign(drawn: Sketch, hidden: tuple[Secret, ...], folder: Path) -> Path:
+def file_campaign(drawn: Sketch, hidden: tuple[Secret, ...], folder: Path, held_out: bool = True) -> Path:
     """File the campaign; where the plant runs away the effect is too large, which the caller hears of."""
     plant = drawn.plant.plus(*(secret.law for secret in hidden))
-    return rig.write_campaign(folder, plant, drawn.plans, drawn.seed, "blind", drawn.bench)
+    plans = drawn.plans if held_out else drawn.fitted_plans
+    return rig.write_campaign(folder, plant, plans, drawn.seed, "blind", drawn.bench)

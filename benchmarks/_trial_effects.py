@@ -116,6 +116,10 @@ def _mode_shape(draw: np.random.Generator, motion: Motion) -> Shape:
     return {"angular_frequency": angular, "damping_ratio": log_uniform(draw, 0.01, 0.1)}
 
 
+def _harmonic_shape(draw: np.random.Generator, motion: Motion) -> Shape:
+    return {"phase": float(draw.uniform(-np.pi, np.pi)), "order": float(draw.choice([2.0, 3.0]))}
+
+
 def _dual_chamber(stiffness: float, shape: Shape) -> rig.DualChamber:
     """Two equal chambers of 0.02 m^2 at 5 bar with this stiffness, time constant and orifice."""
     area, pressure, kappa = 0.02, 5e5, 1.4
@@ -270,8 +274,29 @@ EFFECTS: dict[str, Hidden] = {
         lambda draw, motion: {"level": motion.acceleration * float(draw.uniform(0.8, 1.3))},
         fixed=1.0,
     ),
+    "stiffness_drift": Hidden(
+        lambda size, shape: rig.StiffnessDrift(size), lambda motion: 0.05 * motion.k1, signed=True
+    ),
+    "mains_hum": Hidden(
+        lambda size, shape: rig.MainsHum(size, shape["frequency"]),
+        lambda motion: 0.1 * motion.acceleration,
+        lambda draw, motion: {"frequency": float(draw.choice([50.0, 60.0]))},
+    ),
+    "drive_harmonics": Hidden(
+        lambda size, shape: rig.DriveHarmonics(size, shape["phase"], shape["order"]),
+        lambda motion: 0.05,
+        _harmonic_shape,
+    ),
 }
-"""What may be hidden. Friction that differs between directions is left out: alone it feeds energy in."""
+"""What may be hidden. Friction that differs between directions is left out: alone it feeds energy in.
+
+So is the motion of a floor: it means something only where a sensor on the floor is recorded. That would have
+to be so in every campaign, and the scatter between cycles would then measure the noise in none of them.
+
+So is a drive held between its samples: behind the anti-alias filter of the bench a reading of acceleration
+sees the mean of both sides of each step. What is left at 4 to 7 Hz of 250 Hz is half a sample of delay, to
+1e-3 of the drive: seed 6, so held, comes out as 2.004 ms of input_delay and nothing beside.
+"""
 
 COMMONEST = (
     "coulomb_friction",

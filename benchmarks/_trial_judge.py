@@ -78,7 +78,7 @@ def line(row: Row) -> str:
         for one in row["truth"]
     )
     named = " + ".join("|".join(one["set"]) for one in row.get("findings", ())) or "nothing"
-    text = f"seed {row['seed']:4d} {row['layout']:7s} {truth or 'nothing hidden'}"
+    text = f"seed {row['seed']:4d} {row.get('layout', row['task']):7s} {truth or 'nothing hidden'}"
     if "verdict" in row:
         text += f" -> {row['verdict']}: {named}"
     if "before" in row:
@@ -206,7 +206,18 @@ def table(rows: list[Row]) -> list[Mark]:
                 None,
             )
         )
+    for row in (row for row in rows if row["task"] == "wall_time"):
+        what = f"{len(row['records'])} records of {np.mean(row['records']):.0f} s at 1 kHz"
+        marks += [
+            _seconds(f"seconds of a loop, {what}, compile included: at most 60", row["first"], 60.0),
+            _seconds("the same again in the same process: at most 10", row["second"], 10.0),
+            _seconds("the diagnosis alone, compiled: at most 10", row["diagnosis"], 10.0),
+        ]
     return marks
+
+
+def _seconds(words: str, figure: float, most: float) -> Mark:
+    return Mark(words, figure, 1, None, figure <= most)
 
 
 def _clear(row: Row) -> bool:

@@ -9,23 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from _trial_campaign import Secret, Sketch, file_campaign, secrets, sketch, twin
+from _trial_campaign import Secret, Sketch, file_campaign, secrets, sketch
 from _trial_effects import EFFECTS, element_of, exact_class
+from _trial_wall_time import run_wall_time
 from isojax._parameters import own_parameters
 from isojax._results import is_successful
 from isojax.elements import AbstractElement
 from isojax.identification import (
     Fit,
     Loop,
-    classical_guess,
     close_loop,
-    diagnose,
-    extend,
     fit,
     read_campaign,
     scales,
 )
-from isojax.identification._diagnose import MOST_OF_IT, is_good
 from isojax.records import Campaign
 
 Row = dict[str, Any]
@@ -39,8 +36,8 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
     Args:
         seed: of the campaign.
         kind: class of the campaign.
-        task: "loop" (diagnosed blind), "leave_out" (the true effect is no candidate) or "coverage" (the true
-            structure fitted, nothing diagnosed).
+        task: "loop" (diagnosed blind), "leave_out" (the true effect is no candidate), "coverage" (the true
+            structure fitted, nothing diagnosed) or "wall_time" (a loop by the clock, twice).
         names: what is hidden; drawn if omitted.
 
     Returns:
@@ -48,32 +45,35 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
     """
     begin = time.perf_counter()
     row: Row = {"seed": seed, "kind": kind, "task": task}
+    if task == "wall_time":
+        return row | {"truth": []} | run_wall_time(seed) | {"total_seconds": time.perf_counter() - begin}
     try:
         drawn = sketch(seed, kind, names)
         with tempfile.TemporaryDirectory() as folder:
-            hidden, path, size = _simulated(drawn, Path(folder))
+            hidden, path, size = _simulated(drawn, Path(folder), held_out=task != "coverage")
             campaign = read_campaign(path)
         row |= _facts(drawn, hidden, size)
         if task == "loop":
             row |= _said_of(close_loop(campaign))
         elif task == "leave_out":
-            row |= _without_the_truth(campaign, exact_class(hidden[0].name))
+            excluded = exact_class(hidden[0].name)
+            row |= {"excluded": excluded} | _said_of(close_loop(campaign, excluded=excluded))
         if kind != "outside" and (task == "coverage" or (kind != "none" and task == "loop")):
-            row |= _oracle(drawn, hidden, campaign)
+            row |= _oracle(drawn, hidden, campaign, with_errors=task == "loop")
     except Exception as problem:  # one campaign that fails is a failure of the trial, not its end
         row["error"] = "".join(traceback.format_exception(problem))[-2000:]
     row["total_seconds"] = round(time.perf_counter() - begin, 2)
     return row
 
 
-def _simulated(drawn: Sketch, folder: Path) -> tuple[tuple[Secret, ...], Path, float]:
+def _simulated(drawn: Sketch, folder: Path, held_out: bool = True) -> tuple[tuple[Secret, ...], Path, float]:
     """File the campaign, with smaller effects where the plant would run away."""
-    hidden = secrets(drawn, twin(drawn, folder / "twin")) if drawn.names else ()
+    hidden = secrets(drawn) if drawn.names else ()
     for attempt in range(TRIES):
         share = 0.5**attempt
         smaller = tuple(_shrunk(secret, share) for secret in hidden)
         try:
-            return smaller, file_campaign(drawn, smaller, folder / f"blind{attempt}"), share
+            return smaller, file_campaign(drawn, smaller, folder / f"blind{attempt}", held_out), share
         except RuntimeError:
             continue
     raise RuntimeError(f"The plant of seed {drawn.seed} runs away at an eighth of the drawn size.")
@@ -149,40 +149,7 @@ def _said_of(loop: Loop) -> Row:
     }
 
 
-def _without_the_truth(campaign: Campaign, excluded: tuple[str, ...]) -> Row:
-    """Diagnose while the true effect, and what is exactly like it, are no candidates."""
-    begin = time.perf_counter()
-    current = before = fit(classical_guess(campaign).model, campaign)
-    first, steps, significance = before.estimate.excess, [], 0.01
-    while True:
-        verdict = diagnose(current, first_excess=first, significance=significance, excluded=excluded)
-        if verdict.refit is None or len(steps) == 3:
-            break
-        steps.append(extend(current, verdict))
-        current = steps[-1].after
-        significance *= 0.5
-    found = current.estimate
-    word = verdict.verdict
-    if steps:
-        explained = 1.0 - found.excess / max(first, 1.0)
-        good = is_good(found.chi2 / found.dof, found.excess, first)
-        word = "found" if good else "partly_explained" if explained >= MOST_OF_IT else "unexplained"
-    findings = [step.verdict.finding for step in steps]
-    return {
-        "excluded": excluded,
-        "verdict": word,
-        "findings": [
-            {"effect": one.effect, "set": [one.effect, *one.indistinguishable], "p_value": one.p_value}
-            for one in findings
-        ],
-        "before": _errors(before),
-        "after": _errors(current),
-        "reason": verdict.reason,
-        "seconds": round(time.perf_counter() - begin, 2),
-    }
-
-
-def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign) -> Row:
+def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign, with_errors: bool) -> Row:
     """Fit the true structure from the true numbers: what the best diagnosis could reach."""
     magnitudes = scales(campaign)
     truth = drawn.model.with_elements(
@@ -194,8 +161,7 @@ def _oracle(drawn: Sketch, hidden: tuple[Secret, ...], campaign: Campaign) -> Ro
         name: (float(found.model[name]) - float(truth[name])) / error
         for name, error in found.standard_errors.items()
     }
-    return {
-        "oracle": _errors(found),
+    return ({"oracle": _errors(found)} if with_errors else {}) | {
         "oracle_converged": bool(is_successful(found.result)),
         "off": {name: (value if np.isfinite(value) else None) for name, value in off.items()},
     }
