@@ -14,6 +14,10 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "The simulated response left every bound (it is not finite). Try a smaller step, or a start whose "
         "stiffness and damping stay positive over the motion that was measured."
     )
+    outdone = (
+        "The search was given up: it stood far behind that of another effect and came no nearer. Fit this "
+        "effect by itself from a better start if it is the one that is meant."
+    )
     not_identifiable = (
         "The data do not determine every free coefficient. Fix one of the coefficients that the report "
         "names, or add records that part them."

@@ -22,8 +22,17 @@ FIRST_DAMPING = 1e-5
 MOST_REFUSALS = 8
 """Refused steps in a row after which the search stops."""
 
+PATIENCE = 5
+"""Evaluations that together must gain what a step must."""
+
+CATCHING_UP = 0.05
+"""Share of what a search is behind that it must make good in that many evaluations to be worth going on."""
+
+SHRINKS = 3
+"""Refusals that a trial which ran away counts for: it lies far outside, not just a little too far."""
+
 STALLED = 1e-2
-"""Predicted share of chi2 still to gain below which a search stopped by refusals counts as converged."""
+"""Predicted share of chi2 still to gain below which a search that gains no more counts as converged."""
 
 RUNAWAY = 1e75
 """Residual that stands for a simulation that ran away: finite, so that the solver steps back and not out."""
@@ -111,6 +120,7 @@ def descend(
     solver: optx.AbstractLeastSquaresSolver,
     max_steps: int,
     tolerance: float,
+    rival: float = float("-inf"),
     progress: Callable[[str], None],
 ) -> Descent:
     """Fit coefficients to the records, nuisances eliminated on the way.
@@ -127,6 +137,7 @@ def descend(
         solver: an optimistix least-squares solver.
         max_steps: evaluations after which the search gives up.
         tolerance: decrease of chi2 per max(chi2/dof, 1) below which a step is no longer one.
+        rival: chi2 of another model, far behind which the search is given up.
         progress: told a line a step.
 
     Returns:
@@ -154,6 +165,7 @@ def descend(
     state: Any = None
     result: Any = RESULTS.not_converged
     evaluations, refused, decrement = 0, 0, float("inf")
+    reached: list[float] = []
     while evaluations < max_steps:
         current, slopes = physical(trial)
         point = bench.evaluate(current, one_hot(current, places, slopes), trial_nuisances)
@@ -167,7 +179,8 @@ def descend(
         if state is None:
             scaled = trial / unit
             state = _init(solver, scaled, local)
-        scaled, state = _step(solver, scaled, local, state)
+        for _ in range(1 if point.is_finite else SHRINKS):
+            scaled, state = _step(solver, scaled, local, state)
         accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
         progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
@@ -182,10 +195,16 @@ def descend(
                 break
         else:
             refused += 1
-            # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
-            if refused == MOST_REFUSALS:
-                result = RESULTS.successful if decrement < STALLED * best.chi2 else RESULTS.not_converged
-                break
+        reached.append(best.chi2)
+        # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
+        lately = reached[-PATIENCE - 1] - best.chi2 if len(reached) > PATIENCE else float("inf")
+        idle = lately < tolerance * max(1.0, chi2)
+        if lately < CATCHING_UP * (best.chi2 - rival) < float("inf"):
+            result = RESULTS.outdone
+            break
+        if refused == MOST_REFUSALS or (idle and decrement < STALLED * best.chi2):
+            result = RESULTS.successful if decrement < STALLED * best.chi2 else RESULTS.not_converged
+            break
         if bool(state.terminate):
             result = RESULTS.successful
             break

@@ -17,6 +17,7 @@ from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
 from ._look_ahead import outdone_by_two
 from ._refit import (
+    SMALLEST_GAIN,
     Refit,
     bic,
     follows_freely,
@@ -40,10 +41,6 @@ LEFT_OVER = 0.03
 
 MOST_OF_IT = 0.8
 """Share of the excess that an effect must explain to be the explanation."""
-
-SMALLEST_GAIN = 0.0005
-"""Gain in chi2/dof below which no effect is named, and no effect told from another: with half a million
-samples anything is significant, and no bench is as good as that."""
 
 SMALLEST_SHARE = 0.2
 """Share of the remaining excess that an effect must explain to be named where the fit is not good."""
@@ -146,7 +143,8 @@ def diagnose(
             continue
         strongest = score.z if strongest is None else strongest
         progress(f"refit with {score.element.name}")
-        found = refit_candidate(test, index, scales, solver, max_steps, progress)
+        rival = min((one.estimate.chi2 for one in refits if one.violation is None), default=float("-inf"))
+        found = refit_candidate(test, index, scales, solver, max_steps, progress, rival)
         refits.append(Refit(score, found, _violation(fit, found, score)))
     refits = _without_imitations(fit, refits, scales, solver, progress)
     return _judge(fit, test, refits, first, scales, significance, solver, progress)
@@ -155,6 +153,8 @@ def diagnose(
 def _violation(fit: Fit, found: Estimate, score: Score) -> str | None:
     """Say what speaks against a refit, whatever it gains."""
     fitted = fit.estimate
+    if found.result == RESULTS.outdone:
+        return "its search came no nearer to that of another effect"
     if found.result != RESULTS.successful or found.excess >= fitted.excess:
         return "its refit did not converge"
     if not is_determined(found, score):

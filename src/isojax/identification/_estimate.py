@@ -203,6 +203,7 @@ def estimate(
     max_steps: int,
     progress: Callable[[str], None],
     tolerance: float = 1e-2,
+    rival: float = float("-inf"),
 ) -> Estimate:
     """Fit the free coefficients of a model to records.
 
@@ -216,6 +217,7 @@ def estimate(
         max_steps: evaluations after which a search gives up.
         progress: told a line a step.
         tolerance: decrease of chi2 per max(chi2/dof, 1) below which the search is over.
+        rival: chi2 of another model, far behind which the search is given up.
 
     Returns:
         The estimate.
@@ -241,6 +243,7 @@ def estimate(
         solver=solver,
         max_steps=max_steps,
         tolerance=rough,
+        rival=rival,
         progress=progress,
     )
     steps = found.steps

@@ -87,7 +87,7 @@ class Perturbation(AbstractElement):
 
 
 class Motion(NamedTuple):
-    """What an absent effect may see of a motion, at the start of each integration step.
+    """What an absent effect may see of a motion, at each sample.
 
     Attributes:
         x: displacement [m].
@@ -101,14 +101,14 @@ class Motion(NamedTuple):
         channels: signals of the record.
     """
 
-    x: Float[Array, "node lanes"]
-    v: Float[Array, "node lanes"]
-    recorded_rate: Float[Array, "node lanes"]
-    acted: Float[Array, "node lanes"]
-    acted_rate: Float[Array, "node lanes"]
-    sensed: Float[Array, "node lanes"]
-    stages: tuple[Float[Array, "node 3 lanes"], ...]
-    channels: dict[str, Float[Array, "node lanes"]]
+    x: Float[Array, "time lanes"]
+    v: Float[Array, "time lanes"]
+    recorded_rate: Float[Array, "time lanes"]
+    acted: Float[Array, "time lanes"]
+    acted_rate: Float[Array, "time lanes"]
+    sensed: Float[Array, "time lanes"]
+    stages: tuple[Float[Array, "time 3 lanes"], ...]
+    channels: dict[str, Float[Array, "time lanes"]]
 
 
 def ports_of(kind: type[AbstractElement]) -> tuple[str, ...]:
@@ -148,7 +148,7 @@ def port_columns(
 @eqx.filter_jit
 def follow(
     members: AbstractElement,
-    stages: tuple[Float[Array, "node 3 lanes"], ...],
+    stages: tuple[Float[Array, "time 3 lanes"], ...],
     start: State,
     step: float,
 ) -> tuple[State, State]:

@@ -13,11 +13,11 @@ from .._parameters import find_parameter, list_parameters, replace_parameters
 from .._results import is_successful
 from ..elements import Scales
 from ..models import Isolator
-from ._diagnose import CLOSE_LIKENESS, SMALLEST_GAIN
+from ._diagnose import CLOSE_LIKENESS
 from ._estimate import Estimate
 from ._free_force import AbstractFreeForce, free_laws
 from ._problem import element_names, one_hot
-from ._refit import refit_from
+from ._refit import SMALLEST_GAIN, refit_from
 from ._score import SMALLEST_VISIBILITY
 
 MOST_LAWS = 4

@@ -19,6 +19,10 @@ from ._information import has_stiffness_scale
 from ._problem import one_hot
 from ._score import Score, ScoreTest
 
+SMALLEST_GAIN = 0.0005
+"""Gain in chi2/dof below which no effect is named, and no effect told from another: with half a million
+samples anything is significant, and no bench is as good as that."""
+
 ROUGH = 1.0
 """Decrease of chi2 below which the refit of a candidate is over: a tenth of the evidence that ranks it."""
 
@@ -38,7 +42,13 @@ class Refit(NamedTuple):
 
 
 def refit_candidate(
-    test: ScoreTest, index: int, scales: Scales, solver: Any, max_steps: int, progress: Callable[[str], None]
+    test: ScoreTest,
+    index: int,
+    scales: Scales,
+    solver: Any,
+    max_steps: int,
+    progress: Callable[[str], None],
+    rival: float = float("-inf"),
 ) -> Estimate:
     """Fit the model with one absent effect, everything free, from the linear step that the score gives.
 
@@ -49,6 +59,7 @@ def refit_candidate(
         solver: an optimistix least-squares solver.
         max_steps: evaluations at most.
         progress: told a line a step.
+        rival: chi2 of the best other candidate, far behind which the search is given up.
 
     Returns:
         The refit.
@@ -83,9 +94,10 @@ def refit_candidate(
         solver=solver,
         max_steps=max_steps,
         progress=progress,
-        tolerance=ROUGH,
+        tolerance=_rough(fitted),
+        rival=rival,
     )
-    if found.result == RESULTS.successful or not found.excess < fitted.excess:
+    if found.result in (RESULTS.successful, RESULTS.outdone) or not found.excess < fitted.excess:
         return found
     # Beside a fold the initial states that followed the steps may lie on the other branch: the measured ones
     # again.
@@ -138,8 +150,13 @@ def refit_from(
         solver=solver,
         max_steps=max_steps,
         progress=progress,
-        tolerance=ROUGH,
+        tolerance=_rough(fitted),
     )
+
+
+def _rough(fitted: Estimate) -> float:
+    """Give the decrease of chi2 below which a refit is over: among many samples more tells nothing apart."""
+    return max(ROUGH, 0.1 * SMALLEST_GAIN * fitted.dof)
 
 
 def bic(found: Estimate, inflation: float) -> float:

@@ -1,4 +1,8 @@
-"""What a model makes of small changes along its own path: partial derivatives, all samples at once."""
+"""What a model makes of small changes along its own path: partial derivatives, all samples at once.
+
+A sharp law has the model take several steps a sample. Its slopes are then averaged to the samples, so that
+what is absent is followed at one step a sample, whatever the model asks for.
+"""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +19,12 @@ from ._information import has_stiffness_scale, scaled_model
 from ._ports import PORTS, Motion, Perturbation
 
 
-def nodes_of(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lanes"]:
+def sample_stages(table: Float[Array, "time stage lanes"]) -> Float[Array, "time 3 lanes"]:
+    """Give start, middle and end of each sample."""
+    return table[:, :: (table.shape[1] - 1) // 2]
+
+
+def _steps_of(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lanes"]:
     """Split each sample into its integration steps, three stages each."""
     time, stages, lanes = table.shape
     steps = (stages - 1) // 2
@@ -28,6 +37,25 @@ def cubic_middle(before: Array, left: Array, right: Array, after: Array) -> Arra
     return (9.0 * (left + right) - before - after) / 16.0
 
 
+def _to_samples(values: Float[Array, "step lanes"], steps: int) -> Float[Array, "time lanes"]:
+    """Average what varies between samples, with the weight of a hat: the impulse of a spike is kept.
+
+    What the hat adds to a smooth series, a twelfth of its second difference, is taken off again.
+    """
+    if steps == 1:
+        return values
+    time = values.shape[0] // steps
+    ahead, behind = values[:1].repeat(steps - 1, axis=0), values[-1:].repeat(steps - 1, axis=0)
+    padded = jnp.concatenate([ahead, values, behind])
+    shares = [(1.0 - abs(offset) / steps) / steps for offset in range(1 - steps, steps)]
+    mean = sum(
+        (share * padded[first : first + time * steps : steps] for first, share in enumerate(shares)),
+        start=jnp.zeros_like(values[:time]),
+    )
+    around = jnp.concatenate([mean[:1], mean, mean[-1:]])
+    return mean - (around[2:] - 2.0 * mean + around[:-2]) / 12.0
+
+
 @eqx.filter_jit
 def follow_path(
     model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
@@ -35,8 +63,8 @@ def follow_path(
     """Simulate; give the states at the start of each integration step."""
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
-    drive, rate = nodes_of(batch.drive), nodes_of(batch.drive_rate)
-    channels = {name: nodes_of(values) for name, values in batch.channels.items()}
+    drive, rate = _steps_of(batch.drive), _steps_of(batch.drive_rate)
+    channels = {name: _steps_of(values) for name, values in batch.channels.items()}
     step = sample_time * batch.drive.shape[0] / drive.shape[0]
     solver = RK4()
 
@@ -88,11 +116,12 @@ def slopes_along(
 ) -> Slopes:
     """Differentiate rates and reading along the path."""
     values = tuple(entry.value for entry in list_parameters(model))
-    tables = {name: nodes_of(table) for name, table in batch.channels.items()}
-    drives, drive_rates = nodes_of(batch.drive), nodes_of(batch.drive_rate)
+    tables = {name: _steps_of(table) for name, table in batch.channels.items()}
+    drives, drive_rates = _steps_of(batch.drive), _steps_of(batch.drive_rate)
     channels = {name: table[:, 0] for name, table in tables.items()}
     u, du = drives[:, 0], drive_rates[:, 0]
     scale = jnp.broadcast_to(scale, u.shape)
+    steps = u.shape[0] // batch.measured.shape[0]
 
     def along(values: tuple[Array, ...], scale: Array, state: State, port: dict[str, Array]) -> Change:
         current = scaled_model(model, values, scale)
@@ -130,34 +159,43 @@ def slopes_along(
     if has_stiffness_scale(model):
         by_scale = jax.jvp(lambda s: along(values, s, path, {}), (scale,), (jnp.ones_like(scale),))[1]
 
-    present = scaled_model(model, values, scale)
-    ends = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in path)
-    befores = tuple(jnp.concatenate([state[:1], state[:-1]]) for state in path)
+    def sampled(change: Change) -> Change:
+        return Change(tuple(_to_samples(rate, steps) for rate in change.rates), change.reading[::steps])
+
+    reading = along(values, scale, path, {}).reading[::steps]
+    present = scaled_model(model, values, scale[::steps])
+    own = tuple(state[::steps] for state in path)
+    ends = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in own)
+    befores = tuple(jnp.concatenate([state[:1], state[:-1]]) for state in own)
     afters = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in ends)
-    middles = tuple(map(cubic_middle, befores, path, ends, afters))
+    middles = tuple(map(cubic_middle, befores, own, ends, afters))
+    coarse = sample_stages(batch.drive), sample_stages(batch.drive_rate)
+    beside = {name: sample_stages(table) for name, table in batch.channels.items()}
     seen = []
-    for stage, state in enumerate((path, middles, ends)):
-        beside = {name: table[:, stage] for name, table in tables.items()}
-        now, rate = drives[:, stage], drive_rates[:, stage]
-        base = present.base(now, rate, beside)
-        y = present.reading(state, now, rate, quantity, beside)
+    for stage, state in enumerate((own, middles, ends)):
+        at = {name: table[:, stage] for name, table in beside.items()}
+        now, rate = (table[:, stage] for table in coarse)
+        base = present.base(now, rate, at)
+        y = present.reading(state, now, rate, quantity, at)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
-    acted, acted_rate = present.acting(u, du, channels)
+    now, rate = (table[:, 0] for table in coarse)
+    at = {name: table[:, 0] for name, table in beside.items()}
+    acted, acted_rate = present.acting(now, rate, at)
     motion = Motion(
-        path[0],
-        path[1],
-        du,
+        own[0],
+        own[1],
+        rate,
         acted,
         jnp.broadcast_to(acted_rate, acted.shape),
-        present.sensed(path, u, du, quantity, channels),
+        present.sensed(own, now, rate, quantity, at),
         tuple(jnp.stack(three, axis=1) for three in zip(*seen, strict=True)),
         {},
     )
     return Slopes(
-        along(values, scale, path, {}).reading,
-        tuple(map(by_parameter, moving)),
-        {name: by_port(name) for name in PORTS},
-        by_scale,
-        tuple(map(by_state, range(len(path)))),
+        reading,
+        tuple(sampled(by_parameter(place)) for place in moving),
+        {name: sampled(by_port(name)) for name in PORTS},
+        None if by_scale is None else sampled(by_scale),
+        tuple(sampled(by_state(index)) for index in range(len(path))),
         motion,
     )
