@@ -25,8 +25,20 @@ MOST_REFUSALS = 8
 PATIENCE = 5
 """Evaluations that together must gain what a step must."""
 
-CATCHING_UP = 0.05
-"""Share of what a search is behind that it must make good in that many evaluations to be worth going on."""
+
+class Rival(NamedTuple):
+    """The best other model, far behind which a search is given up.
+
+    Attributes:
+        chi2: what it reaches.
+        patience: evaluations in which a search must catch up.
+        share: how much of what it is behind it must then make good to be worth going on.
+    """
+
+    chi2: float
+    patience: int = PATIENCE
+    share: float = 0.05
+
 
 SHRINKS = 3
 """Refusals that a trial which ran away counts for: it lies far outside, not just a little too far."""
@@ -120,7 +132,7 @@ def descend(
     solver: optx.AbstractLeastSquaresSolver,
     max_steps: int,
     tolerance: float,
-    rival: float = float("-inf"),
+    rival: Rival | None = None,
     progress: Callable[[str], None],
 ) -> Descent:
     """Fit coefficients to the records, nuisances eliminated on the way.
@@ -137,7 +149,7 @@ def descend(
         solver: an optimistix least-squares solver.
         max_steps: evaluations after which the search gives up.
         tolerance: decrease of chi2 per max(chi2/dof, 1) below which a step is no longer one.
-        rival: chi2 of another model, far behind which the search is given up.
+        rival: another model, far behind which the search is given up.
         progress: told a line a step.
 
     Returns:
@@ -197,9 +209,8 @@ def descend(
             refused += 1
         reached.append(best.chi2)
         # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
-        lately = reached[-PATIENCE - 1] - best.chi2 if len(reached) > PATIENCE else float("inf")
-        idle = lately < tolerance * max(1.0, chi2)
-        if lately < CATCHING_UP * (best.chi2 - rival) < float("inf"):
+        idle = _gain(reached, PATIENCE) < tolerance * max(1.0, chi2)
+        if rival is not None and _gain(reached, rival.patience) < rival.share * (best.chi2 - rival.chi2):
             result = RESULTS.outdone
             break
         if refused == MOST_REFUSALS or (idle and decrement < STALLED * best.chi2):
@@ -214,6 +225,11 @@ def descend(
         trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
     assert best is not None
     return Descent(_in_physical_units(best, physical(best_free)[1]), result, evaluations)
+
+
+def _gain(reached: list[float], evaluations: int) -> float:
+    """Give what the last evaluations took off chi2; more than anything before there were so many."""
+    return reached[-evaluations - 1] - reached[-1] if len(reached) > evaluations else float("inf")
 
 
 def _in_physical_units(point: Point, slopes: list[float]) -> Point:

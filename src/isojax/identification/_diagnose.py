@@ -12,6 +12,7 @@ from ..elements import CATALOGUE, Scales
 from ._admissible import find_violation
 from ._balance_start import find_balance_start
 from ._bounds import GOOD, strength_unit, upper_bounds
+from ._descent import Rival
 from ._estimate import Estimate
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
@@ -143,11 +144,24 @@ def diagnose(
             continue
         strongest = score.z if strongest is None else strongest
         progress(f"refit with {score.element.name}")
-        rival = min((one.estimate.chi2 for one in refits if one.violation is None), default=float("-inf"))
-        found = refit_candidate(test, index, scales, solver, max_steps, progress, rival)
+        found = refit_candidate(test, index, scales, solver, max_steps, progress, _rival(refits))
         refits.append(Refit(score, found, _violation(fit, found, score)))
     refits = _without_imitations(fit, refits, scales, solver, progress)
     return _judge(fit, test, refits, first, scales, significance, solver, progress)
+
+
+def _rival(refits: list[Refit]) -> Rival | None:
+    """Give what a further candidate must not stay far behind.
+
+    One that leaves nothing to explain could only be equalled: what comes no nearer at once never will.
+    """
+    best = min(
+        (one.estimate for one in refits if one.violation is None), key=lambda one: one.chi2, default=None
+    )
+    if best is None:
+        return None
+    spotless = best.chi2 / best.dof < 1.0 + 10.0 * SMALLEST_GAIN
+    return Rival(best.chi2, 3, 0.2) if spotless else Rival(best.chi2)
 
 
 def _violation(fit: Fit, found: Estimate, score: Score) -> str | None:

@@ -18,7 +18,7 @@ from ..models import Isolator
 from ..records import Record
 from ._beginning import HELD, best_nuisances
 from ._covariance import Uncertainty, uncertainty, unknown
-from ._descent import descend
+from ._descent import Rival, descend
 from ._elimination import Nuisances
 from ._information import STIFFNESS_SCALE_UNIT, has_stiffness_scale
 from ._problem import Bench, Point
@@ -203,7 +203,7 @@ def estimate(
     max_steps: int,
     progress: Callable[[str], None],
     tolerance: float = 1e-2,
-    rival: float = float("-inf"),
+    rival: Rival | None = None,
 ) -> Estimate:
     """Fit the free coefficients of a model to records.
 
@@ -217,7 +217,7 @@ def estimate(
         max_steps: evaluations after which a search gives up.
         progress: told a line a step.
         tolerance: decrease of chi2 per max(chi2/dof, 1) below which the search is over.
-        rival: chi2 of another model, far behind which the search is given up.
+        rival: another model, far behind which the search is given up.
 
     Returns:
         The estimate.

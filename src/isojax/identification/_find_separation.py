@@ -20,7 +20,7 @@ from ._problem import Bench, element_names, one_hot
 from ._scales import scales as campaign_scales
 from ._segments import Segment
 from ._separation import Experiment, Prospect, Separation, rank_prospects
-from ._trial_run import TrialRun, blank_records, lost_channels, trial_run
+from ._made_records import TrialRun, blank_records, lost_channels, trial_run
 
 LOOSE = 100.0
 """Factor on the spread of the states in which stretches of a planned test begin."""

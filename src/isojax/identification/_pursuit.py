@@ -9,16 +9,15 @@ import numpy as np
 from jaxtyping import Float
 from scipy import stats
 
-from .._parameters import find_parameter, list_parameters, replace_parameters
+from .._parameters import list_parameters, replace_parameters
 from .._results import is_successful
 from ..elements import Scales
 from ..models import Isolator
 from ._diagnose import CLOSE_LIKENESS
 from ._estimate import Estimate
 from ._free_force import AbstractFreeForce, free_laws
-from ._problem import element_names, one_hot
+from ._projection import Projection, project
 from ._refit import SMALLEST_GAIN, refit_from
-from ._score import SMALLEST_VISIBILITY
 
 MOST_LAWS = 4
 """Laws that are pursued at most."""
@@ -77,62 +76,6 @@ class Pursuit(NamedTuple):
     refitted: float
 
 
-class Traces(NamedTuple):
-    """Traces of absent laws in the data, what the fitted coefficients and nuisances absorb taken off.
-
-    Attributes:
-        information: products of the traces; whitened.
-        score: product of each with the residual.
-        unit: size of one unit of each strength.
-        absorbed: step of the fitted coefficients that a unit of each law goes with; last, of none of them.
-        visible: whether enough is left of each trace.
-    """
-
-    information: Float[np.ndarray, "law law"]
-    score: Float[np.ndarray, " law"]
-    unit: Float[np.ndarray, " law"]
-    absorbed: Float[np.ndarray, "coefficient column"]
-    visible: Float[np.ndarray, " law"]
-
-
-def find_traces(fitted: Estimate, scales: Scales, laws: tuple[AbstractFreeForce, ...]) -> Traces:
-    """Give the projected traces of absent laws: exact linear variations of the simulated records.
-
-    Args:
-        fitted: the estimate beside which they are absent.
-        scales: magnitudes of the records.
-        laws: at zero strength.
-
-    Returns:
-        The traces.
-
-    Source: Rao 1948.
-    """
-    model = Isolator(fitted.model.mass, (*fitted.model.elements, *laws), fitted.model.excitation)
-    carried, count = len(fitted.model.elements), len(fitted.places)
-    sizes = np.sqrt(1.0 / np.maximum(np.diag(fitted.point.reduced.matrix)[:-1], 1e-300))
-    unit = np.array([1e-3 * law.typical_strength(scales) for law in laws])
-    names = element_names(model)[carried:]
-    places = [
-        *fitted.places,
-        *(find_parameter(model, f"{name}.{law.strength}") for name, law in zip(names, laws, strict=True)),
-    ]
-    directions = one_hot(model, places, [*sizes, *unit])
-    reduced = fitted.bench.evaluate(model, directions, fitted.point.nuisances, carried).reduced
-    matrix, raw = reduced.matrix, reduced.raw[count:]
-    # A memory that ran away along the motion has no trace.
-    lost = np.flatnonzero(~np.isfinite(np.diag(matrix)))
-    matrix[lost], matrix[:, lost] = 0.0, 0.0
-    base, cross = matrix[:count, :count], matrix[:count, count:]
-    absorbed = np.linalg.pinv(base, rcond=1e-12, hermitian=True) @ cross
-    left = matrix[count:, count:] - cross.T @ absorbed
-    own = np.maximum(np.diag(left)[:-1], 0.0)
-    visible = np.sqrt(own) > SMALLEST_VISIBILITY * np.sqrt(
-        np.where(np.isfinite(raw), np.maximum(raw, 1e-300), np.inf)
-    )
-    return Traces(left[:-1, :-1], left[:-1, -1], unit, sizes[:, None] * absorbed, visible)
-
-
 class _Taken(NamedTuple):
     place: int
     z: float
@@ -140,12 +83,14 @@ class _Taken(NamedTuple):
     alike: tuple[int, ...]
 
 
-def _pursue(traces: Traces, ranks: Float[np.ndarray, " law"], chi2: float, dof: float) -> tuple[_Taken, ...]:
+def _pursue(
+    traces: Projection, ranks: Float[np.ndarray, " law"], chi2: float, dof: float
+) -> tuple[_Taken, ...]:
     """Take the laws one after the other, each projected out of what is left."""
     information, score = traces.information.copy(), traces.score.copy()
     whole = np.diag(traces.information).copy()
-    free = traces.visible.copy()
-    excess, tests = max(chi2 - dof, 1.0), max(1, int(traces.visible.sum()))
+    free = traces.seen.copy()
+    excess, tests = max(chi2 - dof, 1.0), max(1, int(traces.seen.sum()))
     taken: list[_Taken] = []
     while len(taken) < MOST_LAWS and np.any(free):
         own = np.diag(information)
@@ -203,7 +148,8 @@ def pursue_laws(
     """
     laws = free_laws(scales)
     progress(f"pursuit among {len(laws)} free force laws")
-    traces = find_traces(fitted, scales, laws)
+    units = np.array([1e-3 * law.typical_strength(scales) for law in laws])
+    traces = project(fitted, laws, units)
     told = [law.wording() for law in laws]
     taken = _pursue(traces, np.array([one.rank for one in told]), fitted.chi2, fitted.dof)
     chi2_per_dof = fitted.chi2 / fitted.dof
@@ -218,7 +164,7 @@ def pursue_laws(
     found, gone = [], 0.0
     for one, strength, spread in zip(taken, amount, error, strict=True):
         gone += one.gain
-        words, unit = told[one.place], float(traces.unit[one.place])
+        words, unit = told[one.place], float(units[one.place])
         found.append(
             PursuedLaw(
                 words.formula,
@@ -235,7 +181,12 @@ def pursue_laws(
     again = float("nan")
     if refit:
         progress("refit with " + ", ".join(law.formula for law in found))
-        again = _refitted(fitted, scales, [laws[place] for place in places], amount, traces, places, solver)
+        chosen = [
+            eqx.tree_at(lambda e: getattr(e, e.strength), laws[place], jnp.asarray(float(strength)))
+            for place, strength in zip(places, amount * units[places], strict=True)
+        ]
+        step = traces.step[:, -1] - traces.step[:, places] @ amount
+        again = _refitted(fitted, scales, chosen, step, solver)
     return Pursuit(tuple(found), len(laws), chi2_per_dof, float(linear), again)
 
 
@@ -243,21 +194,13 @@ def _refitted(
     fitted: Estimate,
     scales: Scales,
     laws: list[AbstractFreeForce],
-    amount: Float[np.ndarray, " law"],
-    traces: Traces,
-    places: list[int],
+    step: Float[np.ndarray, " coefficient"],
     solver: Any,
 ) -> float:
-    """Give chi2/dof with the laws, everything free, from the linear step."""
-    strengths = amount * traces.unit[places]
-    added = tuple(
-        eqx.tree_at(lambda e: getattr(e, e.strength), law, jnp.asarray(float(strength)))
-        for law, strength in zip(laws, strengths, strict=True)
-    )
-    model = Isolator(fitted.model.mass, (*fitted.model.elements, *added), fitted.model.excitation)
+    """Give chi2/dof with the laws, everything free, from a step of the coefficients."""
+    model = Isolator(fitted.model.mass, (*fitted.model.elements, *laws), fitted.model.excitation)
     listed = list_parameters(model)
     numbers = [entry.value for entry in listed]
-    step = traces.absorbed[:, -1] - traces.absorbed[:, places] @ amount
     for place, change in zip(fitted.places, step, strict=True):
         moved = float(numbers[place]) + float(change)
         if listed[place].spec.lower < moved < listed[place].spec.upper:

@@ -12,6 +12,7 @@ from .._results import RESULTS
 from ..elements import AbstractElement, Scales
 from ..models import Isolator
 from ._beginning import best_nuisances
+from ._descent import Rival
 from ._elimination import Nuisances
 from ._errors import run_freely
 from ._estimate import Estimate, estimate
@@ -48,7 +49,7 @@ def refit_candidate(
     solver: Any,
     max_steps: int,
     progress: Callable[[str], None],
-    rival: float = float("-inf"),
+    rival: Rival | None = None,
 ) -> Estimate:
     """Fit the model with one absent effect, everything free, from the linear step that the score gives.
 
@@ -59,7 +60,7 @@ def refit_candidate(
         solver: an optimistix least-squares solver.
         max_steps: evaluations at most.
         progress: told a line a step.
-        rival: chi2 of the best other candidate, far behind which the search is given up.
+        rival: the best other candidate, far behind which the search is given up.
 
     Returns:
         The refit.

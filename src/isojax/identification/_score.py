@@ -7,16 +7,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import stats
 
-from .._parameters import find_parameter
 from ..elements import CATALOGUE, AbstractElement, Scales
 from ..models import Isolator
 from ._channels import meaningless
 from ._elimination import Nuisances, step_nuisances
 from ._estimate import Estimate
-from ._problem import element_names, one_hot
-
-SMALLEST_VISIBILITY = 0.005
-"""Share of a candidate's column that must be left after projection; less is numerical dust."""
+from ._projection import project
 
 DRAWS = 20_000
 
@@ -118,34 +114,12 @@ def score_test(
     """
     pointless = meaningless(fitted.bench.problem.records)
     probes = tuple(probe for probe in probes if probe.name not in pointless)
-    # Beside what they contain, not in its place: a probe that absorbs an effect shows what it adds to it.
-    model = Isolator(fitted.model.mass, (*fitted.model.elements, *probes), fitted.model.excitation)
-    carried = len(fitted.model.elements)
-    places = list(fitted.places)
-    sizes = list(np.sqrt(1.0 / np.maximum(np.diag(fitted.point.reduced.matrix)[:-1], 1e-300)))
-    for name, element in zip(element_names(model)[carried:], probes, strict=True):
-        places.append(find_parameter(model, f"{name}.{element.strength}"))
-    sizes += [1e-3 * probe.typical_strength(scales) for probe in probes]
-    point = fitted.bench.evaluate(model, one_hot(model, places, sizes), fitted.point.nuisances, carried)
-    count = len(fitted.places)
-    by_record, raw_square = point.reduced.by_record.copy(), point.reduced.raw.copy()
-    # A probe whose memory ran away along the motion has no column: it is as good as hidden.
-    lost = np.flatnonzero(~np.isfinite(np.diagonal(by_record, axis1=1, axis2=2).sum(axis=0)))
-    residual = by_record.shape[-1] - 1
-    if np.any(lost < count) or residual in lost:
-        # What ran away has spoilt the residual or the fitted columns as well: no score says anything then.
-        lost = np.arange(by_record.shape[-1])
-    by_record[:, lost], by_record[:, :, lost] = 0.0, 0.0
-    raw_square[lost[lost < raw_square.size]] = 1.0
-    matrix = by_record.sum(axis=0)
-    base, cross = matrix[:count, :count], matrix[:count, count:]
-    absorbed = np.linalg.pinv(base, rcond=1e-12, hermitian=True) @ cross
-    information = matrix[count:-1, count:-1] - cross[:, :-1].T @ absorbed[:, :-1]
-    score = matrix[count:-1, -1] - cross[:, :-1].T @ absorbed[:, -1]
+    count, carried = len(fitted.places), len(fitted.model.elements)
+    units = np.array([1e-3 * probe.typical_strength(scales) for probe in probes])
+    traces = project(fitted, probes, units)
+    absorbed, by_record, seen = traces.absorbed, traces.by_record, traces.seen
+    information, score = traces.information, traces.score
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    raw = np.sqrt(np.maximum(raw_square[count:], 1e-300))
-    visibility = size / raw
-    seen = visibility > SMALLEST_VISIBILITY
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)
     z = score / safe
     # A phase that each record chose for itself makes the sum of as many Rayleigh amplitudes of noise.
@@ -175,14 +149,14 @@ def score_test(
     either = np.array([probe.signed for probe in probes], dtype=bool)[seen]
     family = _family_wise(correlation[np.ix_(seen, seen)], np.abs(z[order]) / inflation, either, seed)
     scores, steps, moved = [], [], []
-    owner = fitted.bench.prepared(model, carried).record
+    owner = fitted.bench.prepared(traces.model, carried).record
     for column, p_value in zip(order, family, strict=True):
         probe = probes[column]
         amount = score[column] / size[column] ** 2
         step = absorbed[:, -1] - absorbed[:, column] * amount
-        full = np.zeros(len(places))
+        full = np.zeros(count + len(probes))
         full[:count], full[count + column] = step, amount
-        unit = sizes[count + column]
+        unit = units[column]
         scores.append(
             Score(
                 probe,
@@ -190,14 +164,14 @@ def score_test(
                 float(robust[column]),
                 float(amount * unit),
                 float(unit / size[column]),
-                float(visibility[column]),
+                float(traces.visibility[column]),
                 float(p_value),
                 bool(probe.signed or amount > 0.0),
                 column,
             )
         )
-        steps.append(step * np.asarray(sizes[:count]))
-        moved.append(step_nuisances(point.reduced, owner, fitted.point.nuisances, full))
+        steps.append(step * traces.units)
+        moved.append(step_nuisances(traces.point.reduced, owner, fitted.point.nuisances, full))
     hidden = tuple(sorted({probe.name for probe in probes} - set(best)))
     likeness = correlation[np.ix_(order, order)]
     return ScoreTest(tuple(scores), hidden, likeness, fitted, tuple(steps), tuple(moved))
