@@ -1,0 +1,253 @@
+"""One integration step of laws that jump or bend, split at the first event in it."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .._types import Lanes
+from ..elements import Channels
+from ._isolator import NO_CHANNELS, Isolator, Quantity, State
+from ._regime import Regime
+
+_ROUNDS = 6
+"""Safeguarded Newton steps to an event: two make a crossing exact, the others are for near tangents."""
+
+
+class Table(NamedTuple):
+    """What acts at the beginning, the middle and the end of a step.
+
+    Attributes:
+        drive: recorded drive.
+        drive_rate: its time derivative.
+        channels: signals of the record, by name.
+    """
+
+    drive: tuple[Lanes, ...]
+    drive_rate: tuple[Lanes | float, ...]
+    channels: tuple[Channels, ...]
+
+
+def find_regime(
+    model: Isolator, state: State, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS
+) -> Regime:
+    """Find the piece of each law on which a motion goes on.
+
+    Args:
+        model: the isolator.
+        state: displacement, velocity and internal states.
+        u: recorded drive, already shifted.
+        u_rate: its time derivative.
+        channels: signals of the record, by name.
+
+    Returns:
+        The regime. A mass at rest slides forward if forward friction lets it accelerate forward, backward
+        likewise, and is held otherwise.
+
+    Source: Filippov 1988, Differential Equations with Discontinuous Righthand Sides, sec. 15.
+    """
+    corners = tuple(jnp.where(corner < 0.0, -1.0, 1.0) for corner in model.corners(state))
+    v = state[1]
+    if not model.slides:
+        return Regime(jnp.ones_like(v), corners)
+    forward, backward = _pushed(model, state, corners, u, u_rate, channels)
+    leaves = jnp.where(forward > 0.0, 1.0, jnp.where(backward < 0.0, -1.0, 0.0))
+    return Regime(jnp.where(v == 0.0, leaves, jnp.sign(v)), corners)
+
+
+def split_step(
+    model: Isolator, quantity: Quantity, step_time: Lanes | float, state: State, at: Table
+) -> State:
+    """Advance one step; where a law jumps or bends on the way, two steps that meet there.
+
+    Dense output of the step tells when, and carries the derivative of that instant, so that derivatives of
+    the path jump there as they must. Of several events in one step the first is met; what follows it in the
+    same step is found at the start of the next.
+
+    Args:
+        model: the isolator.
+        quantity: what the sensor measures.
+        step_time: length of the step [s].
+        state: state at its beginning.
+        at: what acts at its beginning, middle and end.
+
+    Returns:
+        State at its end.
+
+    Source: Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6, for the
+    dense output; Aizerman & Gantmakher 1958 for the derivatives.
+    """
+    regime = find_regime(model, state, at.drive[0], at.drive_rate[0], at.channels[0])
+    # Where it is held nothing is left of a velocity, nor of its derivative.
+    state = (state[0], jnp.where(regime.is_held, 0.0, state[1]), *state[2:])
+    powers = _dense(_stages(model, quantity, step_time, state, regime, at))
+    end = _place(state, powers, 1.0)
+    events = _Events(model, state, powers, regime, end, at)
+    share, hit = events.first()
+    met = _place(state, powers, share)
+    here = _inside(at, share)
+    after = regime
+    if model.slides:
+        met = (met[0], jnp.where(hit[0], 0.0, met[1]), *met[2:])
+        turned = find_regime(model, met, *(part[0] for part in here)).direction
+        direction = jnp.where(hit[0], turned, regime.direction)
+        after = Regime(jnp.where(events.freed != 0.0, events.freed, direction), ())
+    after = Regime(
+        after.direction,
+        tuple(jnp.where(gone, -side, side) for gone, side in zip(hit[1:], regime.corners, strict=True)),
+    )
+    rest = (1.0 - share) * step_time
+    second = _place(met, _dense(_stages(model, quantity, rest, met, after, here)), 1.0)
+    split = events.any
+    return tuple(jnp.where(split, two, one) for two, one in zip(second, end, strict=True))
+
+
+class _Events:
+    """What ends a piece within a step: a reversal, a corner, or friction that no longer holds."""
+
+    def __init__(
+        self, model: Isolator, state: State, powers: tuple[State, ...], regime: Regime, end: State, at: Table
+    ):
+        sides = (regime.direction, *regime.corners)
+
+        def ahead(model: Isolator, there: State) -> tuple[Lanes, ...]:
+            """Give what is positive as long as the piece lasts."""
+            values = (there[1], *model.corners(there))
+            return tuple(side * value for side, value in zip(sides, values, strict=True))
+
+        self._moving = lambda share: ahead(model, _place(state, powers, share))
+        # No derivative of the search: the step after it carries that of the root.
+        model, state_, powers_, end = jax.tree_util.tree_map(
+            jax.lax.stop_gradient, (model, state, powers, end)
+        )
+        self._still = lambda share: ahead(model, _place(state_, powers_, share))
+        none = jnp.zeros(jnp.shape(end[1]), dtype=bool)
+        self._passed = [value < 0.0 for value in ahead(model, end)]
+        self.freed, self._free_at = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
+        if not model.slides:
+            self._passed[0] = none
+            self.any = _any(self._passed)
+            return
+        # While it is held the excess of the drive over the friction runs nearly straight over a step; an
+        # error of the instant is one of second order in the motion, which begins without acceleration. For
+        # the same reason nothing is lost by leaving out its derivative.
+        before = _pushed(model, state_, regime.corners, *(part[0] for part in at))
+        later = _pushed(model, end, regime.corners, *(part[2] for part in at))
+        for sign, one, two in zip((1.0, -1.0), before, later, strict=True):
+            rises = regime.is_held & (sign * two > 0.0) & (self.freed == 0.0)
+            self.freed = jnp.where(rises, sign, self.freed)
+            whole = jnp.where(rises, two - one, 1.0)
+            self._free_at = jnp.where(rises, jnp.clip(-one / whole, 0.0, 1.0), self._free_at)
+        self.any = _any(self._passed) | (self.freed != 0.0)
+
+    def first(self) -> tuple[Lanes, list[Array]]:
+        """Give the share of the step at which the first event falls, and which it is."""
+        found = jax.lax.stop_gradient(self._free_at)
+        hit = [jnp.zeros_like(passed) for passed in self._passed]
+        for place, passed in enumerate(self._passed):
+            root = _root(lambda share, place=place: self._still(share)[place], self._free_at)
+            sooner = passed & (root < found)
+            found = jnp.where(sooner, root, found)
+            hit = [one & ~sooner for one in hit]
+            hit[place] = sooner
+        found = jax.lax.stop_gradient(found)
+        _, slopes = jax.jvp(self._still, (found,), (jnp.ones_like(found),))
+        share = found
+        for one, value, slope in zip(hit, self._moving(found), slopes, strict=True):
+            step = value / jnp.where(one & (slope != 0.0), jax.lax.stop_gradient(slope), 1.0)
+            share = jnp.where(one, found - step, share)
+        return share, hit
+
+
+def _any(flags: list[Array]) -> Array:
+    total = flags[0]
+    for flag in flags[1:]:
+        total = total | flag
+    return total
+
+
+def _root(value: Callable[[Lanes], Lanes], like: Lanes) -> Lanes:
+    """Find where a function that is not negative at 0 and negative at 1 crosses zero."""
+    low, high = jnp.zeros_like(like), jnp.ones_like(like)
+    share = 0.5 * high
+    for _ in range(_ROUNDS):
+        here, slope = jax.jvp(value, (share,), (jnp.ones_like(share),))
+        low, high = jnp.where(here > 0.0, share, low), jnp.where(here > 0.0, high, share)
+        newton = share - here / slope
+        share = jnp.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
+    return share
+
+
+def _pushed(
+    model: Isolator,
+    state: State,
+    corners: tuple[Lanes, ...],
+    u: Lanes,
+    u_rate: Lanes | float,
+    channels: Channels,
+) -> tuple[Lanes, Lanes]:
+    """Give the accelerations with friction against forward and against backward motion."""
+    one = jnp.ones_like(state[1])
+    forward, backward = (
+        model.acceleration(state, u, u_rate, Regime(sign * one, corners), channels) for sign in (1.0, -1.0)
+    )
+    return forward, backward
+
+
+def _stages(
+    model: Isolator, quantity: Quantity, step_time: Lanes | float, state: State, regime: Regime, at: Table
+) -> tuple[State, ...]:
+    """Give the four increments of a Runge-Kutta step on given sides."""
+
+    def field(place: int, there: State) -> State:
+        u, du, channels = (part[place] for part in at)
+        rates = model.rates(there, u, du, quantity, regime, channels)
+        return tuple(step_time * rate for rate in rates)
+
+    def moved(share: float, increment: State) -> State:
+        return tuple(one + share * other for one, other in zip(state, increment, strict=True))
+
+    k1 = field(0, state)
+    k2 = field(1, moved(0.5, k1))
+    k3 = field(1, moved(0.5, k2))
+    return k1, k2, k3, field(2, moved(1.0, k3))
+
+
+def _dense(stages: tuple[State, ...]) -> tuple[State, ...]:
+    """Give the coefficients of t, t^2 and t^3 of the step's dense output, of third order inside."""
+    powers = [
+        (a, b + c - 1.5 * a - 0.5 * d, (a - b - c + d) / 1.5) for a, b, c, d in zip(*stages, strict=True)
+    ]
+    one, two, three = zip(*powers, strict=True)
+    return one, two, three
+
+
+def _place(state: State, powers: tuple[State, ...], share: Any) -> State:
+    """Give the state at a share of the step."""
+    return tuple(
+        value + share * (a + share * (b + share * c)) for value, a, b, c in zip(state, *powers, strict=True)
+    )
+
+
+def _inside(at: Table, share: Lanes) -> Table:
+    """Give what acts at the beginning, middle and end of the rest of a step.
+
+    A parabola through the three values of the step: these are the limits from inside, so that a drive that
+    jumps from step to step is none the worse for it.
+    """
+
+    def curve(values: tuple[Any, ...], place: Lanes) -> Lanes:
+        begin, middle, end = values
+        return begin + place * (4.0 * middle - 3.0 * begin - end + place * 2.0 * (begin - 2.0 * middle + end))
+
+    places = (share, 0.5 * (1.0 + share))
+
+    def along(values: tuple[Any, ...]) -> tuple[Any, ...]:
+        return (*(curve(values, place) for place in places), values[2])
+
+    names = at.channels[0]
+    known = {name: along(tuple(stage[name] for stage in at.channels)) for name in names}
+    channels = tuple({name: known[name][stage] for name in names} for stage in range(3))
+    return Table(along(at.drive), along(at.drive_rate), channels)
