@@ -15,6 +15,9 @@ from ._regime import Regime
 _ROUNDS = 6
 """Safeguarded Newton steps to an event: two make a crossing exact, the others are for near tangents."""
 
+_ROUNDING = 1e-9
+"""By how much a share of a step may be off."""
+
 
 class Table(NamedTuple):
     """What acts at the beginning, the middle and the end of a step.
@@ -119,12 +122,12 @@ class _Events:
 
         self._moving = lambda share: ahead(model, _place(state, powers, share))
         # No derivative of the search: the step after it carries that of the root.
-        model, state_, powers_, end = jax.tree_util.tree_map(
+        still, state_, powers_, end = jax.tree_util.tree_map(
             jax.lax.stop_gradient, (model, state, powers, end)
         )
-        self._still = lambda share: ahead(model, _place(state_, powers_, share))
+        self._still = lambda share: ahead(still, _place(state_, powers_, share))
         none = jnp.zeros(jnp.shape(end[1]), dtype=bool)
-        self._passed = [value < 0.0 for value in ahead(model, end)]
+        self._passed = [value < 0.0 for value in ahead(still, end)]
         self.freed, self._free_at = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
         if not model.slides:
             self._passed[0] = none
@@ -133,8 +136,8 @@ class _Events:
         # While it is held the excess of the drive over the friction runs nearly straight over a step; an
         # error of the instant is one of second order in the motion, which begins without acceleration. For
         # the same reason nothing is lost by leaving out its derivative.
-        before = _pushed(model, state_, regime.corners, *(part[0] for part in at))
-        later = _pushed(model, end, regime.corners, *(part[2] for part in at))
+        before = _pushed(still, state_, regime.corners, *(part[0] for part in at))
+        later = _pushed(still, end, regime.corners, *(part[2] for part in at))
         for sign, one, two in zip((1.0, -1.0), before, later, strict=True):
             rises = regime.is_held & (sign * two > 0.0) & (self.freed == 0.0)
             self.freed = jnp.where(rises, sign, self.freed)
@@ -176,7 +179,9 @@ def _root(value: Callable[[Lanes], Lanes], like: Lanes) -> Lanes:
         here, slope = jax.jvp(value, (share,), (jnp.ones_like(share),))
         low, high = jnp.where(here > 0.0, share, low), jnp.where(here > 0.0, high, share)
         newton = share - here / slope
-        share = jnp.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
+        # A root that is found lies at one end of the bracket, give or take rounding.
+        kept = (newton > low - _ROUNDING) & (newton < high + _ROUNDING)
+        share = jnp.where(kept, newton, 0.5 * (low + high))
     return share
 
 
