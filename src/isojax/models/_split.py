@@ -1,5 +1,6 @@
 """One integration step of laws that jump or bend, split at the first event in it."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -51,13 +52,18 @@ def find_regime(
 
     Source: Filippov 1988, Differential Equations with Discontinuous Righthand Sides, sec. 15.
     """
+    model, state, u, u_rate, channels = _frozen((model, state, u, u_rate, channels))
     corners = tuple(jnp.where(corner < 0.0, -1.0, 1.0) for corner in model.corners(state))
     v = state[1]
     if not model.slides:
         return Regime(jnp.ones_like(v), corners)
-    forward, backward = _pushed(model, state, corners, u, u_rate, channels)
-    leaves = jnp.where(forward > 0.0, 1.0, jnp.where(backward < 0.0, -1.0, 0.0))
-    return Regime(jnp.where(v == 0.0, leaves, jnp.sign(v)), corners)
+
+    def from_rest() -> Lanes:
+        forward, backward = _pushed(model, state, corners, u, u_rate, channels)
+        leaves = jnp.where(forward > 0.0, 1.0, jnp.where(backward < 0.0, -1.0, 0.0))
+        return jnp.where(v == 0.0, leaves, jnp.sign(v))
+
+    return Regime(jax.lax.cond(jnp.any(v == 0.0), from_rest, lambda: jnp.sign(v)), corners)
 
 
 def split_step(
@@ -82,93 +88,103 @@ def split_step(
     Source: Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6, for the
     dense output; Aizerman & Gantmakher 1958 for the derivatives.
     """
-    regime = find_regime(model, state, at.drive[0], at.drive_rate[0], at.channels[0])
+    regime = find_regime(model, state, *(part[0] for part in at))
     # Where it is held nothing is left of a velocity, nor of its derivative.
     state = (state[0], jnp.where(regime.is_held, 0.0, state[1]), *state[2:])
     powers = _dense(_stages(model, quantity, step_time, state, regime, at))
     end = _place(state, powers, 1.0)
-    events = _Events(model, state, powers, regime, end, at)
-    share, hit = events.first()
-    met = _place(state, powers, share)
-    here = _inside(at, share)
-    after = regime
+    sides = (regime.direction, *regime.corners)
+
+    def ahead(model: Isolator, there: State) -> tuple[Lanes, ...]:
+        """Give what is positive as long as the piece of each law lasts."""
+        values = (there[1], *model.corners(there))
+        return tuple(side * value for side, value in zip(sides, values, strict=True))
+
+    # The search has no derivative: the Newton step after it carries that of the root.
+    still = _frozen((model, state, powers, end, at))
+    passed = [value < 0.0 for value in ahead(still[0], still[3])]
     if model.slides:
-        met = (met[0], jnp.where(hit[0], 0.0, met[1]), *met[2:])
-        turned = find_regime(model, met, *(part[0] for part in here)).direction
-        direction = jnp.where(hit[0], turned, regime.direction)
-        after = Regime(jnp.where(events.freed != 0.0, events.freed, direction), ())
-    after = Regime(
-        after.direction,
-        tuple(jnp.where(gone, -side, side) for gone, side in zip(hit[1:], regime.corners, strict=True)),
-    )
-    rest = (1.0 - share) * step_time
-    second = _place(met, _dense(_stages(model, quantity, rest, met, after, here)), 1.0)
-    split = events.any
-    return tuple(jnp.where(split, two, one) for two, one in zip(second, end, strict=True))
+        freed, free_at = _freed(regime, *still[:2], *still[3:])
+    else:
+        passed[0] = jnp.zeros_like(passed[0])
+        freed, free_at = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
+    split = functools.reduce(jnp.logical_or, passed) | (freed != 0.0)
 
+    def find() -> tuple[Lanes, tuple[Lanes, ...], list[Array], Lanes]:
+        still_model, begin, still_powers, _, still_at = still
 
-class _Events:
-    """What ends a piece within a step: a reversal, a corner, or friction that no longer holds."""
+        def along(share: Lanes) -> tuple[Lanes, ...]:
+            return ahead(still_model, _place(begin, still_powers, share))
 
-    def __init__(
-        self, model: Isolator, state: State, powers: tuple[State, ...], regime: Regime, end: State, at: Table
-    ):
-        sides = (regime.direction, *regime.corners)
-
-        def ahead(model: Isolator, there: State) -> tuple[Lanes, ...]:
-            """Give what is positive as long as the piece lasts."""
-            values = (there[1], *model.corners(there))
-            return tuple(side * value for side, value in zip(sides, values, strict=True))
-
-        self._moving = lambda share: ahead(model, _place(state, powers, share))
-        # No derivative of the search: the step after it carries that of the root.
-        still, state_, powers_, end = jax.tree_util.tree_map(
-            jax.lax.stop_gradient, (model, state, powers, end)
-        )
-        self._still = lambda share: ahead(still, _place(state_, powers_, share))
-        none = jnp.zeros(jnp.shape(end[1]), dtype=bool)
-        self._passed = [value < 0.0 for value in ahead(still, end)]
-        self.freed, self._free_at = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
-        if not model.slides:
-            self._passed[0] = none
-            self.any = _any(self._passed)
-            return
-        # While it is held the excess of the drive over the friction runs nearly straight over a step; an
-        # error of the instant is one of second order in the motion, which begins without acceleration. For
-        # the same reason nothing is lost by leaving out its derivative.
-        before = _pushed(still, state_, regime.corners, *(part[0] for part in at))
-        later = _pushed(still, end, regime.corners, *(part[2] for part in at))
-        for sign, one, two in zip((1.0, -1.0), before, later, strict=True):
-            rises = regime.is_held & (sign * two > 0.0) & (self.freed == 0.0)
-            self.freed = jnp.where(rises, sign, self.freed)
-            whole = jnp.where(rises, two - one, 1.0)
-            self._free_at = jnp.where(rises, jnp.clip(-one / whole, 0.0, 1.0), self._free_at)
-        self.any = _any(self._passed) | (self.freed != 0.0)
-
-    def first(self) -> tuple[Lanes, list[Array]]:
-        """Give the share of the step at which the first event falls, and which it is."""
-        found = jax.lax.stop_gradient(self._free_at)
-        hit = [jnp.zeros_like(passed) for passed in self._passed]
-        for place, passed in enumerate(self._passed):
-            root = _root(lambda share, place=place: self._still(share)[place], self._free_at)
-            sooner = passed & (root < found)
+        found, hit = free_at, [jnp.zeros_like(one) for one in passed]
+        for place, one in enumerate(passed):
+            root = _root(lambda share, place=place: along(share)[place], free_at)
+            sooner = one & (root < found)
             found = jnp.where(sooner, root, found)
-            hit = [one & ~sooner for one in hit]
+            hit = [other & ~sooner for other in hit]
             hit[place] = sooner
-        found = jax.lax.stop_gradient(found)
-        _, slopes = jax.jvp(self._still, (found,), (jnp.ones_like(found),))
+        slopes = jax.jvp(along, (found,), (jnp.ones_like(found),))[1]
+        met = _at_rest(_place(begin, still_powers, found), hit[0])
+        turned = find_regime(still_model, met, *(part[0] for part in _inside(still_at, found))).direction
+        direction = jnp.where(hit[0], turned, jnp.where(freed != 0.0, freed, regime.direction))
+        return found, slopes, hit, direction
+
+    def find_none() -> tuple[Lanes, tuple[Lanes, ...], list[Array], Lanes]:
+        return free_at, tuple(jnp.ones_like(free_at) for _ in sides), passed, regime.direction
+
+    # Conditions also keep the compiler from working out the search anew for every derivative.
+    any_split = jnp.any(split)
+    found, slopes, hit, direction = jax.lax.cond(any_split, find, find_none)
+
+    def go_on() -> State:
         share = found
-        for one, value, slope in zip(hit, self._moving(found), slopes, strict=True):
-            step = value / jnp.where(one & (slope != 0.0), jax.lax.stop_gradient(slope), 1.0)
-            share = jnp.where(one, found - step, share)
-        return share, hit
+        for one, value, slope in zip(hit, ahead(model, _place(state, powers, found)), slopes, strict=True):
+            share = jnp.where(one, share - value / jnp.where(one & (slope != 0.0), slope, 1.0), share)
+        met = _at_rest(_place(state, powers, share), hit[0])
+        flipped = tuple(jnp.where(one, -side, side) for one, side in zip(hit[1:], sides[1:], strict=True))
+        after, rest = Regime(direction, flipped), (1.0 - share) * step_time
+        second = _place(met, _dense(_stages(model, quantity, rest, met, after, _inside(at, share))), 1.0)
+        return tuple(jnp.where(split, two, one) for two, one in zip(second, end, strict=True))
+
+    return jax.lax.cond(any_split, go_on, lambda: end)
 
 
-def _any(flags: list[Array]) -> Array:
-    total = flags[0]
-    for flag in flags[1:]:
-        total = total | flag
-    return total
+def _frozen(tree: Any) -> Any:
+    return jax.tree_util.tree_map(jax.lax.stop_gradient, tree)
+
+
+def _at_rest(state: State, reversal: Array) -> State:
+    """Give the state with a velocity of exactly zero where it reverses."""
+    return (state[0], jnp.where(reversal, 0.0, state[1]), *state[2:])
+
+
+def _freed(regime: Regime, model: Isolator, begin: State, end: State, at: Table) -> tuple[Lanes, Lanes]:
+    """Find where friction that holds the mass gives way.
+
+    While it holds, what drives the mass beyond it runs nearly straight over a step; one secant step takes
+    the bend into account. The motion begins without acceleration, so that an error of the instant is one of
+    second order, and its derivative one of first order that is left out.
+
+    Returns:
+        The direction in which the mass breaks loose, 0 where it does not; the share of the step at which.
+    """
+    none = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
+
+    def look() -> tuple[Lanes, Lanes]:
+        freed, free_at = none
+        before = _pushed(model, begin, regime.corners, *(part[0] for part in at))
+        later = _pushed(model, end, regime.corners, *(part[2] for part in at))
+        for sign, one, two in zip((1.0, -1.0), before, later, strict=True):
+            rises = regime.is_held & (sign * two > 0.0) & (freed == 0.0)
+            rise = jnp.where(rises, two - one, 1.0)
+            share = jnp.clip(-one / rise, 0.0, 1.0)
+            between = tuple(a + share * (b - a) for a, b in zip(begin, end, strict=True))
+            there = _pushed(model, between, regime.corners, *(part[0] for part in _inside(at, share)))
+            share = jnp.clip(share - there[0 if sign > 0.0 else 1] / rise, 0.0, 1.0)
+            freed, free_at = jnp.where(rises, sign, freed), jnp.where(rises, share, free_at)
+        return freed, free_at
+
+    return jax.lax.cond(jnp.any(regime.is_held), look, lambda: none)
 
 
 def _root(value: Callable[[Lanes], Lanes], like: Lanes) -> Lanes:
