@@ -171,18 +171,17 @@ def _freed(regime: Regime, model: Isolator, begin: State, end: State, at: Table)
     none = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
 
     def look() -> tuple[Lanes, Lanes]:
-        freed, free_at = none
         before = _pushed(model, begin, regime.corners, *(part[0] for part in at))
         later = _pushed(model, end, regime.corners, *(part[2] for part in at))
-        for sign, one, two in zip((1.0, -1.0), before, later, strict=True):
-            rises = regime.is_held & (sign * two > 0.0) & (freed == 0.0)
-            rise = jnp.where(rises, two - one, 1.0)
-            share = jnp.clip(-one / rise, 0.0, 1.0)
-            between = tuple(a + share * (b - a) for a, b in zip(begin, end, strict=True))
-            there = _pushed(model, between, regime.corners, *(part[0] for part in _inside(at, share)))
-            share = jnp.clip(share - there[0 if sign > 0.0 else 1] / rise, 0.0, 1.0)
-            freed, free_at = jnp.where(rises, sign, freed), jnp.where(rises, share, free_at)
-        return freed, free_at
+        ahead, back = regime.is_held & (later[0] > 0.0), regime.is_held & (later[1] < 0.0)
+        freed = jnp.where(ahead, 1.0, jnp.where(back, -1.0, 0.0))
+        one, two = (jnp.where(ahead, *pair) for pair in (before, later))
+        rise = jnp.where(freed != 0.0, two - one, 1.0)
+        share = jnp.clip(-one / rise, 0.0, 1.0)
+        between = tuple(a + share * (b - a) for a, b in zip(begin, end, strict=True))
+        u, u_rate, channels = (part[0] for part in _inside(at, share))
+        left = model.acceleration(between, u, u_rate, Regime(freed, regime.corners), channels)
+        return freed, jnp.where(freed != 0.0, jnp.clip(share - left / rise, 0.0, 1.0), 1.0)
 
     return jax.lax.cond(jnp.any(regime.is_held), look, lambda: none)
 
