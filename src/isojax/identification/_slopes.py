@@ -1,15 +1,14 @@
 """What a model makes of small changes along its own path: partial derivatives, all samples at once."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._parameters import list_parameters
-from ..models import RK4, Isolator, Quantity, State
+from ..models import RK4, Isolator, Quantity, State, advance_record, at_stages, find_regime, read_record
 from ._batch import Batch
 from ._information import has_stiffness_scale, scaled_model
 from ._ports import PORTS, Motion, Perturbation
@@ -40,17 +39,10 @@ def follow_path(
     step = sample_time * batch.drive.shape[0] / drive.shape[0]
     solver = RK4()
 
-    def field(t: float, state: State, args: tuple[Any, Any, Any]) -> State:
-        place = round(2.0 * t)
-        beside = {name: at[place] for name, at in args[2].items()}
-        rates = current.rates(state, args[0][place], args[1][place], quantity, channels=beside)
-        return tuple(step * value for value in rates)
-
-    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
-
     def body(state: State, table: tuple) -> tuple[State, State]:
-        moved, *_ = solver.step(term, 0.0, 1.0, state, table, None, False)
-        return moved, state
+        u, du, known = table
+        stages = tuple(u[i] for i in range(3)), tuple(du[i] for i in range(3)), at_stages(known, 3)
+        return advance_record(current, solver, quantity, step, state, *stages), state
 
     return jax.lax.scan(body, states, (drive, rate, channels))[1]
 
@@ -140,21 +132,22 @@ def slopes_along(
         beside = {name: table[:, stage] for name, table in tables.items()}
         now, rate = drives[:, stage], drive_rates[:, stage]
         base = present.base(now, rate, beside)
-        y = present.reading(state, now, rate, quantity, beside)
+        y = read_record(present, state, now, rate, quantity, beside)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
     acted, acted_rate = present.acting(u, du, channels)
+    regime = find_regime(present, path, u, du, channels) if model.splits else None
     motion = Motion(
         path[0],
         path[1],
         du,
         acted,
         jnp.broadcast_to(acted_rate, acted.shape),
-        present.sensed(path, u, du, quantity, channels),
+        present.sensed(path, u, du, quantity, channels, regime),
         tuple(jnp.stack(three, axis=1) for three in zip(*seen, strict=True)),
         {},
     )
     return Slopes(
-        along(values, scale, path, {}).reading,
+        seen[0][2],
         tuple(map(by_parameter, moving)),
         {name: by_port(name) for name in PORTS},
         by_scale,

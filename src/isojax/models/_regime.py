@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from jaxtyping import Array, Bool
+
 from .._types import Lanes
 
 
@@ -17,6 +19,6 @@ class Regime(NamedTuple):
     corners: tuple[Lanes, ...]
 
     @property
-    def is_held(self) -> Lanes:
+    def is_held(self) -> Bool[Array, "..."]:
         """Whether dry friction holds the mass: displacement and velocity then stay."""
         return self.direction == 0.0
