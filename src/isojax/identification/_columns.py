@@ -25,6 +25,7 @@ from ._families import Family, find_families, in_turn, stack_states
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, share_lanes
 from ._ports import port_columns
 from ._slopes import Change, Slopes, cubic_middle, follow_path, nodes_of, slopes_along
+from ._transitions import Transitions, respond_in_steps, transitions_along
 
 _ENTRIES = 2e7
 """Numbers that one table of columns along the motion may hold."""
@@ -191,9 +192,14 @@ def _block(
     error = (np.asarray(batch.measured) - np.asarray(slopes.reading)[:: nodes // time]) * weight
     table[:, -1] = error.T
 
-    group = _Group(size, nodes, time, lanes)
-    for column, forcing, direct in _sources(layout, prepared, batch, slopes, states[size:], columns, part):
-        group.add(column, forcing, direct)
+    by_step = None
+    if model.splits:
+        tables = (own.drive, own.drive_rate, own.channels)
+        tables = jax.tree_util.tree_map(nodes_of, tables)
+        by_step = transitions_along(model, layout.moving, scale, path, tables, prepared.quantity, step)
+    group = _Group(size, nodes, time, lanes, by_step)
+    for source in _sources(layout, prepared, batch, slopes, by_step, states[size:], columns, part):
+        group.add(*source)
         if group.is_full:
             group.solve(table, slopes.states, batch.weight, step)
     for index in range(size):
@@ -211,11 +217,16 @@ def _sources(
     prepared: Prepared,
     batch: Batch,
     slopes: Slopes,
+    by_step: Transitions | None,
     memories: State,
     columns: int,
     part: int,
-) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Give each coefficient's column, change of the rates (row node lanes), of the reading (time lanes)."""
+) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray | float]]:
+    """Give each coefficient's column, change of the rates (row node lanes), of the reading (time lanes).
+
+    Last comes what it does over a step (state node lanes), in place of the change of the rates, where the
+    model's laws jump.
+    """
     size = 2 + layout.model.internal_states
     steps = slopes.reading.shape[0] // batch.measured.shape[0]
 
@@ -223,22 +234,29 @@ def _sources(
         forcing = unit * np.stack([np.asarray(row) for row in change.rates])
         return forcing, unit * np.asarray(change.reading)[::steps]
 
-    for column, change in zip(layout.places[0], slopes.parameters, strict=True):
-        yield column, *ready(layout.units[column], change)
+    def own(unit: float, change: Change, place: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | float]:
+        forcing, direct = ready(unit, change)
+        if by_step is None:
+            return forcing, direct, 0.0
+        added = by_step.scale if place < 0 else by_step.parameters[:, place]
+        return 0.0 * forcing, direct, unit * np.asarray(added)
+
+    for place, (column, change) in enumerate(zip(layout.places[0], slopes.parameters, strict=True)):
+        yield column, *own(layout.units[column], change, place)
     scaled = columns - 1 - size
     if scaled > len(layout.units):
         change = slopes.states[0] if slopes.scale is None else slopes.scale
         # A model without a spring has no stiffness to scale, whatever a probe would bring.
         unit = 0.0 if slopes.scale is None else STIFFNESS_SCALE_UNIT
-        yield scaled - 1, *ready(unit, change)
+        yield scaled - 1, *own(unit, change, -1)
     starts = stack_states(layout.families, layout.probes, memories)
     followed = {name: np.asarray(nodes_of(values)) for name, values in batch.channels.items()}
     step = prepared.sample_time / steps
     ports = {name: ready(1.0, change) for name, change in slopes.ports.items()}
     ends = np.cumsum([0, *(family.elements.internal_states for family in layout.families)])
-    own = dict(zip((family.places for family in layout.families), itertools.pairwise(ends), strict=True))
+    shares = dict(zip((family.places for family in layout.families), itertools.pairwise(ends), strict=True))
     for family in in_turn(layout.families, part):
-        begin, end = own[family.places]
+        begin, end = shares[family.places]
         own_channels = {name: followed[name] for name in family.elements.channels}
         pushing = {name: jnp.asarray(_across_jumps(values)) for name, values in own_channels.items()}
         added = port_columns(family, slopes.motion._replace(channels=pushing), starts[begin:end], step)
@@ -254,7 +272,7 @@ def _sources(
                 unit = layout.units[column]
                 forcing = sum(unit * values[member] * rates for values, _, (rates, _) in does)
                 direct = sum(unit * values[member, ::steps] * reading for _, values, (_, reading) in does)
-                yield column, np.asarray(forcing), np.asarray(direct)
+                yield column, np.asarray(forcing), np.asarray(direct), 0.0
 
 
 def _across_jumps(values: Float[np.ndarray, "node 3 lanes"]) -> Float[np.ndarray, "node lanes"]:
@@ -269,21 +287,27 @@ def _across_jumps(values: Float[np.ndarray, "node 3 lanes"]) -> Float[np.ndarray
 class _Group:
     """Columns that wait for one linear solve."""
 
-    def __init__(self, size: int, nodes: int, time: int, lanes: int):
+    def __init__(self, size: int, nodes: int, time: int, lanes: int, by_step: Transitions | None):
         self.forcing = np.zeros((size - 1, _TOGETHER, nodes, lanes))
         self.direct = np.zeros((_TOGETHER, time, lanes))
         self.starts = np.zeros((size, _TOGETHER, lanes))
         self.columns: list[int] = []
+        self.by_step = by_step
+        self.kicks = None if by_step is None else np.zeros((size, _TOGETHER, nodes, lanes))
 
     @property
     def is_full(self) -> bool:
         """Whether no more columns fit."""
         return len(self.columns) == _TOGETHER
 
-    def add(self, column: int, forcing: np.ndarray, direct: np.ndarray) -> None:
+    def add(
+        self, column: int, forcing: np.ndarray, direct: np.ndarray, kick: np.ndarray | float = 0.0
+    ) -> None:
         """Put a column that is pushed along the motion."""
         place = len(self.columns)
         self.forcing[:, place], self.direct[place], self.starts[:, place] = forcing, direct, 0.0
+        if self.kicks is not None:
+            self.kicks[:, place] = kick
         self.columns.append(column)
 
     def start(self, column: int, state: int, size: np.ndarray) -> None:
@@ -295,6 +319,10 @@ class _Group:
         """Solve, and put what the readings do into the table."""
         if self.columns:
             forcing, direct, starts = map(jnp.asarray, (self.forcing, self.direct, self.starts))
-            rows = _respond(by_state, forcing, direct, starts, weight, step)
+            if self.by_step is None:
+                rows = _respond(by_state, forcing, direct, starts, weight, step)
+            else:
+                seen, kicks = tuple(entry.reading for entry in by_state), jnp.asarray(self.kicks)
+                rows = respond_in_steps(self.by_step, seen, forcing, kicks, direct, starts, weight)
             table[:, self.columns] = np.asarray(rows)[:, : len(self.columns)]
         self.columns = []

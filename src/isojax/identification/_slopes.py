@@ -78,13 +78,19 @@ class Slopes(NamedTuple):
 def slopes_along(
     model: Isolator, moving: tuple[int, ...], scale: Array, path: State, batch: Batch, quantity: Quantity
 ) -> Slopes:
-    """Differentiate rates and reading along the path."""
+    """Differentiate rates and reading along the path.
+
+    A law that jumps has no slope: its rates are those of the rounded law, of use to ports alone; what it does
+    to changes of states and parameters is in `transitions_along`.
+    """
     values = tuple(entry.value for entry in list_parameters(model))
     tables = {name: nodes_of(table) for name, table in batch.channels.items()}
     drives, drive_rates = nodes_of(batch.drive), nodes_of(batch.drive_rate)
     channels = {name: table[:, 0] for name, table in tables.items()}
     u, du = drives[:, 0], drive_rates[:, 0]
     scale = jnp.broadcast_to(scale, u.shape)
+    present = scaled_model(model, values, scale)
+    regime = find_regime(present, path, u, du, channels) if model.splits else None
 
     def along(values: tuple[Array, ...], scale: Array, state: State, port: dict[str, Array]) -> Change:
         current = scaled_model(model, values, scale)
@@ -96,7 +102,7 @@ def slopes_along(
             current = Isolator(current.mass, (*current.elements, small), current.excitation)
         followed = {**channels, "perturbation": port["base"]} if port else channels
         rates = current.rates(state, acted, du, quantity, channels=followed)[1 : len(state)]
-        return Change(rates, current.reading(state, acted, du, quantity, followed))
+        return Change(rates, current.reading(state, acted, du, quantity, followed, regime))
 
     def by_parameter(place: int) -> Change:
         def with_number(number: Array) -> Change:
@@ -122,7 +128,6 @@ def slopes_along(
     if has_stiffness_scale(model):
         by_scale = jax.jvp(lambda s: along(values, s, path, {}), (scale,), (jnp.ones_like(scale),))[1]
 
-    present = scaled_model(model, values, scale)
     ends = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in path)
     befores = tuple(jnp.concatenate([state[:1], state[:-1]]) for state in path)
     afters = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in ends)
@@ -135,7 +140,6 @@ def slopes_along(
         y = read_record(present, state, now, rate, quantity, beside)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
     acted, acted_rate = present.acting(u, du, channels)
-    regime = find_regime(present, path, u, du, channels) if model.splits else None
     motion = Motion(
         path[0],
         path[1],

@@ -27,11 +27,18 @@ class Table(NamedTuple):
         drive: recorded drive.
         drive_rate: its time derivative.
         channels: signals of the record, by name.
+        push: further rates of the states while they are free to move, none if omitted: what a column of
+            derivatives is driven by.
     """
 
     drive: tuple[Lanes, ...]
     drive_rate: tuple[Lanes | float, ...]
     channels: tuple[Channels, ...]
+    push: tuple[State, ...] = ()
+
+    def acting(self, stage: int) -> tuple[Lanes, Lanes | float, Channels]:
+        """Give drive, its rate and the channels at the beginning (0), middle (1) or end (2)."""
+        return self.drive[stage], self.drive_rate[stage], self.channels[stage]
 
 
 def find_regime(
@@ -88,7 +95,7 @@ def split_step(
     Source: Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6, for the
     dense output; Aizerman & Gantmakher 1958 for the derivatives.
     """
-    regime = find_regime(model, state, *(part[0] for part in at))
+    regime = find_regime(model, state, *at.acting(0))
     # Where it is held nothing is left of a velocity, nor of its derivative.
     state = (state[0], jnp.where(regime.is_held, 0.0, state[1]), *state[2:])
     powers = _dense(_stages(model, quantity, step_time, state, regime, at))
@@ -125,7 +132,7 @@ def split_step(
             hit[place] = sooner
         slopes = jax.jvp(along, (found,), (jnp.ones_like(found),))[1]
         met = _at_rest(_place(begin, still_powers, found), hit[0])
-        turned = find_regime(still_model, met, *(part[0] for part in _inside(still_at, found))).direction
+        turned = find_regime(still_model, met, *_inside(still_at, found).acting(0)).direction
         direction = jnp.where(hit[0], turned, jnp.where(freed != 0.0, freed, regime.direction))
         return found, slopes, hit, direction
 
@@ -171,15 +178,15 @@ def _freed(regime: Regime, model: Isolator, begin: State, end: State, at: Table)
     none = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
 
     def look() -> tuple[Lanes, Lanes]:
-        before = _pushed(model, begin, regime.corners, *(part[0] for part in at))
-        later = _pushed(model, end, regime.corners, *(part[2] for part in at))
+        before = _pushed(model, begin, regime.corners, *at.acting(0))
+        later = _pushed(model, end, regime.corners, *at.acting(2))
         ahead, back = regime.is_held & (later[0] > 0.0), regime.is_held & (later[1] < 0.0)
         freed = jnp.where(ahead, 1.0, jnp.where(back, -1.0, 0.0))
         one, two = (jnp.where(ahead, *pair) for pair in (before, later))
         rise = jnp.where(freed != 0.0, two - one, 1.0)
         share = jnp.clip(-one / rise, 0.0, 1.0)
         between = tuple(a + share * (b - a) for a, b in zip(begin, end, strict=True))
-        u, u_rate, channels = (part[0] for part in _inside(at, share))
+        u, u_rate, channels = _inside(at, share).acting(0)
         left = model.acceleration(between, u, u_rate, Regime(freed, regime.corners), channels)
         return freed, jnp.where(freed != 0.0, jnp.clip(share - left / rise, 0.0, 1.0), 1.0)
 
@@ -222,8 +229,12 @@ def _stages(
     """Give the four increments of a Runge-Kutta step on given sides."""
 
     def field(place: int, there: State) -> State:
-        u, du, channels = (part[place] for part in at)
+        u, du, channels = at.acting(place)
         rates = model.rates(there, u, du, quantity, regime, channels)
+        if at.push:
+            held = (regime.is_held, regime.is_held, *(False,) * model.internal_states)
+            pushes = zip(rates, held, at.push[place], strict=True)
+            rates = tuple(rate + jnp.where(stays, 0.0, push) for rate, stays, push in pushes)
         return tuple(step_time * rate for rate in rates)
 
     def moved(share: float, increment: State) -> State:
@@ -270,4 +281,5 @@ def _inside(at: Table, share: Lanes) -> Table:
     names = at.channels[0]
     known = {name: along(tuple(stage[name] for stage in at.channels)) for name in names}
     channels = tuple({name: known[name][stage] for name in names} for stage in range(3))
-    return Table(along(at.drive), along(at.drive_rate), channels)
+    push = tuple(zip(*(along(rates) for rates in zip(*at.push, strict=True)), strict=True))
+    return Table(along(at.drive), along(at.drive_rate), channels, push)
