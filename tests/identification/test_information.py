@@ -1,19 +1,22 @@
 """The information that segments hold is that of a dense Jacobian of an independent simulation."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import pytest
 
+from isojax import rig
 from isojax._parameters import list_parameters, replace_parameters
 from isojax.elements import (
+    AbstractElement,
     AddedMass,
     BoucWen,
     CoulombFriction,
     CubicDamping,
     CubicStiffness,
     DahlFriction,
+    EndStop,
     InputDelay,
     InputGain,
     InputOffset,
@@ -33,6 +36,8 @@ from isojax.identification._problem import one_hot
 from isojax.identification._segments import Segment
 from isojax.models import Integrator, Isolator, simulate
 from isojax.records import Record
+from isojax.rig._balance import Balance
+from isojax.rig._solver import Integrator as RigIntegrator
 
 RATE = 500.0
 SPRING = (LinearStiffness(1.08e6), CubicStiffness(2.5e11), LinearDamping(1.0e4))
@@ -60,7 +65,8 @@ class Case(NamedTuple):
 
 
 CASES = {
-    "friction": Case(Isolator(800.0, (*SPRING, CoulombFriction(8.0, 2e-3)))),
+    "friction": Case(Isolator(800.0, (*SPRING, CoulombFriction(8.0, 2e-3))), hold="linear"),
+    "sticking": Case(Isolator(800.0, (*SPRING, CoulombFriction(60.0, 2e-3))), hold="linear"),
     "maxwell": Case(Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))), hold="linear"),
     "hysteresis": Case(Isolator(800.0, (*SPRING, BoucWen(1e5, 800.0, -300.0, 1.0), DahlFriction(5.0, 2e-4)))),
     "delay": Case(Isolator(800.0, (*SPRING, InputDelay(7e-4)))),
@@ -75,7 +81,7 @@ CASES = {
 }
 
 
-def _setting(case: Case) -> tuple[Prepared, Unknowns, tuple[int, ...]]:
+def _setting(case: Case, substeps: int | None = None) -> tuple[Prepared, Unknowns, tuple[int, ...]]:
     records = _records((300, 220), case.amplitude)
     model = case.model
     segments = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0))
@@ -84,7 +90,7 @@ def _setting(case: Case) -> tuple[Prepared, Unknowns, tuple[int, ...]]:
         segments,
         quantity=case.quantity,
         hold=case.hold,
-        substeps=model.substeps,
+        substeps=model.record_substeps if substeps is None else substeps,
         shift=float(model.shift()),
         based=model.excitation == "base_acceleration",
     )
@@ -101,6 +107,19 @@ def _setting(case: Case) -> tuple[Prepared, Unknowns, tuple[int, ...]]:
     start = 0.7 * scales
     factor = np.linspace(1.01, 0.99, lanes)
     return prepared, Unknowns(model, one_hot(model, places, sizes), factor, start, scales), places
+
+
+def _exact(model: Isolator, drive: np.ndarray, start: list[float]) -> np.ndarray:
+    """Acceleration under a drive that is straight between samples, from the event-exact bench."""
+    times = np.arange(drive.size) / RATE
+    slopes = np.diff(drive, append=0.0) * RATE
+    pieces = [rig.Line(t, t + 1.0 / RATE, t, f, s) for t, f, s in zip(times, drive, slopes, strict=True)]
+    laws = (rig.LinearStiffness, rig.CubicStiffness, rig.LinearDamping, rig.CoulombFriction)
+    strengths = [getattr(element, element.strength) for element in model.elements]
+    plant = rig.Plant(tuple(law(float(f)) for law, f in zip(laws, strengths, strict=True)), float(model.mass))
+    balance = Balance(plant)
+    states, sides, held = RigIntegrator(balance, 1e-11).run(pieces, [float(s) for s in start]).at(times)
+    return np.asarray(balance.acceleration(times, states, drive, sides, held))
 
 
 def _columns(case: Case, unknowns: Unknowns, lane: int, length: int) -> np.ndarray:
@@ -127,6 +146,8 @@ def _columns(case: Case, unknowns: Unknowns, lane: int, length: int) -> np.ndarr
             unknowns.states[index, lane] + unknowns.state_scales[index, lane] * inner[index]
             for index in range(unknowns.states.shape[0])
         ]
+        if model.slides:
+            return _exact(replace_parameters(model, numbers), record.input[:length], start)
         run = simulate(
             replace_parameters(model, numbers),
             Sampled(record.input, RATE, case.hold),
@@ -159,7 +180,8 @@ def test_information_is_that_of_a_dense_jacobian(name):
     for lane, (length, counted) in enumerate(((300, 40), (220, 0))):
         dense = _columns(case, unknowns, lane, length)[counted:]
         wanted = dense.T @ dense
-        assert _deviation(found[lane], wanted) < 3e-6
+        # The bench is exact between samples; where the mass sticks, its breaking loose is found to h^3.
+        assert _deviation(found[lane], wanted) < {"friction": 6e-5, "sticking": 1e-3}.get(name, 3e-6)
 
 
 @pytest.mark.parametrize("name", ["friction", "delay", "base excitation"])
@@ -181,7 +203,7 @@ def test_information_follows_central_differences(name):
                 prepared.segments,
                 quantity=case.quantity,
                 hold=case.hold,
-                substeps=base.substeps,
+                substeps=base.record_substeps,
                 shift=float(model.shift()),
                 based=model.excitation == "base_acceleration",
             )
@@ -214,11 +236,18 @@ def test_samples_that_do_not_count_add_nothing():
     np.testing.assert_allclose(information(unknowns, again), whole, rtol=1e-10, atol=1e-6)
 
 
+class RoundedFriction(CoulombFriction):
+    """Dry friction over its width, which is how the columns of an absent effect take it."""
+
+    slides: ClassVar[bool] = False
+    sharp_force = AbstractElement.sharp_force
+
+
 PROBES = (
     QuadraticStiffness(0.0),
     CubicDamping(0.0),
     PositionDamping(0.0),
-    CoulombFriction(0.0, 1e-2),
+    RoundedFriction(0.0, 1e-2),
     MaxwellBranch(0.0, 0.03),
     MaxwellBranch(0.0, 0.1),
     BoucWen(0.0, 2e3, -1e3, 1.0),
@@ -236,10 +265,12 @@ PROBES = (
     [
         Isolator(800.0, (*SPRING,)),
         Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))),
-        Isolator(800.0, (*SPRING, CoulombFriction(8.0, 2e-2))),
+        Isolator(800.0, (*SPRING, RoundedFriction(8.0, 2e-2))),
+        Isolator(800.0, (*SPRING, CoulombFriction(40.0, 2e-3))),
+        Isolator(800.0, (*SPRING, EndStop(4e5, 1e-4, 0.3, 1e-6))),
         Isolator(800.0, (LinearDamping(1e4), CubicStiffness(2e13)), "base_acceleration"),
     ],
-    ids=["spring", "memory", "two steps a sample", "base excitation"],
+    ids=["spring", "memory", "four steps a sample", "friction", "stop", "base excitation"],
 )
 def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
     probes = tuple(probe for probe in PROBES if model.element(probe.name) is None)

@@ -32,6 +32,7 @@ class AsymmetricFriction(AbstractElement):
     needs: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
     signed: ClassVar[bool] = True
     substeps: ClassVar[int] = 4
+    slides: ClassVar[bool] = True
 
     difference: Scalar = parameter(symbol="dF", unit="N")
     width: Scalar = parameter(symbol="vs", unit="m/s", lower=0.0, fitted=False)
@@ -49,3 +50,9 @@ class AsymmetricFriction(AbstractElement):
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
         """See `AbstractElement.force`."""
         return self.difference * jnp.tanh(v / self.width) ** 2
+
+    def sharp_force(
+        self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
+    ) -> Lanes:
+        """See `AbstractElement.sharp_force`."""
+        return self.difference * direction**2

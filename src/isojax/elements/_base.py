@@ -52,7 +52,8 @@ class AbstractElement(eqx.Module):
         strength: the field that is zero when the effect is absent.
         signed: whether a negative strength is physical.
         internal_states: how many internal states it carries.
-        substeps: integration steps a sample that the law needs at least (sharp laws need more than one).
+        substeps: integration steps a sample that the rounded law needs at least (sharp ones need several).
+        slides: whether the law, unrounded, jumps with the sign of the velocity, so that it can hold the mass.
         absorbs: catalogue names of effects that this one contains; it takes their place in a model.
         needs: catalogue names of effects without which this one means nothing.
         channels: signals made from the record that the effect follows, such as the clock; without a record it
@@ -66,6 +67,7 @@ class AbstractElement(eqx.Module):
     signed: ClassVar[bool] = False
     internal_states: ClassVar[int] = 0
     substeps: ClassVar[int] = 1
+    slides: ClassVar[bool] = False
     absorbs: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[tuple[str, ...]] = ()
     channels: ClassVar[tuple[str, ...]] = ()
@@ -205,6 +207,44 @@ class AbstractElement(eqx.Module):
             One rate an internal state; equal to `state_rate` where the state lies on those sides.
         """
         return self.state_rate(x, v, s)
+
+    def corners(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
+        """Give the functions of the state at whose zeros the law, unrounded, has a corner.
+
+        A simulated record is split there, and where an element that `slides` changes direction, so that each
+        piece has the law of `sharp_force`. Orbits and maps keep to `force`, which is smooth.
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            s: internal states.
+
+        Returns:
+            One value a corner, such as `x - g` of a stop.
+        """
+        return ()
+
+    def sharp_force(
+        self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
+    ) -> Lanes:
+        """Give the force of the law without its rounding, each piece carried on smoothly past its end.
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            s: internal states.
+            direction: +1 or -1, the sign of the velocity that is meant.
+            sides: +1 or -1, the sign of each of `corners` on the side that is meant.
+
+        Returns:
+            Force [N].
+        """
+        return self.force(x, v, s)
+
+    @property
+    def splits(self) -> bool:
+        """Whether simulated records are split where this law jumps or bends."""
+        return self.slides or type(self).corners is not AbstractElement.corners
 
     def inertia(self) -> Lanes | float:
         """Give the mass that moves with the isolator [kg]."""

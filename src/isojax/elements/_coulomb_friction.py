@@ -28,6 +28,7 @@ class CoulombFriction(AbstractElement):
     words: ClassVar[str] = "dry (Coulomb) friction"
     strength: ClassVar[str] = "force_level"
     substeps: ClassVar[int] = 4
+    slides: ClassVar[bool] = True
 
     force_level: Scalar = parameter(symbol="Fc", unit="N", lower=0.0)
     width: Scalar = parameter(symbol="vs", unit="m/s", lower=0.0, fitted=False)
@@ -53,3 +54,9 @@ class CoulombFriction(AbstractElement):
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
         """See `AbstractElement.force`."""
         return self.force_level * jnp.tanh(v / self.width)
+
+    def sharp_force(
+        self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
+    ) -> Lanes:
+        """See `AbstractElement.sharp_force`."""
+        return self.force_level * direction

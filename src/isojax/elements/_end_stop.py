@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 import jax
+import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
@@ -75,4 +76,16 @@ class EndStop(AbstractElement):
         """See `AbstractElement.force`."""
         above = self.width * jax.nn.softplus((x - self.gap) / self.width)
         below = self.width * jax.nn.softplus((-x - self.gap) / self.width)
+        return self.stiffness * ((1.0 + self.side) * above - (1.0 - self.side) * below)
+
+    def corners(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
+        """See `AbstractElement.corners`."""
+        return x - self.gap, -x - self.gap
+
+    def sharp_force(
+        self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
+    ) -> Lanes:
+        """See `AbstractElement.sharp_force`."""
+        above = jnp.where(sides[0] > 0.0, x - self.gap, 0.0)
+        below = jnp.where(sides[1] > 0.0, -x - self.gap, 0.0)
         return self.stiffness * ((1.0 + self.side) * above - (1.0 - self.side) * below)

@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 import jax
+import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
@@ -68,3 +69,14 @@ class Freeplay(AbstractElement):
         """See `AbstractElement.force`."""
         beyond = jax.nn.softplus((x + self.gap) / self.width) - jax.nn.softplus((x - self.gap) / self.width)
         return -self.lost_stiffness * (self.width * beyond - self.gap)
+
+    def corners(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
+        """See `AbstractElement.corners`."""
+        return x - self.gap, x + self.gap
+
+    def sharp_force(
+        self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
+    ) -> Lanes:
+        """See `AbstractElement.sharp_force`."""
+        clipped = jnp.where(sides[0] > 0.0, self.gap, jnp.where(sides[1] > 0.0, x, -self.gap))
+        return -self.lost_stiffness * clipped

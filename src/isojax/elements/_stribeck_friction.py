@@ -31,6 +31,7 @@ class StribeckFriction(AbstractElement):
     words: ClassVar[str] = "falling (Stribeck) friction"
     strength: ClassVar[str] = "force_level"
     substeps: ClassVar[int] = 4
+    slides: ClassVar[bool] = True
     absorbs: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
 
     force_level: Scalar = parameter(symbol="F", unit="N", lower=0.0)
@@ -61,5 +62,14 @@ class StribeckFriction(AbstractElement):
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
         """See `AbstractElement.force`."""
-        falling = 1.0 + self.excess * jnp.exp(-((v / self.stribeck_velocity) ** 2))
-        return self.force_level * falling * jnp.tanh(v / self.width)
+        return self._size(v) * jnp.tanh(v / self.width)
+
+    def sharp_force(
+        self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
+    ) -> Lanes:
+        """See `AbstractElement.sharp_force`."""
+        return self._size(v) * direction
+
+    def _size(self, v: Lanes) -> Lanes:
+        """Give the size of the force at a speed [N]."""
+        return self.force_level * (1.0 + self.excess * jnp.exp(-((v / self.stribeck_velocity) ** 2)))

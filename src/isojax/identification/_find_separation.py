@@ -16,11 +16,11 @@ from ._estimate import Estimate
 from ._experiments import DWELLS, candidate_experiments, find_plan, yardstick
 from ._findings import Extension
 from ._known_load import KnownLoad
+from ._made_records import TrialRun, blank_records, lost_channels, trial_run
 from ._problem import Bench, element_names, one_hot
 from ._scales import scales as campaign_scales
 from ._segments import Segment
 from ._separation import Experiment, Prospect, Separation, rank_prospects
-from ._made_records import TrialRun, blank_records, lost_channels, trial_run
 
 LOOSE = 100.0
 """Factor on the spread of the states in which stretches of a planned test begin."""
@@ -83,7 +83,7 @@ def find_separating_experiment(extension: Extension, *, seconds: float | None = 
         return nothing
     question = _question(extension, campaign_scales(campaign))
     fine = extension.before.model.substeps > 1 or any(probe.channels for probe in question.probes)
-    steps = problem.integrator.steps_per_sample(extension.before.model)
+    steps = problem.integrator.record_steps(extension.before.model)
     plan = find_plan(campaign, steps, every_sample=fine)
     if plan is None:
         return nothing
@@ -214,7 +214,7 @@ def _made(model: Isolator, experiment: Experiment, question: _Question, rest: fl
         blank,
         quantity=problem.quantity,
         hold=problem.hold,
-        substeps=problem.integrator.steps_per_sample(model),
+        substeps=problem.integrator.record_steps(model),
         rest=rest if experiment.load else 0.0,
     )
     return made if made.is_finite else "the motion runs away"

@@ -76,7 +76,7 @@ def _statistics(fit: Fit) -> list[str]:
         ("stiffness scatter", f"{100 * stats.stiffness_scatter:.2g} % between records"),
         (
             "integration",
-            f"{type(integrator.solver).__name__}, {integrator.steps_per_sample(fit.model)} a sample",
+            f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample",
         ),
     ]
     if math.isfinite(stats.integration_error):

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from .._parameters import list_parameters, replace_parameters
 from ..elements import Channels
-from ..models import RK4, Isolator, Quantity, State, advance, at_stages
+from ..models import RK4, Isolator, Quantity, State, advance_record, at_stages, read_record
 from ._batch import Batch, Prepared, workers
 
 
@@ -90,8 +90,8 @@ def _sampler(model: Isolator, quantity: Quantity, sample_time: float) -> Callabl
         # come.
         late = current.shift() - jax.lax.stop_gradient(current.shift())
         u = tuple(value - late * slope for value, slope in zip(u, du, strict=True))
-        reading = current.reading(state, u[0], du[0], quantity, channels[0])
-        return reading, advance(current, solver, quantity, sample_time, state, u, du, channels)
+        reading = read_record(current, state, u[0], du[0], quantity, channels[0])
+        return reading, advance_record(current, solver, quantity, sample_time, state, u, du, channels)
 
     return sample
 

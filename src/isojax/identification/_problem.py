@@ -136,7 +136,7 @@ class Bench:
             The batches.
         """
         problem = self.problem
-        steps = problem.integrator.steps_per_sample(
+        steps = problem.integrator.record_steps(
             Isolator(model.mass, model.elements[:carried], model.excitation)
         )
         key = (steps, float(model.shift()))

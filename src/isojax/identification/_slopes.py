@@ -4,16 +4,15 @@ A sharp law has the model take several steps a sample. Its slopes are then avera
 what is absent is followed at one step a sample, whatever the model asks for.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._parameters import list_parameters
-from ..models import RK4, Isolator, Quantity, State
+from ..models import RK4, Isolator, Quantity, State, advance_record, at_stages, find_regime, read_record
 from ._batch import Batch
 from ._information import has_stiffness_scale, scaled_model
 from ._ports import PORTS, Motion, Perturbation
@@ -24,7 +23,7 @@ def sample_stages(table: Float[Array, "time stage lanes"]) -> Float[Array, "time
     return table[:, :: (table.shape[1] - 1) // 2]
 
 
-def _steps_of(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lanes"]:
+def steps_of(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lanes"]:
     """Split each sample into its integration steps, three stages each."""
     time, stages, lanes = table.shape
     steps = (stages - 1) // 2
@@ -63,22 +62,15 @@ def follow_path(
     """Simulate; give the states at the start of each integration step."""
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
-    drive, rate = _steps_of(batch.drive), _steps_of(batch.drive_rate)
-    channels = {name: _steps_of(values) for name, values in batch.channels.items()}
+    drive, rate = steps_of(batch.drive), steps_of(batch.drive_rate)
+    channels = {name: steps_of(values) for name, values in batch.channels.items()}
     step = sample_time * batch.drive.shape[0] / drive.shape[0]
     solver = RK4()
 
-    def field(t: float, state: State, args: tuple[Any, Any, Any]) -> State:
-        place = round(2.0 * t)
-        beside = {name: at[place] for name, at in args[2].items()}
-        rates = current.rates(state, args[0][place], args[1][place], quantity, channels=beside)
-        return tuple(step * value for value in rates)
-
-    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
-
     def body(state: State, table: tuple) -> tuple[State, State]:
-        moved, *_ = solver.step(term, 0.0, 1.0, state, table, None, False)
-        return moved, state
+        u, du, known = table
+        stages = tuple(u[i] for i in range(3)), tuple(du[i] for i in range(3)), at_stages(known, 3)
+        return advance_record(current, solver, quantity, step, state, *stages), state
 
     return jax.lax.scan(body, states, (drive, rate, channels))[1]
 
@@ -114,14 +106,20 @@ class Slopes(NamedTuple):
 def slopes_along(
     model: Isolator, moving: tuple[int, ...], scale: Array, path: State, batch: Batch, quantity: Quantity
 ) -> Slopes:
-    """Differentiate rates and reading along the path."""
+    """Differentiate rates and reading along the path.
+
+    A law that jumps has no slope: its rates are those of the rounded law, of use to ports alone; what it does
+    to changes of states and parameters is in `transitions_along`.
+    """
     values = tuple(entry.value for entry in list_parameters(model))
-    tables = {name: _steps_of(table) for name, table in batch.channels.items()}
-    drives, drive_rates = _steps_of(batch.drive), _steps_of(batch.drive_rate)
+    tables = {name: steps_of(table) for name, table in batch.channels.items()}
+    drives, drive_rates = steps_of(batch.drive), steps_of(batch.drive_rate)
     channels = {name: table[:, 0] for name, table in tables.items()}
     u, du = drives[:, 0], drive_rates[:, 0]
     scale = jnp.broadcast_to(scale, u.shape)
     steps = u.shape[0] // batch.measured.shape[0]
+    present = scaled_model(model, values, scale)
+    regime = find_regime(present, path, u, du, channels) if model.splits else None
 
     def along(values: tuple[Array, ...], scale: Array, state: State, port: dict[str, Array]) -> Change:
         current = scaled_model(model, values, scale)
@@ -133,7 +131,7 @@ def slopes_along(
             current = Isolator(current.mass, (*current.elements, small), current.excitation)
         followed = {**channels, "perturbation": port["base"]} if port else channels
         rates = current.rates(state, acted, du, quantity, channels=followed)[1 : len(state)]
-        return Change(rates, current.reading(state, acted, du, quantity, followed))
+        return Change(rates, current.reading(state, acted, du, quantity, followed, regime))
 
     def by_parameter(place: int) -> Change:
         def with_number(number: Array) -> Change:
@@ -162,7 +160,6 @@ def slopes_along(
     def sampled(change: Change) -> Change:
         return Change(tuple(_to_samples(rate, steps) for rate in change.rates), change.reading[::steps])
 
-    reading = along(values, scale, path, {}).reading[::steps]
     present = scaled_model(model, values, scale[::steps])
     own = tuple(state[::steps] for state in path)
     ends = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in own)
@@ -176,10 +173,11 @@ def slopes_along(
         at = {name: table[:, stage] for name, table in beside.items()}
         now, rate = (table[:, stage] for table in coarse)
         base = present.base(now, rate, at)
-        y = present.reading(state, now, rate, quantity, at)
+        y = read_record(present, state, now, rate, quantity, at)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
     now, rate = (table[:, 0] for table in coarse)
     at = {name: table[:, 0] for name, table in beside.items()}
+    held = find_regime(present, own, now, rate, at) if model.splits else None
     acted, acted_rate = present.acting(now, rate, at)
     motion = Motion(
         own[0],
@@ -187,12 +185,12 @@ def slopes_along(
         rate,
         acted,
         jnp.broadcast_to(acted_rate, acted.shape),
-        present.sensed(own, now, rate, quantity, at),
+        present.sensed(own, now, rate, quantity, at, held),
         tuple(jnp.stack(three, axis=1) for three in zip(*seen, strict=True)),
         {},
     )
     return Slopes(
-        reading,
+        seen[0][2],
         tuple(sampled(by_parameter(place)) for place in moving),
         {name: sampled(by_port(name)) for name in PORTS},
         None if by_scale is None else sampled(by_scale),

@@ -55,6 +55,17 @@ class Integrator(eqx.Module):
         """
         return max(self.substeps, model.substeps)
 
+    def record_steps(self, model: Isolator) -> int:
+        """Give the integration steps a sample of records, which are split where a law jumps or bends.
+
+        Args:
+            model: the isolator.
+
+        Returns:
+            As `steps_per_sample`, but a law that is split asks for no more than one.
+        """
+        return max(self.substeps, model.record_substeps)
+
     def steps_a_period(self, model: Isolator) -> int:
         """Give the integration steps a drive period.
 

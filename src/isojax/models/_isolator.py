@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
 from .._types import Internal, Lanes, Scalar
 from ..elements import AbstractElement, Channels
+from ._regime import Regime
 
 State = tuple[Lanes, ...]
 """Displacement [m], velocity [m/s], then the internal states of each element in turn."""
@@ -67,6 +68,21 @@ class Isolator(eqx.Module):
     def substeps(self) -> int:
         """Integration steps a sample that the sharpest element asks for."""
         return max((element.substeps for element in self.elements), default=1)
+
+    @property
+    def record_substeps(self) -> int:
+        """Integration steps a sample of simulated records, which are split where a law jumps or bends."""
+        return max((element.substeps for element in self.elements if not element.splits), default=1)
+
+    @property
+    def slides(self) -> bool:
+        """Whether some law, unrounded, jumps where the velocity changes sign."""
+        return any(element.slides for element in self.elements)
+
+    @property
+    def splits(self) -> bool:
+        """Whether simulated records are split where some law jumps or bends."""
+        return any(element.splits for element in self.elements)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -216,21 +232,39 @@ class Isolator(eqx.Module):
             for kink in element.kinks(state[0], state[1], internal)
         )
 
-    def _sides(self, state: State, sides: State) -> list[State]:
-        """Share the sides of the kinks out among the elements."""
+    def corners(self, state: State) -> State:
+        """Give the functions at whose zeros some law, unrounded, has a corner.
+
+        Args:
+            state: displacement, velocity and internal states.
+
+        Returns:
+            One value a corner, those of each element in turn.
+        """
+        return tuple(
+            corner
+            for element, internal in zip(self.elements, self._internal(state), strict=True)
+            for corner in element.corners(state[0], state[1], internal)
+        )
+
+    def _sides(self, state: State, sides: State | Regime) -> list[State]:
+        """Share the sides of the kinks, or of a regime's corners, out among the elements."""
         shares, place = [], 0
+        sharp = isinstance(sides, Regime)
+        values = sides.corners if sharp else sides
         for element, internal in zip(self.elements, self._internal(state), strict=True):
-            count = len(element.kinks(state[0], state[1], internal))
-            shares.append(sides[place : place + count])
+            count = len((element.corners if sharp else element.kinks)(state[0], state[1], internal))
+            shares.append(values[place : place + count])
             place += count
         return shares
 
-    def restoring_force(self, state: State, sides: State | None = None) -> Lanes:
+    def restoring_force(self, state: State, sides: State | Regime | None = None) -> Lanes:
         """Give the sum of element forces [N].
 
         Args:
             state: displacement, velocity and internal states.
-            sides: sign of each of `kinks` whose side is meant; those of the state itself if omitted.
+            sides: sign of each of `kinks` whose side is meant, or the regime in which the laws are sharp; the
+                rounded laws on the sides of the state itself if omitted.
 
         Returns:
             Force on the left-hand side of the balance [N].
@@ -242,7 +276,10 @@ class Isolator(eqx.Module):
             return total
         shares = zip(self.elements, self._internal(state), self._sides(state, sides), strict=True)
         for element, internal, own in shares:
-            total = total + element.force_beside(state[0], state[1], internal, own)
+            if isinstance(sides, Regime):
+                total = total + element.sharp_force(state[0], state[1], internal, sides.direction, own)
+            else:
+                total = total + element.force_beside(state[0], state[1], internal, own)
         return total
 
     def acceleration(
@@ -250,7 +287,7 @@ class Isolator(eqx.Module):
         state: State,
         u: Lanes,
         u_rate: Lanes | float = 0.0,
-        sides: State | None = None,
+        sides: State | Regime | None = None,
         channels: Channels = NO_CHANNELS,
     ) -> Lanes:
         """Give the acceleration of the coordinate.
@@ -274,7 +311,8 @@ class Isolator(eqx.Module):
         drive = 0.0 if self.excitation == "base_acceleration" else self.drive(u, u_rate, channels)
         base = self.base(u, u_rate, channels)
         absolute = (drive - force) / inertia
-        return absolute if base is None else absolute - base
+        relative = absolute if base is None else absolute - base
+        return jnp.where(sides.is_held, 0.0, relative) if isinstance(sides, Regime) else relative
 
     def motion(
         self,
@@ -283,6 +321,7 @@ class Isolator(eqx.Module):
         u_rate: Lanes | float,
         quantity: Quantity,
         channels: Channels = NO_CHANNELS,
+        sides: Regime | None = None,
     ) -> Lanes:
         """Give the motion at the sensor.
 
@@ -292,6 +331,7 @@ class Isolator(eqx.Module):
             u_rate: its time derivative.
             quantity: what the sensor measures.
             channels: see `drive`.
+            sides: see `restoring_force`.
 
         Returns:
             Acceleration [m/s^2], absolute; velocity [m/s] or displacement [m], relative to a base or floor
@@ -301,7 +341,7 @@ class Isolator(eqx.Module):
             return state[0]
         if quantity == "velocity":
             return state[1]
-        acceleration = self.acceleration(state, u, u_rate, channels=channels)
+        acceleration = self.acceleration(state, u, u_rate, sides, channels)
         base = self.base(u, u_rate, channels)
         return acceleration if base is None else acceleration + base
 
@@ -312,6 +352,7 @@ class Isolator(eqx.Module):
         u_rate: Lanes | float,
         quantity: Quantity,
         channels: Channels = NO_CHANNELS,
+        sides: Regime | None = None,
     ) -> Lanes:
         """Give what the sensor chain records.
 
@@ -321,11 +362,12 @@ class Isolator(eqx.Module):
             u_rate: its time derivative.
             quantity: what the sensor measures.
             channels: see `drive`.
+            sides: see `restoring_force`.
 
         Returns:
             The reading [SI unit of the quantity].
         """
-        y = self.sensed(state, u, u_rate, quantity, channels)
+        y = self.sensed(state, u, u_rate, quantity, channels, sides)
         for element in self._following(channels):
             y = y + element.channel_reading(channels)
         return y
@@ -337,6 +379,7 @@ class Isolator(eqx.Module):
         u_rate: Lanes | float,
         quantity: Quantity,
         channels: Channels = NO_CHANNELS,
+        sides: Regime | None = None,
     ) -> Lanes:
         """Give the reading before what signals of the record add to it.
 
@@ -346,11 +389,12 @@ class Isolator(eqx.Module):
             u_rate: its time derivative.
             quantity: what the sensor measures.
             channels: see `drive`.
+            sides: see `restoring_force`.
 
         Returns:
             The reading [SI unit of the quantity].
         """
-        y = self.motion(state, u, u_rate, quantity, channels)
+        y = self.motion(state, u, u_rate, quantity, channels, sides)
         for element, internal in zip(self.elements, self._internal(state), strict=True):
             y = element.reading(y, internal)
         return y
@@ -361,7 +405,7 @@ class Isolator(eqx.Module):
         u: Lanes,
         u_rate: Lanes | float,
         quantity: Quantity = "acceleration",
-        sides: State | None = None,
+        sides: State | Regime | None = None,
         channels: Channels = NO_CHANNELS,
     ) -> State:
         """Give the time derivative of the state.
@@ -381,9 +425,11 @@ class Isolator(eqx.Module):
         x, v = state[:2]
         internal_rates: list[Lanes] = []
         if self.internal_states:
-            y = self.motion(state, u, u_rate, quantity, channels)
+            regime = sides if isinstance(sides, Regime) else None
+            y = self.motion(state, u, u_rate, quantity, channels, regime)
             base = self.base(u, u_rate, channels)
-            beside = [None] * len(self.elements) if sides is None else self._sides(state, sides)
+            own_law = sides is None or regime is not None
+            beside = [None] * len(self.elements) if own_law else self._sides(state, sides)
             for element, internal, own in zip(self.elements, self._internal(state), beside, strict=True):
                 if own is None:
                     law = element.state_rate(x, v, internal)

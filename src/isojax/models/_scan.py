@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from .._types import Lanes
 from ..elements import Channels
 from ._isolator import NO_CHANNELS, Isolator, Quantity, State
+from ._split import Table, find_regime, split_step
 
 
 def sampled_term(model: Isolator, quantity: Quantity, sample_time: Lanes | float) -> diffrax.ODETerm:
@@ -78,22 +79,93 @@ def advance(
     # Many substeps are looped over: unrolled they take long to compile and run no faster.
     term = sampled_term(model, quantity, sample_time / substeps)
 
-    def stages(values: tuple[Array | float, ...], offset: int) -> Array:
-        return jnp.stack([jnp.asarray(value) for value in values[offset : len(values) - 2 + offset : 2]])
-
     def body(carry: State, table: tuple) -> tuple[State, None]:
         moved, *_ = solver.step(term, 0.0, 1.0, carry, table, None, False)
         return moved, None
 
+    return jax.lax.scan(body, state, _step_tables(drive, drive_rate, channels))[0]
+
+
+def _step_tables(
+    drive: tuple[Array, ...], drive_rate: tuple[Array | float, ...], channels: tuple[Channels, ...]
+) -> tuple[tuple[Array, ...], tuple[Array, ...], tuple[Channels, ...]]:
+    """Give what acts at the beginning, middle and end of each step, steps first."""
+
+    def stages(values: tuple[Array | float, ...], offset: int) -> Array:
+        return jnp.stack([jnp.asarray(value) for value in values[offset : len(values) - 2 + offset : 2]])
+
     def named(offset: int) -> dict[str, Array]:
         return {name: stages(tuple(at[name] for at in channels), offset) for name in channels[0]}
 
-    tables = (
+    return (
         tuple(stages(drive, offset) for offset in range(3)),
         tuple(stages(drive_rate, offset) for offset in range(3)),
         tuple(named(offset) for offset in range(3)),
     )
-    return jax.lax.scan(body, state, tables)[0]
+
+
+def advance_record(
+    model: Isolator,
+    solver: diffrax.AbstractSolver,
+    quantity: Quantity,
+    sample_time: Lanes | float,
+    state: State,
+    drive: tuple[Array, ...],
+    drive_rate: tuple[Array | float, ...],
+    channels: tuple[Channels, ...] = (),
+) -> State:
+    """Advance the state of a record by one sample: as `advance`, but split where a law jumps or bends.
+
+    Args:
+        model: the isolator.
+        solver: a fixed-step solver with equidistant stages, for models that need no splitting.
+        quantity: what the sensor measures.
+        sample_time: time between samples [s].
+        state: state at the sample, any leading shape.
+        drive: recorded drive at `2 substeps + 1` equidistant times of the sample.
+        drive_rate: its time derivative at the same times.
+        channels: signals of the record at the same times; none if omitted.
+
+    Returns:
+        State one sample later.
+    """
+    if not model.splits:
+        return advance(model, solver, quantity, sample_time, state, drive, drive_rate, channels)
+    channels = channels or (NO_CHANNELS,) * len(drive)
+    substeps = (len(drive) - 1) // 2
+    step_time = sample_time / substeps
+    if substeps == 1:
+        return split_step(model, quantity, step_time, state, Table(drive, drive_rate, channels))
+
+    def body(carry: State, table: tuple) -> tuple[State, None]:
+        return split_step(model, quantity, step_time, carry, Table(*table)), None
+
+    return jax.lax.scan(body, state, _step_tables(drive, drive_rate, channels))[0]
+
+
+def read_record(
+    model: Isolator,
+    state: State,
+    u: Lanes,
+    u_rate: Lanes | float,
+    quantity: Quantity,
+    channels: Channels = NO_CHANNELS,
+) -> Lanes:
+    """Give what the sensor chain records: as `Isolator.reading`, but with laws that jump or bend as they are.
+
+    Args:
+        model: the isolator.
+        state: displacement, velocity and internal states.
+        u: recorded drive, already shifted.
+        u_rate: its time derivative.
+        quantity: what the sensor measures.
+        channels: signals of the record, by name.
+
+    Returns:
+        The reading [SI unit of the quantity].
+    """
+    regime = find_regime(model, state, u, u_rate, channels) if model.splits else None
+    return model.reading(state, u, u_rate, quantity, channels, regime)
 
 
 def at_stages(channels: dict[str, Float[Array, "stage lanes"]], stages: int) -> tuple[Channels, ...]:
@@ -143,6 +215,7 @@ def scan_records(
         u = tuple(values[stage] for stage in range(stages))
         du = (0.0,) * stages if slopes is None else tuple(slopes[stage] for stage in range(stages))
         kept = observe(carry, u[0], du[0])
-        return advance(model, solver, quantity, sample_time, carry, u, du, at_stages(beside, stages)), kept
+        ahead = advance_record(model, solver, quantity, sample_time, carry, u, du, at_stages(beside, stages))
+        return ahead, kept
 
     return jax.lax.scan(body, state, (drive, drive_rate, channels or {}))
