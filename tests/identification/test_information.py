@@ -1,7 +1,7 @@
 """The information that segments hold is that of a dense Jacobian of an independent simulation."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from isojax.elements import (
     CubicDamping,
     CubicStiffness,
     DahlFriction,
+    EndStop,
     InputDelay,
     InputGain,
     InputOffset,
@@ -234,11 +235,17 @@ def test_samples_that_do_not_count_add_nothing():
     np.testing.assert_allclose(information(unknowns, again), whole, rtol=1e-10, atol=1e-6)
 
 
+class RoundedFriction(CoulombFriction):
+    """Dry friction over its width, which is how the columns of an absent effect take it."""
+
+    slides: ClassVar[bool] = False
+
+
 PROBES = (
     QuadraticStiffness(0.0),
     CubicDamping(0.0),
     PositionDamping(0.0),
-    CoulombFriction(0.0, 1e-2),
+    RoundedFriction(0.0, 1e-2),
     MaxwellBranch(0.0, 0.03),
     MaxwellBranch(0.0, 0.1),
     BoucWen(0.0, 2e3, -1e3, 1.0),
@@ -256,10 +263,12 @@ PROBES = (
     [
         Isolator(800.0, (*SPRING,)),
         Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))),
-        Isolator(800.0, (*SPRING, CoulombFriction(8.0, 2e-2))),
+        Isolator(800.0, (*SPRING, RoundedFriction(8.0, 2e-2))),
+        Isolator(800.0, (*SPRING, CoulombFriction(40.0, 2e-3))),
+        Isolator(800.0, (*SPRING, EndStop(4e5, 1e-4, 0.3, 1e-6))),
         Isolator(800.0, (LinearDamping(1e4), CubicStiffness(2e13)), "base_acceleration"),
     ],
-    ids=["spring", "memory", "two steps a sample", "base excitation"],
+    ids=["spring", "memory", "four steps a sample", "friction", "stop", "base excitation"],
 )
 def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
     probes = tuple(probe for probe in PROBES if model.element(probe.name) is None)

@@ -58,6 +58,7 @@ def transitions_along(
     """
     values = tuple(entry.value for entry in list_parameters(model))
     size, like = len(path), path[0]
+    scale = jnp.broadcast_to(scale, like.shape)
     drive, rate = (tuple(table[:, stage] for stage in range(3)) for table in tables[:2])
     channels = tuple({name: table[:, stage] for name, table in tables[2].items()} for stage in range(3))
 
