@@ -9,6 +9,7 @@ import pytest
 from isojax import rig
 from isojax._parameters import list_parameters, replace_parameters
 from isojax.elements import (
+    AbstractElement,
     AddedMass,
     BoucWen,
     CoulombFriction,
@@ -239,6 +240,7 @@ class RoundedFriction(CoulombFriction):
     """Dry friction over its width, which is how the columns of an absent effect take it."""
 
     slides: ClassVar[bool] = False
+    sharp_force = AbstractElement.sharp_force
 
 
 PROBES = (
