@@ -287,6 +287,29 @@ def test_a_law_beside_its_kinks_is_the_law_where_it_lies_on_those_sides(kind):
 
 
 @every_element
+def test_a_sharp_law_is_the_limit_of_the_rounded_one(kind):
+    element = with_strength(kind.guess(SCALES), 0.5)
+    if not element.splits:
+        return
+    x, v, *_ = motion((64,))
+    s = internal(element, rest=False, shape=(64,))
+    # Corners lie within the motion, and the rounding far within the distance to any of them.
+    element = replace_parameters(
+        element,
+        [
+            1e-9 * p.value if p.name == "width" else 0.3 * SCALES.displacement if p.name == "gap" else p.value
+            for p in list_parameters(element)
+        ],
+    )
+    sides = tuple(jnp.where(corner < 0.0, -1.0, 1.0) for corner in element.corners(x, v, s))
+    sharp = element.sharp_force(x, v, s, jnp.sign(v), sides)
+    assert sharp.shape == x.shape
+    np.testing.assert_allclose(sharp, element.force(x, v, s), rtol=1e-6, atol=1e-9 * SCALES.force)
+    absent = with_strength(element, 0.0)
+    assert float(jnp.max(jnp.abs(absent.sharp_force(x, v, s, jnp.sign(v), sides)))) == 0.0
+
+
+@every_element
 def test_a_law_beside_a_kink_goes_on_smoothly_past_it(kind):
     # With the sides held, the slope across the kinks, which all lie at rest, is that of central differences;
     # for |s|s itself the two differ by |s|s times the step.

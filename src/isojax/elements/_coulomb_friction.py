@@ -12,10 +12,10 @@ from ._base import AbstractElement, Scales
 class CoulombFriction(AbstractElement):
     """Dry friction: a constant force against the motion.
 
-    `Fc tanh(v / vs)` [N]; vs is a declared regularising width, not a physical number. The law stands for
-    `Fc sign(v)` as long as the motion crosses +-vs within a few integration steps; the fit reports what
-    halving it does. Of a motion of velocity amplitude V it loses `pi^2/24 (vs/V)^2` of the dissipation, and
-    `0.25 vs/V` of the mean square force goes amiss near the reversals.
+    `Fc sign(v)` [N] in simulated records, which are split where the mass reverses, sticks and breaks loose;
+    `Fc tanh(v / vs)` where a smooth law is needed, with a declared regularising width vs that is no physical
+    number. Of a motion of velocity amplitude V that loses `pi^2/24 (vs/V)^2` of the dissipation, and `0.25
+    vs/V` of the mean square force goes amiss near the reversals.
 
     Attributes:
         force_level: Fc [N].

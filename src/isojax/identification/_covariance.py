@@ -13,9 +13,6 @@ What they do not hold, and what can exceed them once the noise is small:
 - noise of the force. Through the isolator it becomes motion; at 0.02 N on 800 kg (1 kHz) its density is below
   a thousandth of that of 0.003 m/s^2 of sensor noise, and it is left out. A force as noisy as the response
   would bias the coefficients.
-- the regularising width of dry friction and the instants at which it is sampled. Where the jump 2 Fc/m is
-  several times the noise, readings inside the jump pull at Fc: by 0.2 to 0.5 % at Fc/m = 2.5 sigma, several
-  standard errors, and about half as much at half the width.
 """
 
 from typing import NamedTuple

@@ -58,6 +58,7 @@ def transitions_along(
     """
     values = tuple(entry.value for entry in list_parameters(model))
     size, like = len(path), path[0]
+    scale = jnp.broadcast_to(scale, like.shape)
     steps = like.shape[0] // tables[0].shape[0]
     step_time = sample_time / steps
     tables = jax.tree_util.tree_map(steps_of, tables)

@@ -428,8 +428,9 @@ class Isolator(eqx.Module):
             regime = sides if isinstance(sides, Regime) else None
             y = self.motion(state, u, u_rate, quantity, channels, regime)
             base = self.base(u, u_rate, channels)
-            own_law = sides is None or regime is not None
-            beside = [None] * len(self.elements) if own_law else self._sides(state, sides)
+            beside = [None] * len(self.elements)
+            if sides is not None and regime is None:
+                beside = self._sides(state, sides)
             for element, internal, own in zip(self.elements, self._internal(state), beside, strict=True):
                 if own is None:
                     law = element.state_rate(x, v, internal)
