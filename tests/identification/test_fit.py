@@ -15,7 +15,7 @@ from isojax.elements import (
     InputGain,
     LinearDamping,
     LinearStiffness,
-    LuGreFriction,
+    LugreFriction,
     MaxwellBranch,
 )
 from isojax.excitations import Sampled
@@ -361,9 +361,9 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
 
 
 def test_an_element_with_a_sharp_law_keeps_its_own_steps(simulated):
-    model = START.with_elements(LuGreFriction(1.0, 1e-3, 0.0, 1e-2, 1e-3))
+    model = START.with_elements(LugreFriction(1.0, 1e-3, 0.0, 1e-2, 1e-3))
     problem = _stiff_problem(simulated, model)._replace(noise=1e3)
-    assert find_integrator(problem, model).integrator.substeps == LuGreFriction.substeps
+    assert find_integrator(problem, model).integrator.substeps == LugreFriction.substeps
     # Dry friction is split at its reversals instead.
     model = START.with_elements(CoulombFriction(1.0, 1.0))
     assert find_integrator(problem, model).integrator.substeps == 1
