@@ -114,9 +114,8 @@ def _over_samples(each: list[Array], size: int) -> Transitions:
         onward = [[found[row, column] for column in rows] for row in rows]
         forward = product(onward, forward)
         pushed = [product(onward, one) for one in pushed]
-        rest = (
-            jnp.stack([sum(onward[row][k] * rest[k] for k in rows) for row in rows]) + found[:, pushes_end:]
-        )
+        carried = [sum(onward[row][k][None] * rest[k] for k in rows) for row in rows]
+        rest = jnp.stack(carried) + found[:, pushes_end:]
         for stage in range(3):
             at = (step + 0.5 * stage) / steps
             # Lagrange's parabolas through 0, 1/2 and 1.
