@@ -22,8 +22,8 @@ FIRST_DAMPING = 1e-5
 MOST_REFUSALS = 8
 """Refused steps in a row after which the search stops."""
 
-PATIENCE = 5
-"""Evaluations that together must gain what a step must."""
+IDLE = 3
+"""Accepted steps that together must gain what a step must."""
 
 
 class Rival(NamedTuple):
@@ -31,12 +31,14 @@ class Rival(NamedTuple):
 
     Attributes:
         chi2: what it reaches.
+        far: how much more chi2 is far behind; who is nearer may take its time.
         patience: evaluations in which a search must catch up.
         share: how much of what it is behind it must then make good to be worth going on.
     """
 
     chi2: float
-    patience: int = PATIENCE
+    far: float
+    patience: int = 5
     share: float = 0.05
 
 
@@ -178,6 +180,7 @@ def descend(
     result: Any = RESULTS.not_converged
     evaluations, refused, decrement = 0, 0, float("inf")
     reached: list[float] = []
+    levels: list[float] = []
     while evaluations < max_steps:
         current, slopes = physical(trial)
         point = bench.evaluate(current, one_hot(current, places, slopes), trial_nuisances)
@@ -208,11 +211,14 @@ def descend(
         else:
             refused += 1
         reached.append(best.chi2)
+        levels += [best.chi2] if accepted else []
         # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
-        idle = _gain(reached, PATIENCE) < tolerance * max(1.0, chi2)
-        if rival is not None and _gain(reached, rival.patience) < rival.share * (best.chi2 - rival.chi2):
-            result = RESULTS.outdone
-            break
+        idle = _gain(levels, IDLE) < tolerance * max(1.0, chi2)
+        if rival is not None:
+            behind = best.chi2 - rival.chi2
+            if behind > rival.far and _gain(reached, rival.patience) < rival.share * behind:
+                result = RESULTS.outdone
+                break
         if refused == MOST_REFUSALS or (idle and decrement < STALLED * best.chi2):
             result = RESULTS.successful if decrement < STALLED * best.chi2 else RESULTS.not_converged
             break

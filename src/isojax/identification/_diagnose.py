@@ -161,7 +161,8 @@ def _rival(refits: list[Refit]) -> Rival | None:
     if best is None:
         return None
     spotless = best.chi2 / best.dof < 1.0 + 10.0 * SMALLEST_GAIN
-    return Rival(best.chi2, 3, 0.2) if spotless else Rival(best.chi2)
+    far = 10.0 * _close(best)
+    return Rival(best.chi2, far, 3, 0.2) if spotless else Rival(best.chi2, far)
 
 
 def _violation(fit: Fit, found: Estimate, score: Score) -> str | None:
