@@ -207,7 +207,7 @@ def table(rows: list[Row]) -> list[Mark]:
             )
         )
     for row in (row for row in rows if row["task"] == "wall_time"):
-        what = f"{len(row['records'])} records of {np.mean(row['records']):.0f} s at 1 kHz"
+        what = f"{len(row['records'])} records of {np.mean(row['records']):.0f} s at {row['rate']:.0f} Hz"
         marks += [
             _seconds(f"seconds of a loop, {what}, compile included: at most 60", row["first"], 60.0),
             _seconds("the same again in the same process: at most 10", row["second"], 10.0),

@@ -38,7 +38,7 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
         kind: class of the campaign.
         task: "loop" (diagnosed blind), "leave_out" (the true effect is no candidate), "coverage" (the true
             structure fitted, nothing diagnosed) or "wall_time" (a loop by the clock, twice).
-        names: what is hidden; drawn if omitted.
+        names: what is hidden, drawn if omitted; of "wall_time" the sampling rate [Hz].
 
     Returns:
         What goes into a line of the output file; "error" where something raised.
@@ -46,7 +46,8 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
     begin = time.perf_counter()
     row: Row = {"seed": seed, "kind": kind, "task": task}
     if task == "wall_time":
-        return row | {"truth": []} | run_wall_time(seed) | {"total_seconds": time.perf_counter() - begin}
+        timed = run_wall_time(seed, float(names[0]) if names else 250.0)
+        return row | {"truth": []} | timed | {"total_seconds": time.perf_counter() - begin}
     try:
         drawn = sketch(seed, kind, names)
         with tempfile.TemporaryDirectory() as folder:
