@@ -28,9 +28,9 @@ _MOST_MAPPINGS = 15_000
 function takes several. Beyond that limit the compiler does not raise, it crashes."""
 
 
-@pytest.fixture(scope="module", autouse=True)
+@pytest.fixture(autouse=True)
 def _let_compiled_code_go() -> Iterator[None]:
-    """Forget compiled functions between modules, once they crowd the address space."""
+    """Forget compiled functions after a test, once they crowd the address space."""
     yield
     mappings = Path("/proc/self/maps")
     if mappings.exists() and len(mappings.read_bytes().splitlines()) > _MOST_MAPPINGS:
