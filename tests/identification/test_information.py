@@ -90,7 +90,7 @@ def _setting(case: Case, substeps: int | None = None) -> tuple[Prepared, Unknown
         segments,
         quantity=case.quantity,
         hold=case.hold,
-        substeps=model.record_substeps if substeps is None else substeps,
+        substeps=Integrator().record_steps(model) if substeps is None else substeps,
         shift=float(model.shift()),
         based=model.excitation == "base_acceleration",
     )
@@ -203,7 +203,7 @@ def test_information_follows_central_differences(name):
                 prepared.segments,
                 quantity=case.quantity,
                 hold=case.hold,
-                substeps=base.record_substeps,
+                substeps=Integrator().record_steps(base),
                 shift=float(model.shift()),
                 based=model.excitation == "base_acceleration",
             )

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from .._parameters import list_parameters
 from .._results import RESULTS
 from ..elements import CATALOGUE, Scales
 from ._admissible import find_violation
 from ._balance_start import find_balance_start
-from ._bounds import GOOD, strength_unit, upper_bounds
+from ._bounds import GOOD, upper_bounds
 from ._descent import Rival
 from ._estimate import Estimate
+from ._evidence import CLOSE_BIC, by_evidence, least_difference, rank_candidates, smallest_inflation
 from ._findings import Candidate, Finding, Verdict
 from ._fit import DEFAULT_SOLVER, Fit, silent
 from ._look_ahead import outdone_by_two
@@ -27,7 +27,6 @@ from ._refit import (
     refit_candidate,
     refit_from,
     rivals,
-    strength_place,
 )
 from ._scales import scales as campaign_scales
 from ._score import Score, ScoreTest, absent_effects, score_test
@@ -55,7 +54,6 @@ WORTH_REFIT = 0.04
 FAR = 2.0
 """chi2/dof above which the balance of measured forces is asked, too: a score is a derivative at the fit."""
 
-CLOSE_BIC = 10.0
 CLOSE_LIKENESS = 0.95
 
 
@@ -161,7 +159,7 @@ def _rival(refits: list[Refit]) -> Rival | None:
     if best is None:
         return None
     spotless = best.chi2 / best.dof < 1.0 + 10.0 * SMALLEST_GAIN
-    far = 10.0 * _close(best)
+    far = 10.0 * least_difference(best)
     return Rival(best.chi2, far, 3, 0.2) if spotless else Rival(best.chi2, far)
 
 
@@ -214,7 +212,7 @@ def _without_imitations(
     """Strike out a best candidate that two simpler effects outdo, until the best stands."""
     refits = list(refits)
     while True:
-        usable = _by_evidence(refits)
+        usable = by_evidence(refits)
         if not usable:
             return refits
         pair = outdone_by_two(fit.estimate, usable, fit.campaign, scales, solver, progress)
@@ -222,35 +220,6 @@ def _without_imitations(
             return refits
         place = next(index for index, one in enumerate(refits) if one is usable[0])
         refits[place] = usable[0]._replace(violation=f"{pair} explain more with as many coefficients")
-
-
-def _by_evidence(refits: list[Refit]) -> list[Refit]:
-    """List the refits that nothing speaks against, best first.
-
-    Of those that these data do not tell apart the simplest goes first: fewest coefficients, then memories.
-    """
-    usable = [refit for refit in refits if refit.violation is None]
-    if not usable:
-        return usable
-    inflation = _inflation(usable)
-    usable = sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
-    most = bic(usable[0].estimate, inflation) + _close(usable[0].estimate)
-
-    def simplicity(refit: Refit) -> tuple[int, int]:
-        return len(refit.estimate.places), refit.estimate.model.internal_states
-
-    first = min((one for one in usable if bic(one.estimate, inflation) <= most), key=simplicity)
-    return [first, *(one for one in usable if one is not first)]
-
-
-def _close(found: Estimate) -> float:
-    """Give the difference of Schwarz's criterion up to which two effects are not told apart."""
-    return max(CLOSE_BIC, SMALLEST_GAIN * found.dof)
-
-
-def _inflation(usable: list[Refit]) -> float:
-    """Give the smallest chi2/dof among refits, at least 1."""
-    return max(1.0, min((refit.estimate.chi2 / refit.estimate.dof for refit in usable), default=1.0))
 
 
 def _judge(
@@ -265,11 +234,11 @@ def _judge(
 ) -> Verdict:
     """Weigh the refits, and word the verdict."""
     fitted = fit.estimate
-    inflation = _inflation(_by_evidence(refits))
+    inflation = smallest_inflation(by_evidence(refits))
     good = is_good(fitted.chi2 / fitted.dof, fitted.excess, first_excess)
     reason = "no absent effect is both significant and physical"
     refits = list(refits)
-    while usable := _by_evidence(refits):
+    while usable := by_evidence(refits):
         best = usable[0]
         gain = fitted.misfit - best.estimate.misfit
         needed = max(SMALLEST_GAIN, _needed_share(fitted) * fitted.excess / fitted.dof)
@@ -280,14 +249,14 @@ def _judge(
             break
         share = transferred_share(fit, best.estimate, scales, solver, progress)
         if share > 0.0:
-            ranking = _ranking(test, refits, usable, inflation)
+            ranking = rank_candidates(test, refits, usable, inflation)
             usable[0] = best._replace(estimate=polish(best.estimate, scales, solver, progress))
             return _found(fit, test, usable, ranking, first_excess, share, inflation)
         # What imitates the missing effect on the records of its refit alone must not hide that effect.
         reason = f"{too_little}, but it does not carry over to data left out of its refit"
         place = next(index for index, one in enumerate(refits) if one is best)
         refits[place] = best._replace(violation="it does not carry over to data left out of its refit")
-    ranking = _ranking(test, refits, _by_evidence(refits), inflation)
+    ranking = rank_candidates(test, refits, by_evidence(refits), inflation)
     bounds = upper_bounds(test, fitted, None)
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
@@ -336,7 +305,7 @@ def _found(
         # A law that contains the finding follows it everywhere, and was not found to say more.
         and name not in CATALOGUE[entry.effect].absorbs
         and (
-            entry.delta_bic <= _close(best.estimate)
+            entry.delta_bic <= least_difference(best.estimate)
             or (np.isnan(entry.delta_bic) and abs(entry.likeness) > CLOSE_LIKENESS)
         )
     )
@@ -364,51 +333,3 @@ def _found(
     return Verdict(
         verdict, finding, ranking, together, float(max(left, 0.0)), test.hidden, bounds, best.estimate, reason
     )
-
-
-def _ranking(
-    test: ScoreTest, refits: list[Refit], usable: list[Refit], inflation: float
-) -> tuple[Candidate, ...]:
-    """List every candidate: refitted ones by evidence, then the others by score."""
-    best = usable[0] if usable else None
-    order = {score.element.name: index for index, score in enumerate(test.scores)}
-    done = {refit.score.element.name: refit for refit in refits}
-    lowest = bic(best.estimate, inflation) if best is not None else float("nan")
-
-    def candidate(score: Score) -> Candidate:
-        refit = done.get(score.element.name)
-        score = score if refit is None else refit.score
-        strength, error = score.strength, score.error
-        chi2, delta, admissible = float("nan"), float("nan"), score.admissible
-        if refit is not None and len(refit.estimate.places) > len(test.fitted.places):
-            found = refit.estimate
-            place = strength_place(found, score)
-            strength = float(list_parameters(found.model)[found.places[place]].value)
-            error = float(found.uncertainty.standard_error[place])
-            chi2 = found.chi2 / found.dof
-            delta = bic(found, inflation) - lowest
-            admissible = admissible and refit.violation is None
-        likeness = (
-            0.0
-            if best is None
-            else float(test.likeness[order[score.element.name], order[best.score.element.name]])
-        )
-        return Candidate(
-            score.element.name,
-            score.element.words,
-            score.z,
-            score.p_value,
-            score.visibility,
-            strength,
-            error,
-            strength_unit(score.element),
-            chi2,
-            delta,
-            likeness,
-            admissible,
-        )
-
-    names = [refit.score.element.name for refit in usable]
-    first = [test.scores[order[name]] for name in names]
-    rest = [score for score in test.scores if score.element.name not in names]
-    return tuple(candidate(score) for score in (*first, *rest))

@@ -10,14 +10,15 @@ from jaxtyping import Float
 from .._parameters import find_parameter, own_parameters
 from ..elements import CATALOGUE, AbstractElement, Scales
 from ..models import Integrator, Isolator
-from ._diagnose import CLOSE_BIC, SMALLEST_GAIN
 from ._elimination import Nuisances
 from ._estimate import Estimate
+from ._evidence import CLOSE_BIC
 from ._experiments import DWELLS, candidate_experiments, find_plan, yardstick
 from ._findings import Extension
 from ._known_load import KnownLoad
 from ._made_records import TrialRun, blank_records, lost_channels, trial_run
 from ._problem import Bench, element_names, one_hot
+from ._refit import SMALLEST_GAIN
 from ._scales import scales as campaign_scales
 from ._segments import Segment
 from ._separation import Experiment, Prospect, Separation, rank_prospects

@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 from .._parameters import list_parameters
 from ..elements import Channels
 from ..excitations import Hold
-from ..models import RK4, Isolator, State
+from ..models import RK4, Isolator, State, share_internal
 from ..records import Band, Campaign, Record, measured_state
 from ..records._integrate import shift_order
 from ._batch import drive_table
@@ -94,7 +94,9 @@ def follow_memories(
     def field(t: float, internal: State, ends: tuple[tuple[Array, ...], tuple[Array, ...]]) -> State:
         far, fast, seen, drive = (one + t * (other - one) for one, other in zip(*ends, strict=True))
         rates: list[Array] = []
-        for element, own in zip(model.elements, model._internal((far, fast, *internal)), strict=True):
+        for element, own in zip(
+            model.elements, share_internal(model.elements, (far, fast, *internal)), strict=True
+        ):
             rates.extend(follow_motion(element, far, fast, seen, drive if based else None, own))
         return tuple(sample_time * rate for rate in rates)
 

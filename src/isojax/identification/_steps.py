@@ -51,7 +51,7 @@ def find_integrator(problem: Problem, model: Isolator) -> Problem:
     Returns:
         The problem with its integrator (the finest that was tried where none suffices) and its step error.
     """
-    substeps = model.record_substeps
+    substeps = Integrator().record_steps(model)
     error = step_error(problem, model, substeps)
     while substeps < FINEST and error > SHARE_OF_NOISE:
         substeps *= 2

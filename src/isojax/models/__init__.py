@@ -4,13 +4,14 @@ from ._integrator import Integrator as Integrator
 from ._isolator import Isolator as Isolator
 from ._isolator import Quantity as Quantity
 from ._isolator import State as State
-from ._regime import Regime as Regime
 from ._rk4 import RK4 as RK4
 from ._scan import advance as advance
 from ._scan import advance_record as advance_record
 from ._scan import at_stages as at_stages
 from ._scan import read_record as read_record
 from ._scan import scan_records as scan_records
+from ._shares import Regime as Regime
+from ._shares import share_internal as share_internal
 from ._simulate import Simulation as Simulation
 from ._simulate import simulate as simulate
 from ._split import Table as Table

@@ -64,7 +64,7 @@ class Integrator(eqx.Module):
         Returns:
             As `steps_per_sample`, but a law that is split asks for no more than one.
         """
-        return max(self.substeps, model.record_substeps)
+        return max(self.substeps, *(one.substeps for one in model.elements if not one.splits), 1)
 
     def steps_a_period(self, model: Isolator) -> int:
         """Give the integration steps a drive period.

@@ -9,12 +9,9 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
-from .._types import Internal, Lanes, Scalar
+from .._types import Lanes, Scalar
 from ..elements import AbstractElement, Channels
-from ._regime import Regime
-
-State = tuple[Lanes, ...]
-"""Displacement [m], velocity [m/s], then the internal states of each element in turn."""
+from ._shares import Regime, State, gather, share_internal, share_sides, sum_forces
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
 
@@ -68,11 +65,6 @@ class Isolator(eqx.Module):
     def substeps(self) -> int:
         """Integration steps a sample that the sharpest element asks for."""
         return max((element.substeps for element in self.elements), default=1)
-
-    @property
-    def record_substeps(self) -> int:
-        """Integration steps a sample of simulated records, which are split where a law jumps or bends."""
-        return max((element.substeps for element in self.elements if not element.splits), default=1)
 
     @property
     def slides(self) -> bool:
@@ -154,14 +146,6 @@ class Isolator(eqx.Module):
         """List the elements that follow signals of the record, where there is one."""
         return tuple(element for element in self.elements if element.channels) if channels else ()
 
-    def _internal(self, state: State) -> list[Internal]:
-        """Share the internal states out among the elements."""
-        shares, place = [], 2
-        for element in self.elements:
-            shares.append(state[place : place + element.internal_states])
-            place += element.internal_states
-        return shares
-
     def shift(self) -> Lanes | float:
         """Give the time by which the recorded drive leads the one that acted [s]."""
         return sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
@@ -226,11 +210,7 @@ class Isolator(eqx.Module):
         Returns:
             One value a kink, those of each element in turn.
         """
-        return tuple(
-            kink
-            for element, internal in zip(self.elements, self._internal(state), strict=True)
-            for kink in element.kinks(state[0], state[1], internal)
-        )
+        return gather(self.elements, state, "kinks")
 
     def corners(self, state: State) -> State:
         """Give the functions at whose zeros some law, unrounded, has a corner.
@@ -241,22 +221,7 @@ class Isolator(eqx.Module):
         Returns:
             One value a corner, those of each element in turn.
         """
-        return tuple(
-            corner
-            for element, internal in zip(self.elements, self._internal(state), strict=True)
-            for corner in element.corners(state[0], state[1], internal)
-        )
-
-    def _sides(self, state: State, sides: State | Regime) -> list[State]:
-        """Share the sides of the kinks, or of a regime's corners, out among the elements."""
-        shares, place = [], 0
-        sharp = isinstance(sides, Regime)
-        values = sides.corners if sharp else sides
-        for element, internal in zip(self.elements, self._internal(state), strict=True):
-            count = len((element.corners if sharp else element.kinks)(state[0], state[1], internal))
-            shares.append(values[place : place + count])
-            place += count
-        return shares
+        return gather(self.elements, state, "corners")
 
     def restoring_force(self, state: State, sides: State | Regime | None = None) -> Lanes:
         """Give the sum of element forces [N].
@@ -269,18 +234,7 @@ class Isolator(eqx.Module):
         Returns:
             Force on the left-hand side of the balance [N].
         """
-        total = 0.0 * state[0]
-        if sides is None:
-            for element, internal in zip(self.elements, self._internal(state), strict=True):
-                total = total + element.force(state[0], state[1], internal)
-            return total
-        shares = zip(self.elements, self._internal(state), self._sides(state, sides), strict=True)
-        for element, internal, own in shares:
-            if isinstance(sides, Regime):
-                total = total + element.sharp_force(state[0], state[1], internal, sides.direction, own)
-            else:
-                total = total + element.force_beside(state[0], state[1], internal, own)
-        return total
+        return sum_forces(self.elements, state, sides)
 
     def acceleration(
         self,
@@ -395,7 +349,7 @@ class Isolator(eqx.Module):
             The reading [SI unit of the quantity].
         """
         y = self.motion(state, u, u_rate, quantity, channels, sides)
-        for element, internal in zip(self.elements, self._internal(state), strict=True):
+        for element, internal in zip(self.elements, share_internal(self.elements, state), strict=True):
             y = element.reading(y, internal)
         return y
 
@@ -428,10 +382,10 @@ class Isolator(eqx.Module):
             regime = sides if isinstance(sides, Regime) else None
             y = self.motion(state, u, u_rate, quantity, channels, regime)
             base = self.base(u, u_rate, channels)
-            beside = [None] * len(self.elements)
-            if sides is not None and regime is None:
-                beside = self._sides(state, sides)
-            for element, internal, own in zip(self.elements, self._internal(state), beside, strict=True):
+            kinked = None if sides is None or regime is not None else share_sides(self.elements, state, sides)
+            beside = [None] * len(self.elements) if kinked is None else kinked
+            shares = share_internal(self.elements, state)
+            for element, internal, own in zip(self.elements, shares, beside, strict=True):
                 if own is None:
                     law = element.state_rate(x, v, internal)
                 else:

@@ -11,7 +11,7 @@ from jaxtyping import Array
 from .._types import Lanes
 from ..elements import Channels
 from ._isolator import NO_CHANNELS, Isolator, Quantity, State
-from ._regime import Regime
+from ._shares import Regime
 
 _ROUNDS = 6
 """Safeguarded Newton steps to an event: two make a crossing exact, the others are for near tangents."""
