@@ -215,8 +215,10 @@ def _sources(
             column = layout.places[1][probe]
             if column >= 0:
                 unit = layout.units[column]
-                forcing = sum(unit * values[member] * rates for values, _, (rates, _) in does)
-                direct = sum(unit * values[member] * reading for _, values, (_, reading) in does)
+                # A memory that ran away is told by its products, which are not finite.
+                with np.errstate(over="ignore", invalid="ignore"):
+                    forcing = sum(unit * values[member] * rates for values, _, (rates, _) in does)
+                    direct = sum(unit * values[member] * reading for _, values, (_, reading) in does)
                 yield column, np.asarray(forcing), np.asarray(direct), 0.0
 
 
