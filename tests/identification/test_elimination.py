@@ -89,6 +89,30 @@ def test_a_step_of_coefficients_and_nuisances_is_that_of_dense_least_squares(set
     np.testing.assert_array_equal(moved.states[USED:], nuisances.states[USED:])
 
 
+def test_a_column_that_is_not_finite_leaves_the_steps_of_the_others_alone():
+    rng = np.random.default_rng(8)
+    nuisances = Nuisances(rng.standard_normal((OWNER.size, STATES)), rng.standard_normal(RECORDS), SPREAD)
+    blocks = _blocks(True)
+    matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)
+    spoilt = matrices.copy()
+    spoilt[:, 1], spoilt[:, :, 1], spoilt[0, 1, 1] = np.inf, np.inf, np.nan
+
+    def moved(matrices, columns):
+        with np.errstate(invalid="ignore"):
+            reduced = eliminate(matrices, NOISE, OWNER, USED, RECORDS, COLUMNS, True, nuisances)
+        step = np.linspace(1.0, 2.0, COLUMNS)
+        step[1] = 0.0
+        return reduced.without(columns), step_nuisances(reduced.without(columns), OWNER, nuisances, step)
+
+    (whole, expected), (without, found) = moved(matrices, np.array([], int)), moved(spoilt, np.array([1]))
+    np.testing.assert_allclose(found.states, expected.states, rtol=1e-12)
+    np.testing.assert_allclose(found.stiffness, expected.stiffness, rtol=1e-12)
+    left = np.delete(np.delete(whole.matrix, 1, 0), 1, 1)
+    np.testing.assert_allclose(np.delete(np.delete(without.matrix, 1, 0), 1, 1), left, rtol=1e-12)
+    assert not without.matrix[1].any()
+    assert without.raw[1] == 0.0
+
+
 def test_eliminated_degrees_of_freedom_are_those_of_the_dense_projection(setting):
     reduced, _, has_scale, rows, _, owner = setting
     inner = rows[:, COLUMNS:]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from isojax import rig
-from isojax._parameters import list_parameters, replace_parameters
+from isojax._parameters import list_parameters, parameter, replace_parameters
+from isojax._types import Scalar
 from isojax.elements import (
     AbstractElement,
     AddedMass,
@@ -236,11 +237,19 @@ def test_samples_that_do_not_count_add_nothing():
     np.testing.assert_allclose(information(unknowns, again), whole, rtol=1e-10, atol=1e-6)
 
 
-class RoundedFriction(CoulombFriction):
+class RoundedFriction(AbstractElement):
     """Dry friction over its width, which is how the columns of an absent effect take it."""
 
-    slides: ClassVar[bool] = False
-    sharp_force = AbstractElement.sharp_force
+    name: ClassVar[str] = CoulombFriction.name
+    strength: ClassVar[str] = CoulombFriction.strength
+    substeps: ClassVar[int] = CoulombFriction.substeps
+
+    force_level: Scalar = parameter(symbol="Fc", unit="N", lower=0.0)
+    width: Scalar = parameter(symbol="vs", unit="m/s", lower=0.0, fitted=False)
+
+    guess = CoulombFriction.guess
+    typical_strength = CoulombFriction.typical_strength
+    force = CoulombFriction.force
 
 
 PROBES = (

@@ -23,7 +23,7 @@ from ._families import Family, find_families, in_turn, stack_states
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, share_lanes
 from ._ports import port_columns
 from ._propagation import propagate, respond
-from ._slopes import Change, Slopes, follow_path, sample_stages, slopes_along
+from ._slopes import Change, Slopes, follow_path, impulse_at_samples, slopes_along
 from ._transitions import Transitions, transitions_along
 
 _ENTRIES = 2e7
@@ -195,19 +195,18 @@ def _sources(
         yield scaled - 1, *own(unit, change, -1)
     step = prepared.sample_time
     starts = stack_states(layout.families, layout.probes, memories)
-    followed = {name: np.asarray(sample_stages(values)) for name, values in batch.channels.items()}
     ports = {name: ready(1.0, change) for name, change in slopes.ports.items()}
     ends = np.cumsum([0, *(family.elements.internal_states for family in layout.families)])
     shares = dict(zip((family.places for family in layout.families), itertools.pairwise(ends), strict=True))
     for family in in_turn(layout.families, part):
         begin, end = shares[family.places]
-        own_channels = {name: followed[name] for name in family.elements.channels}
-        pushing = {name: jnp.asarray(_across_jumps(values)) for name, values in own_channels.items()}
+        own_channels = {name: batch.channels[name] for name in family.elements.channels}
+        pushing = {name: impulse_at_samples(values) for name, values in own_channels.items()}
         added = port_columns(family, slopes.motion._replace(channels=pushing), starts[begin:end], step)
         read = added
         if own_channels:
             # A reading is that of the sample itself, at whose beginning every hold agrees with the record.
-            reading = {name: jnp.asarray(values[:, 0]) for name, values in own_channels.items()}
+            reading = {name: values[:, 0] for name, values in own_channels.items()}
             seen = slopes.motion._replace(channels=reading)
             read = port_columns(family, seen, starts[begin:end], step)
         does = [(np.asarray(added[name]), np.asarray(read[name]), ports[name]) for name in added]
@@ -220,15 +219,6 @@ def _sources(
                     forcing = sum(unit * values[member] * rates for values, _, (rates, _) in does)
                     direct = sum(unit * values[member] * reading for _, values, (_, reading) in does)
                 yield column, np.asarray(forcing), np.asarray(direct), 0.0
-
-
-def _across_jumps(values: Float[np.ndarray, "time 3 lanes"]) -> Float[np.ndarray, "time lanes"]:
-    """Give a signal at each sample, where it jumps the mean of both sides.
-
-    What another hold would give agrees with the record at every sample: all of it lies between them.
-    """
-    ended = np.concatenate([values[:1, 0], values[:-1, 2]])
-    return 0.5 * (ended + values[:, 0])
 
 
 class _Group:

@@ -54,6 +54,29 @@ class Reduced(NamedTuple):
         """Normal equations of all records together."""
         return self.by_record.sum(axis=0)
 
+    def without(self, columns: Int[np.ndarray, " lost"]) -> "Reduced":
+        """Give the equations with nothing in some columns, as if they moved no reading.
+
+        Args:
+            columns: coefficients, or the residual behind them.
+
+        Returns:
+            The equations.
+        """
+        by_record, states, stiffness = (
+            self.by_record.copy(),
+            self.states_map.copy(),
+            self.stiffness_map.copy(),
+        )
+        raw = self.raw.copy()
+        residual = raw.size
+        by_record[:, columns], by_record[:, :, columns] = 0.0, 0.0
+        stiffness[:, columns] = 0.0
+        # In the map of the states the stiffness scale may stand between the coefficients and the residual.
+        states[..., np.where(columns == residual, -1, columns)] = 0.0
+        raw[columns[columns < residual]] = 0.0
+        return self._replace(by_record=by_record, raw=raw, stiffness_map=stiffness, states_map=states)
+
 
 def eliminate(
     matrices: Float[np.ndarray, "lanes column column"],

@@ -24,9 +24,9 @@ class Projection(NamedTuple):
 
     Attributes:
         model: the fitted model with the absent effects appended.
-        point: where it was evaluated; its columns are the fitted coefficients, then the strengths.
+        point: where it was evaluated; its columns are the fitted coefficients, then the strengths, with
+            nothing in those whose trace was lost.
         units: size of one unit of each fitted coefficient.
-        by_record: products of columns and residual, record by record; zero where a trace was lost.
         absorbed: step of the fitted coefficients that a unit of each effect goes with; last, of none of them.
         information: g' g.
         score: g' r.
@@ -36,7 +36,6 @@ class Projection(NamedTuple):
     model: Isolator
     point: Point
     units: Float[np.ndarray, " coefficient"]
-    by_record: Float[np.ndarray, "record column column"]
     absorbed: Float[np.ndarray, "coefficient column"]
     information: Float[np.ndarray, "effect effect"]
     score: Float[np.ndarray, " effect"]
@@ -77,19 +76,18 @@ def project(
     places = [*fitted.places, *(find_parameter(model, name) for name in strengths)]
     directions = one_hot(model, places, [*own, *units])
     point = fitted.bench.evaluate(model, directions, fitted.point.nuisances, carried)
-    by_record, raw = point.reduced.by_record.copy(), point.reduced.raw.copy()
+    by_record = point.reduced.by_record
     # A memory that ran away along the motion has no trace: it is as good as hidden.
     lost = np.flatnonzero(~np.isfinite(np.diagonal(by_record, axis1=1, axis2=2).sum(axis=0)))
     residual = by_record.shape[-1] - 1
     if np.any(lost < count) or residual in lost:
         # What ran away has spoilt the residual or the fitted columns as well: no trace says anything then.
         lost = np.arange(residual + 1)
-    by_record[:, lost], by_record[:, :, lost] = 0.0, 0.0
-    raw[lost[lost < raw.size]] = 1.0
-    matrix = by_record.sum(axis=0)
+    point = point._replace(reduced=point.reduced.without(lost))
+    matrix = point.reduced.matrix
     base, cross = matrix[:count, :count], matrix[:count, count:]
     absorbed = np.linalg.pinv(base, rcond=1e-12, hermitian=True) @ cross
     left = matrix[count:, count:] - cross.T @ absorbed
     size = np.sqrt(np.maximum(np.diag(left)[:-1], 0.0))
-    visibility = size / np.sqrt(np.maximum(raw[count:], 1e-300))
-    return Projection(model, point, own, by_record, absorbed, left[:-1, :-1], left[:-1, -1], visibility)
+    visibility = size / np.sqrt(np.maximum(point.reduced.raw[count:], 1e-300))
+    return Projection(model, point, own, absorbed, left[:-1, :-1], left[:-1, -1], visibility)

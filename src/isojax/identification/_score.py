@@ -117,7 +117,7 @@ def score_test(
     count, carried = len(fitted.places), len(fitted.model.elements)
     units = np.array([1e-3 * probe.typical_strength(scales) for probe in probes])
     traces = project(fitted, probes, units)
-    absorbed, by_record, seen = traces.absorbed, traces.by_record, traces.seen
+    absorbed, by_record, seen = traces.absorbed, traces.point.reduced.by_record, traces.seen
     information, score = traces.information, traces.score
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)

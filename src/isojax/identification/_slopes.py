@@ -51,6 +51,28 @@ def _to_samples(values: Float[Array, "step lanes"], steps: int) -> Float[Array, 
         (share * padded[first : first + time * steps : steps] for first, share in enumerate(shares)),
         start=jnp.zeros_like(values[:time]),
     )
+    return _without_bend(mean)
+
+
+def impulse_at_samples(table: Float[Array, "time stage lanes"]) -> Float[Array, "time lanes"]:
+    """Average a signal to the samples as slopes are: all of it may lie between them, as that of a hold does.
+
+    Args:
+        table: the signal at equidistant times from each sample to the next; it may jump there.
+
+    Returns:
+        At each sample what pushes a model as much.
+    """
+    place = jnp.linspace(0.0, 1.0, table.shape[1])
+    pattern = jnp.ones(table.shape[1]).at[1::2].set(4.0).at[2:-1:2].set(2.0)
+    simpson = pattern / pattern.sum()
+    ahead = jnp.einsum("s,tsl->tl", simpson * (1.0 - place), table)
+    behind = jnp.einsum("s,tsl->tl", simpson * place, table)
+    return _without_bend(ahead + jnp.concatenate([0.5 * table[:1, 0], behind[:-1]]))
+
+
+def _without_bend(mean: Float[Array, "time lanes"]) -> Float[Array, "time lanes"]:
+    """Take off what a hat adds to a smooth series."""
     around = jnp.concatenate([mean[:1], mean, mean[-1:]])
     return mean - (around[2:] - 2.0 * mean + around[:-2]) / 12.0
 
