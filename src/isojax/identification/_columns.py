@@ -130,8 +130,8 @@ def _block(
     """Work out the columns of a few lanes, and multiply them out."""
     model, size = layout.model, 2 + layout.model.internal_states
     own = batch.following(model)
-    path = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
-    slopes = slopes_along(model, layout.moving, scale, path, own, prepared.quantity)
+    path, echo = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
+    slopes = slopes_along(model, layout.moving, scale, path, echo, own, prepared.quantity)
     lanes, time, step = scale.shape[0], batch.measured.shape[0], prepared.sample_time
     table = np.empty((lanes, columns, time))
     weight = np.asarray(batch.weight)
@@ -169,7 +169,7 @@ def _sources(
 ) -> Iterator[tuple[int, np.ndarray | float, np.ndarray, np.ndarray | float]]:
     """Give each coefficient's column, change of the rates (row time lanes), of the reading (time lanes).
 
-    Last comes what it adds over each sample (state time lanes), in place of the change of the rates, where
+    Last comes what it adds over each sample (row time lanes), in place of the change of the rates, where
     the model's laws jump.
     """
     size = 2 + layout.model.internal_states
@@ -230,7 +230,7 @@ class _Group:
         self.readings = tuple(entry.reading for entry in by_state)
         size, (time, lanes) = len(by_state), weight.shape
         self.forcing = np.zeros((size - 1, time, _TOGETHER, lanes))
-        self.kicks = None if exact is None else np.zeros((size, time, _TOGETHER, lanes))
+        self.kicks = None if exact is None else np.zeros((size + 2, time, _TOGETHER, lanes))
         self.direct = np.zeros((time, _TOGETHER, lanes))
         self.starts = np.zeros((size, _TOGETHER, lanes))
         self.columns: list[int] = []

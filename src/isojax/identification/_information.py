@@ -73,8 +73,13 @@ def has_stiffness_scale(model: Isolator) -> bool:
     return _stiffness_place(model) is not None
 
 
-def _sampler(model: Isolator, quantity: Quantity, sample_time: float) -> Callable[..., tuple[Array, State]]:
-    """Give the function that reads one sample and steps to the next, the model's numbers as arguments."""
+def _sampler(
+    model: Isolator, quantity: Quantity, sample_time: float
+) -> Callable[..., tuple[Array, State, Array | None]]:
+    """Give the function that reads one sample and steps to the next, the model's numbers as arguments.
+
+    Last it gives what jumps on the way leave in the next reading.
+    """
     solver = RK4()
 
     def sample(
@@ -84,14 +89,15 @@ def _sampler(model: Isolator, quantity: Quantity, sample_time: float) -> Callabl
         u: tuple[Array, ...],
         du: tuple[Array, ...],
         channels: tuple[Channels, ...],
-    ) -> tuple[Array, State]:
+    ) -> tuple[Array, State, Array | None]:
         current = scaled_model(model, values, scale)
         # The table already holds the delayed drive; only the derivative with respect to the delay is still to
         # come.
         late = current.shift() - jax.lax.stop_gradient(current.shift())
         u = tuple(value - late * slope for value, slope in zip(u, du, strict=True))
         reading = read_record(current, state, u[0], du[0], quantity, channels[0])
-        return reading, advance_record(current, solver, quantity, sample_time, state, u, du, channels)
+        ahead, echo = advance_record(current, solver, quantity, sample_time, state, u, du, channels)
+        return (reading, ahead, None) if echo is None else (reading + echo.before, ahead, echo.after)
 
     return sample
 
@@ -134,7 +140,7 @@ def _lane_information(
         return tuple(numbers)
 
     def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
-        state, tangent, gram = carry
+        state, tangent, gram, heard = carry
         drive, rate, known, measured, weight = table
         u = tuple(drive[stage] for stage in range(stages))
         du = tuple(rate[stage] for stage in range(stages))
@@ -148,11 +154,15 @@ def _lane_information(
             )
             return primal, change
 
-        (reading, state), change = jax.vmap(along, out_axes=(None, 0))(seeds, scale_seed, tangent)
-        rows = jnp.concatenate([change[0], (measured - reading)[None]]) * weight[None]
-        return (state, change[1], gram + rows[:, None] * rows[None]), None
+        (reading, state, after), change = jax.vmap(along, out_axes=(None, 0))(seeds, scale_seed, tangent)
+        rows = jnp.concatenate([change[0], (measured - reading)[None]])
+        if heard is not None:
+            rows, heard = rows + heard, jnp.concatenate([change[2], -after[None]])
+        rows = rows * weight[None]
+        return (state, change[1], gram + rows[:, None] * rows[None], heard), None
 
-    start = (states, tangents, jnp.zeros((total + 1, total + 1, lanes)))
+    silent = jnp.zeros((total + 1, lanes)) if model.splits else None
+    start = (states, tangents, jnp.zeros((total + 1, total + 1, lanes)), silent)
     tables = (batch.drive, batch.drive_rate, batch.channels, batch.measured, batch.weight)
     carry, _ = jax.lax.scan(body, start, tables)
     return carry[2]
@@ -220,13 +230,14 @@ def _lane_readings(
     sample = _sampler(model, quantity, sample_time)
     stages = batch.drive.shape[1]
 
-    def body(state: State, table: tuple) -> tuple[State, Array]:
-        drive, rate, known = table
+    def body(carry: tuple[State, Array | None], table: tuple) -> tuple[tuple[State, Array | None], Array]:
+        (state, heard), (drive, rate, known) = carry, table
         u, du = tuple(drive[i] for i in range(stages)), tuple(rate[i] for i in range(stages))
-        reading, state = sample(values, scale, state, u, du, at_stages(known, stages))
-        return state, reading
+        reading, state, after = sample(values, scale, state, u, du, at_stages(known, stages))
+        return (state, after), reading if heard is None else reading + heard
 
-    return jax.lax.scan(body, states, (batch.drive, batch.drive_rate, batch.channels))[1]
+    start = (states, jnp.zeros_like(scale) if model.splits else None)
+    return jax.lax.scan(body, start, (batch.drive, batch.drive_rate, batch.channels))[1]
 
 
 def readings(

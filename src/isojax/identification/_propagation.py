@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..models import Echo, hear
 from ._slopes import Change, cubic_middle
 
 Matrix = list[list[Array]]
@@ -21,6 +22,9 @@ class Propagation(NamedTuple):
         by_start: G0, what the rates b at its beginning add; its first column, of the velocity, is unused.
         by_middle: Gm, of those in the middle.
         by_end: G1, of those at the end.
+
+    Of a model whose laws jump each has two rows more: what d and b do to the readings at the beginning and
+    the end of the sample.
     """
 
     forward: Matrix
@@ -122,7 +126,7 @@ def respond(
     propagation: Propagation,
     readings: tuple[Float[Array, "time lanes"], ...],
     forcing: Float[Array, "row time column lanes"],
-    kicks: Float[Array, "state time column lanes"] | None,
+    kicks: Float[Array, "effect time column lanes"] | None,
     direct: Float[Array, "time column lanes"],
     starts: Float[Array, "state column lanes"],
     weight: Float[Array, "time lanes"],
@@ -133,7 +137,7 @@ def respond(
         propagation: what each sample does to them.
         readings: what a unit of each state does to the reading.
         forcing: rates of the states but the first that push them; between samples they follow cubics.
-        kicks: what else each sample adds to them.
+        kicks: what else each sample adds to the states and to the readings at its ends.
         direct: what the columns do to the reading at once.
         starts: where they begin.
         weight: of each reading.
@@ -153,7 +157,7 @@ def respond(
             (by[row][place + 1][:, None] * rate for by, rates in stages for place, rate in enumerate(rates)),
             start=jnp.zeros(()) if kicks is None else kicks[row],
         )
-        for row in range(size)
+        for row in range(len(propagation.forward))
     ]
 
     def body(d: tuple[Array, ...], table: tuple[Matrix, list[Array]]) -> tuple[tuple, tuple[Array, ...]]:
@@ -165,6 +169,11 @@ def respond(
         return moved, d
 
     start = tuple(starts[index] for index in range(size))
-    path = jax.lax.scan(body, start, (propagation.forward, pushed))[1]
+    path = jax.lax.scan(body, start, (propagation.forward[:size], pushed[:size]))[1]
     rows = sum(d * reading[:, None] for d, reading in zip(path, readings, strict=True)) + direct
+    if kicks is not None:
+        heard = zip(propagation.forward[size:], pushed[size:], strict=True)
+        rows = hear(
+            rows, Echo(*(sum((f[:, None] * d for f, d in zip(by, path, strict=True)), g) for by, g in heard))
+        )
     return rows * weight[:, None]

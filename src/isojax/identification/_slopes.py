@@ -12,7 +12,21 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._parameters import list_parameters
-from ..models import RK4, Isolator, Quantity, State, advance_record, at_stages, find_regime, read_record
+from ..models import (
+    RK4,
+    Echo,
+    Isolator,
+    Quantity,
+    State,
+    Table,
+    advance,
+    at_stages,
+    find_echo,
+    find_regime,
+    hear,
+    read_record,
+    split_step,
+)
 from ._batch import Batch
 from ._information import has_stiffness_scale, scaled_model
 from ._ports import PORTS, Motion, Perturbation
@@ -80,21 +94,28 @@ def _without_bend(mean: Float[Array, "time lanes"]) -> Float[Array, "time lanes"
 @eqx.filter_jit
 def follow_path(
     model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> State:
-    """Simulate; give the states at the start of each integration step."""
+) -> tuple[State, Echo | None]:
+    """Simulate; give the states at the start of each integration step, and the echoes of jumps."""
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
     drive, rate = steps_of(batch.drive), steps_of(batch.drive_rate)
     channels = {name: steps_of(values) for name, values in batch.channels.items()}
-    step = sample_time * batch.drive.shape[0] / drive.shape[0]
+    time = batch.drive.shape[0]
+    steps = drive.shape[0] // time
+    step_time = sample_time / steps
     solver = RK4()
 
-    def body(state: State, table: tuple) -> tuple[State, State]:
-        u, du, known = table
+    def body(state: State, table: tuple) -> tuple[State, tuple[State, Echo | None]]:
+        number, u, du, known = table
         stages = tuple(u[i] for i in range(3)), tuple(du[i] for i in range(3)), at_stages(known, 3)
-        return advance_record(current, solver, quantity, step, state, *stages), state
+        if not model.splits:
+            return advance(current, solver, quantity, step_time, state, *stages), (state, None)
+        ahead, jump = split_step(current, quantity, step_time, state, Table(*stages))
+        return ahead, (state, find_echo(jump, number, steps))
 
-    return jax.lax.scan(body, states, (drive, rate, channels))[1]
+    numbers = jnp.tile(jnp.arange(steps), time)
+    path, echo = jax.lax.scan(body, states, (numbers, drive, rate, channels))[1]
+    return path, jax.tree_util.tree_map(lambda one: one.reshape(time, steps, -1).sum(axis=1), echo)
 
 
 class Change(NamedTuple):
@@ -126,7 +147,13 @@ class Slopes(NamedTuple):
 
 @eqx.filter_jit
 def slopes_along(
-    model: Isolator, moving: tuple[int, ...], scale: Array, path: State, batch: Batch, quantity: Quantity
+    model: Isolator,
+    moving: tuple[int, ...],
+    scale: Array,
+    path: State,
+    echo: Echo | None,
+    batch: Batch,
+    quantity: Quantity,
 ) -> Slopes:
     """Differentiate rates and reading along the path.
 
@@ -196,18 +223,21 @@ def slopes_along(
         now, rate = (table[:, stage] for table in coarse)
         base = present.base(now, rate, at)
         y = read_record(present, state, now, rate, quantity, at)
+        if echo is not None and stage == 0:
+            y = hear(y, echo)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
     now, rate = (table[:, 0] for table in coarse)
     at = {name: table[:, 0] for name, table in beside.items()}
     held = find_regime(present, own, now, rate, at) if model.splits else None
     acted, acted_rate = present.acting(now, rate, at)
+    sensed = present.sensed(own, now, rate, quantity, at, held)
     motion = Motion(
         own[0],
         own[1],
         rate,
         acted,
         jnp.broadcast_to(acted_rate, acted.shape),
-        present.sensed(own, now, rate, quantity, at, held),
+        sensed if echo is None else hear(sensed, echo),
         tuple(jnp.stack(three, axis=1) for three in zip(*seen, strict=True)),
         {},
     )

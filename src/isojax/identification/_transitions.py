@@ -12,14 +12,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._parameters import list_parameters
-from ..models import Isolator, Quantity, State, Table, split_step
+from ..models import Isolator, Quantity, State, Table, find_echo, split_step
 from ._information import scaled_model
-from ._propagation import Propagation, product
+from ._propagation import Matrix, Propagation, product
 from ._slopes import steps_of
 
 
 class Transitions(NamedTuple):
-    """What each sample adds to the state at its end.
+    """What each sample adds to the state at its end, then to the readings at its beginning and its end.
 
     Attributes:
         propagation: for a unit of each state at its beginning, and for rates that push.
@@ -28,8 +28,8 @@ class Transitions(NamedTuple):
     """
 
     propagation: Propagation
-    parameters: Float[Array, "state parameter time lanes"]
-    scale: Float[Array, "state time lanes"]
+    parameters: Float[Array, "row parameter time lanes"]
+    scale: Float[Array, "row time lanes"]
 
 
 @eqx.filter_jit
@@ -59,7 +59,9 @@ def transitions_along(
     values = tuple(entry.value for entry in list_parameters(model))
     size, like = len(path), path[0]
     scale = jnp.broadcast_to(scale, like.shape)
-    steps = like.shape[0] // tables[0].shape[0]
+    time = tables[0].shape[0]
+    steps = like.shape[0] // time
+    step_of_sample = jnp.tile(jnp.arange(steps), time)[:, None]
     step_time = sample_time / steps
     tables = jax.tree_util.tree_map(steps_of, tables)
     drive, rate = (tuple(table[:, stage] for stage in range(3)) for table in tables[:2])
@@ -76,7 +78,9 @@ def transitions_along(
             (jnp.zeros_like(like), *(push[stage, row] + 0.0 * like for row in range(size - 1)))
             for stage in range(3)
         )
-        return jnp.stack(split_step(current, quantity, step_time, state, Table(u, rate, channels, pushes)))
+        at = Table(u, rate, channels, pushes)
+        ahead, jump = split_step(current, quantity, step_time, state, at)
+        return jnp.stack([*ahead, *find_echo(jump, step_of_sample, steps)])
 
     known = tuple(values[place] for place in moving)
     nothing = (
@@ -99,23 +103,36 @@ def transitions_along(
 
     # One derivative after the other: side by side they would hold as many copies of the path.
     found = jnp.moveaxis(jax.lax.map(along, jax.tree_util.tree_map(lambda *s: jnp.stack(s), *seeds)), 0, 1)
-    found = found.reshape(size, len(seeds), -1, steps, like.shape[1])
+    found = found.reshape(size + 2, len(seeds), -1, steps, like.shape[1])
     return _over_samples([found[:, :, :, step] for step in range(steps)], size)
 
 
 def _over_samples(each: list[Array], size: int) -> Transitions:
-    """Join the steps of a sample; what pushes follows a parabola through its beginning, middle and end."""
+    """Join the steps of a sample; what pushes follows a parabola through its beginning, middle and end.
+
+    Rows of states go on from step to step, those of readings add up.
+    """
     steps, pushes_end = len(each), size + 3 * (size - 1)
-    rows = range(size)
-    forward = [[jnp.zeros_like(each[0][0, 0]) + float(row == column) for column in rows] for row in rows]
-    pushed = [[[jnp.zeros_like(each[0][0, 0]) for _ in rows] for _ in rows] for _ in range(3)]
+    rows = range(size + 2)
+    nothing = jnp.zeros_like(each[0][0, 0])
+    forward = [[nothing + float(row == column) for column in range(size)] for row in rows]
+    pushed = [[[nothing for _ in range(size)] for _ in rows] for _ in range(3)]
     rest = jnp.zeros_like(each[0][:, pushes_end:])
+
+    def joined(onward: Matrix, so_far: Matrix) -> Matrix:
+        moved = product(onward, so_far[:size])
+        heard = [
+            [old + new for old, new in zip(*both, strict=True)]
+            for both in zip(so_far[size:], moved[size:], strict=True)
+        ]
+        return [*moved[:size], *heard]
+
     for step, found in enumerate(each):
-        onward = [[found[row, column] for column in rows] for row in rows]
-        forward = product(onward, forward)
-        pushed = [product(onward, one) for one in pushed]
-        carried = [sum(onward[row][k][None] * rest[k] for k in rows) for row in rows]
-        rest = jnp.stack(carried) + found[:, pushes_end:]
+        onward = [[found[row, column] for column in range(size)] for row in rows]
+        forward = joined(onward, forward)
+        pushed = [joined(onward, one) for one in pushed]
+        carried = jnp.stack([sum(onward[row][k][None] * rest[k] for k in range(size)) for row in rows])
+        rest = carried.at[size:].add(rest[size:]) + found[:, pushes_end:]
         for stage in range(3):
             at = (step + 0.5 * stage) / steps
             # Lagrange's parabolas through 0, 1/2 and 1.

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from .._types import Lanes
 from ..elements import Channels
 from ._isolator import NO_CHANNELS, Isolator, Quantity, State
-from ._split import Table, find_regime, split_step
+from ._split import Echo, Table, find_echo, find_regime, split_step
 
 
 def sampled_term(model: Isolator, quantity: Quantity, sample_time: Lanes | float) -> diffrax.ODETerm:
@@ -113,7 +113,7 @@ def advance_record(
     drive: tuple[Array, ...],
     drive_rate: tuple[Array | float, ...],
     channels: tuple[Channels, ...] = (),
-) -> State:
+) -> tuple[State, Echo | None]:
     """Advance the state of a record by one sample: as `advance`, but split where a law jumps or bends.
 
     Args:
@@ -127,20 +127,27 @@ def advance_record(
         channels: signals of the record at the same times; none if omitted.
 
     Returns:
-        State one sample later.
+        State one sample later; what jumps on the way leave in the readings of both samples, None of a model
+        without jumps.
     """
     if not model.splits:
-        return advance(model, solver, quantity, sample_time, state, drive, drive_rate, channels)
+        return advance(model, solver, quantity, sample_time, state, drive, drive_rate, channels), None
     channels = channels or (NO_CHANNELS,) * len(drive)
     substeps = (len(drive) - 1) // 2
     step_time = sample_time / substeps
     if substeps == 1:
-        return split_step(model, quantity, step_time, state, Table(drive, drive_rate, channels))
+        state, jump = split_step(model, quantity, step_time, state, Table(drive, drive_rate, channels))
+        return state, find_echo(jump, 0, 1)
 
-    def body(carry: State, table: tuple) -> tuple[State, None]:
-        return split_step(model, quantity, step_time, carry, Table(*table)), None
+    def body(carry: tuple[State, Echo], table: tuple) -> tuple[tuple[State, Echo], None]:
+        (state, heard), (step, *at) = carry, table
+        state, jump = split_step(model, quantity, step_time, state, Table(*at))
+        echo = find_echo(jump, step, substeps)
+        return (state, Echo(heard.before + echo.before, heard.after + echo.after)), None
 
-    return jax.lax.scan(body, state, _step_tables(drive, drive_rate, channels))[0]
+    silent = Echo(jnp.zeros_like(state[0]), jnp.zeros_like(state[0]))
+    tables = (jnp.arange(substeps), *_step_tables(drive, drive_rate, channels))
+    return jax.lax.scan(body, (state, silent), tables)[0]
 
 
 def read_record(
@@ -152,6 +159,8 @@ def read_record(
     channels: Channels = NO_CHANNELS,
 ) -> Lanes:
     """Give what the sensor chain records: as `Isolator.reading`, but with laws that jump or bend as they are.
+
+    The echoes of jumps between samples are not in it: see `hear`.
 
     Args:
         model: the isolator.
@@ -191,7 +200,7 @@ def scan_records(
     drive_rate: Float[Array, "time stage lanes"] | None,
     observe: Callable[[State, Array, Array | float], Any],
     channels: dict[str, Float[Array, "time stage lanes"]] | None = None,
-) -> tuple[State, Any]:
+) -> tuple[State, Any, Echo | None]:
     """Integrate records side by side and observe each sample before it is stepped over.
 
     Args:
@@ -206,16 +215,18 @@ def scan_records(
         channels: signals of the records at the same times, by name.
 
     Returns:
-        State after the last sample, and the observations, time first.
+        State after the last sample; the observations, time first; the echoes of jumps, None without any.
     """
     stages = drive.shape[1]
 
-    def body(carry: State, table: tuple[Array, Array | None, dict[str, Array]]) -> tuple[State, Any]:
+    def body(carry: State, table: tuple[Array, Array | None, dict[str, Array]]) -> tuple[State, tuple]:
         values, slopes, beside = table
         u = tuple(values[stage] for stage in range(stages))
         du = (0.0,) * stages if slopes is None else tuple(slopes[stage] for stage in range(stages))
         kept = observe(carry, u[0], du[0])
-        ahead = advance_record(model, solver, quantity, sample_time, carry, u, du, at_stages(beside, stages))
-        return ahead, kept
+        beside = at_stages(beside, stages)
+        ahead, echo = advance_record(model, solver, quantity, sample_time, carry, u, du, beside)
+        return ahead, (kept, echo)
 
-    return jax.lax.scan(body, state, (drive, drive_rate, channels or {}))
+    last, (kept, echo) = jax.lax.scan(body, state, (drive, drive_rate, channels or {}))
+    return last, kept, echo
