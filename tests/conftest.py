@@ -23,7 +23,7 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 install_import_hook("isojax", "beartype.beartype")
 
 
-_MOST_MAPPINGS = 15_000
+_MOST_MAPPINGS = 40_000
 """Memory mappings of the process from which compiled code is let go; Linux allows 65530, and every compiled
 function takes several. Beyond that limit the compiler does not raise, it crashes."""
 
