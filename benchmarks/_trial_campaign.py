@@ -150,7 +150,7 @@ def sketch(seed: int, kind: str | None = None, names: tuple[str, ...] | None = N
         force_noise=draw.uniform(0.0, 0.05),
         drift=draw.uniform(0.0, 0.002),
         shaker=shaker,
-        tolerance=1e-9,
+        tolerance=1e-7,  # of the motion: below 1e-4 of the noise
     )
     frequencies = tuple((CYCLES * RATE / counts).tolist())
     plans = _plans(layout, levels, frequencies, draw)

@@ -76,8 +76,8 @@ class Tones(Piece):
 
     @property
     def longest_step(self) -> float:
-        """A quarter of the shortest period, s."""
-        return 2 * math.pi / 4 / max(self.angular_frequencies, default=0.1)
+        """Half of the shortest period, s."""
+        return 2 * math.pi / 2 / max(self.angular_frequencies, default=0.1)
 
     @no_type_check
     def force(self, t):
@@ -194,9 +194,9 @@ class Chirp(Piece):
 
     @property
     def longest_step(self) -> float:
-        """A quarter of the shortest period, s."""
+        """Half of the shortest period, s."""
         highest = max(abs(self.frequency + self.sweep * (t - self.origin)) for t in (self.start, self.stop))
-        return 1 / 4 / (highest * max((order for order, _, _ in self.harmonics), default=1))
+        return 1 / 2 / (highest * max((order for order, _, _ in self.harmonics), default=1))
 
     @no_type_check
     def force(self, t):
