@@ -1,5 +1,6 @@
 """The information that segments hold is that of a dense Jacobian of an independent simulation."""
 
+import itertools
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
@@ -111,7 +112,10 @@ def _setting(case: Case, substeps: int | None = None) -> tuple[Prepared, Unknown
 
 
 def _exact(model: Isolator, drive: np.ndarray, start: list[float]) -> np.ndarray:
-    """Acceleration under a drive that is straight between samples, from the event-exact bench."""
+    """Acceleration under a drive that is straight between samples, from the event-exact bench.
+
+    Its jumps are those of band-limited steps, as far as the nearest sample on each side.
+    """
     times = np.arange(drive.size) / RATE
     slopes = np.diff(drive, append=0.0) * RATE
     pieces = [rig.Line(t, t + 1.0 / RATE, t, f, s) for t, f, s in zip(times, drive, slopes, strict=True)]
@@ -119,8 +123,21 @@ def _exact(model: Isolator, drive: np.ndarray, start: list[float]) -> np.ndarray
     strengths = [getattr(element, element.strength) for element in model.elements]
     plant = rig.Plant(tuple(law(float(f)) for law, f in zip(laws, strengths, strict=True)), float(model.mass))
     balance = Balance(plant)
-    states, sides, held = RigIntegrator(balance, 1e-11).run(pieces, [float(s) for s in start]).at(times)
-    return np.asarray(balance.acceleration(times, states, drive, sides, held))
+    path = RigIntegrator(balance, 1e-11).run(pieces, [float(s) for s in start])
+    states, sides, held = path.at(times)
+    found = np.asarray(balance.acceleration(times, states, drive, sides, held))
+    for before, (at, _, state, _, *after) in itertools.pairwise(path._steps):
+        place = min(int(at * RATE), drive.size - 1)
+        share, push = at * RATE - place, np.array([pieces[place].force(at)])
+        sooner, later = (
+            float(balance.acceleration(at, state[:, None], push, np.array(own)[:, None], stuck)[0])
+            for own, stuck in (before[4:], after)
+        )
+        jump = later - sooner
+        found[place] += jump * (1.0 - share) * (0.5 - 0.8 * share)
+        if place + 1 < drive.size:
+            found[place + 1] -= jump * share * (0.5 - 0.8 * (1.0 - share))
+    return found
 
 
 def _columns(case: Case, unknowns: Unknowns, lane: int, length: int) -> np.ndarray:
