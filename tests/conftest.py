@@ -17,7 +17,7 @@ _COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
 
 os.environ["JAX_COMPILATION_CACHE_DIR"] = _COMPILED
 jax.config.update("jax_compilation_cache_dir", _COMPILED)
-jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 install_import_hook("isojax", "beartype.beartype")
