@@ -28,7 +28,7 @@ def test_records_side_by_side_are_the_single_simulations(hold):
     def observe(state, u, du):
         return state[0], model.reading(state, u, du, "acceleration")
 
-    end, (displacement, reading), echo = jax.jit(
+    end, (displacement, reading), ringing = jax.jit(
         lambda drive: scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, drive, None, observe)
     )(jnp.asarray(np.stack(tables, axis=-1)))
     for lane in range(2):
@@ -44,7 +44,7 @@ def test_records_side_by_side_are_the_single_simulations(hold):
         size = float(jnp.max(jnp.abs(record.reading)))
         np.testing.assert_allclose(reading[:, lane], record.reading, atol=1e-11 * size)
     assert all(value.shape == (2,) for value in end)
-    assert echo is None
+    assert ringing is None
 
 
 def test_the_drive_rate_reaches_the_instruments():

@@ -26,10 +26,10 @@ from isojax.models import (
     Integrator,
     Isolator,
     State,
+    add_ringing,
     advance,
     advance_record,
     find_regime,
-    hear,
     read_record,
     scan_records,
 )
@@ -103,15 +103,15 @@ def split(model: Isolator, drive: jax.Array, start: State) -> tuple[State, jax.A
 
 
 @eqx.filter_jit
-def heard(model: Isolator, drive: jax.Array, start: State) -> tuple[jax.Array, jax.Array]:
+def as_recorded(model: Isolator, drive: jax.Array, start: State) -> tuple[jax.Array, jax.Array]:
     """Readings of the motion at the samples, and as they are in a band-limited record."""
 
     def observe(state, u, du):
         return read_record(model, state, u, du, "acceleration")
 
-    _, sharp, echo = scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, drive, None, observe)
-    assert echo is not None
-    return sharp, hear(sharp, echo)
+    _, sharp, ringing = scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, drive, None, observe)
+    assert ringing is not None
+    return sharp, add_ringing(sharp, ringing)
 
 
 @eqx.filter_jit
@@ -147,7 +147,7 @@ def test_a_record_is_that_of_the_exact_bench_with_one_step_a_sample(name):
 
 
 @pytest.mark.parametrize(("limit", "steps", "share"), [(8.0, 1, 0.4), (8.0, 3, 0.4), (60.0, 1, 0.45)])
-def test_jumps_are_heard_as_an_anti_alias_filter_passes_them(limit, steps, share):
+def test_jumps_are_read_as_an_anti_alias_filter_passes_them(limit, steps, share):
     piece = rig.Tones(0.0, COUNT / RATE + 1.0, 0.0, *TONES)
     plant = rig.Plant((BENCH, DASHPOT, rig.CoulombFriction(limit)))
     factor, taps = oversampling(RATE), anti_alias_taps(RATE)
@@ -158,7 +158,8 @@ def test_jumps_are_heard_as_an_anti_alias_filter_passes_them(limit, steps, share
     model = Isolator(MASS, (SPRING, DAMPER, CoulombFriction(limit, WIDTH)))
     start = (jnp.full(1, 5e-4), jnp.zeros(1))
     sharp, band_limited = (
-        np.asarray(values)[reach : COUNT - reach, 0] for values in heard(model, table(piece, steps), start)
+        np.asarray(values)[reach : COUNT - reach, 0]
+        for values in as_recorded(model, table(piece, steps), start)
     )
     before, after = (np.sqrt(np.mean((values - wanted) ** 2)) for values in (sharp, band_limited))
     # A sampled step differs from a band-limited one by 1/pi^2 of its square (Parseval), beyond the nearest

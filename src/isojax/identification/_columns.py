@@ -130,8 +130,8 @@ def _block(
     """Work out the columns of a few lanes, and multiply them out."""
     model, size = layout.model, 2 + layout.model.internal_states
     own = batch.following(model)
-    path, echo = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
-    slopes = slopes_along(model, layout.moving, scale, path, echo, own, prepared.quantity)
+    path, ringing = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
+    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, prepared.quantity)
     lanes, time, step = scale.shape[0], batch.measured.shape[0], prepared.sample_time
     table = np.empty((lanes, columns, time))
     weight = np.asarray(batch.weight)

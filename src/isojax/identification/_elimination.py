@@ -63,12 +63,8 @@ class Reduced(NamedTuple):
         Returns:
             The equations.
         """
-        by_record, states, stiffness = (
-            self.by_record.copy(),
-            self.states_map.copy(),
-            self.stiffness_map.copy(),
-        )
-        raw = self.raw.copy()
+        by_record, raw = self.by_record.copy(), self.raw.copy()
+        states, stiffness = self.states_map.copy(), self.stiffness_map.copy()
         residual = raw.size
         by_record[:, columns], by_record[:, :, columns] = 0.0, 0.0
         stiffness[:, columns] = 0.0

@@ -96,8 +96,8 @@ def _sampler(
         late = current.shift() - jax.lax.stop_gradient(current.shift())
         u = tuple(value - late * slope for value, slope in zip(u, du, strict=True))
         reading = read_record(current, state, u[0], du[0], quantity, channels[0])
-        ahead, echo = advance_record(current, solver, quantity, sample_time, state, u, du, channels)
-        return (reading, ahead, None) if echo is None else (reading + echo.before, ahead, echo.after)
+        ahead, ringing = advance_record(current, solver, quantity, sample_time, state, u, du, channels)
+        return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)
 
     return sample
 
@@ -140,7 +140,7 @@ def _lane_information(
         return tuple(numbers)
 
     def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
-        state, tangent, gram, heard = carry
+        state, tangent, gram, pending = carry
         drive, rate, known, measured, weight = table
         u = tuple(drive[stage] for stage in range(stages))
         du = tuple(rate[stage] for stage in range(stages))
@@ -156,10 +156,10 @@ def _lane_information(
 
         (reading, state, after), change = jax.vmap(along, out_axes=(None, 0))(seeds, scale_seed, tangent)
         rows = jnp.concatenate([change[0], (measured - reading)[None]])
-        if heard is not None:
-            rows, heard = rows + heard, jnp.concatenate([change[2], -after[None]])
+        if pending is not None:
+            rows, pending = rows + pending, jnp.concatenate([change[2], -after[None]])
         rows = rows * weight[None]
-        return (state, change[1], gram + rows[:, None] * rows[None], heard), None
+        return (state, change[1], gram + rows[:, None] * rows[None], pending), None
 
     silent = jnp.zeros((total + 1, lanes)) if model.splits else None
     start = (states, tangents, jnp.zeros((total + 1, total + 1, lanes)), silent)
@@ -231,10 +231,10 @@ def _lane_readings(
     stages = batch.drive.shape[1]
 
     def body(carry: tuple[State, Array | None], table: tuple) -> tuple[tuple[State, Array | None], Array]:
-        (state, heard), (drive, rate, known) = carry, table
+        (state, pending), (drive, rate, known) = carry, table
         u, du = tuple(drive[i] for i in range(stages)), tuple(rate[i] for i in range(stages))
         reading, state, after = sample(values, scale, state, u, du, at_stages(known, stages))
-        return (state, after), reading if heard is None else reading + heard
+        return (state, after), reading if pending is None else reading + pending
 
     start = (states, jnp.zeros_like(scale) if model.splits else None)
     return jax.lax.scan(body, start, (batch.drive, batch.drive_rate, batch.channels))[1]

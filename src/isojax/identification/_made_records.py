@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..excitations import Hold
-from ..models import RK4, Isolator, Quantity, State, hear, read_record, scan_records
+from ..models import RK4, Isolator, Quantity, State, add_ringing, read_record, scan_records
 from ..records import Dwell, Record
 from ._batch import drive_table
 from ._channels import carries, channel_table
@@ -47,12 +47,12 @@ def _run(
     sample_time: float,
 ) -> tuple[State, Array]:
     """Give states and readings at the samples."""
-    _, path, echo = scan_records(
+    _, path, ringing = scan_records(
         model, RK4(), quantity, sample_time, start, drive, drive_rate, lambda state, u, du: state, channels
     )
     beside = {name: table[:, 0] for name, table in channels.items()}
     reading = read_record(model, path, drive[:, 0], drive_rate[:, 0], quantity, beside)
-    return path, reading if echo is None else hear(reading, echo)
+    return path, add_ringing(reading, ringing)
 
 
 def blank_records(experiment: Experiment) -> tuple[Record, ...]:

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..models import Echo, hear
+from ..models import Ringing, add_ringing
 from ._slopes import Change, cubic_middle
 
 Matrix = list[list[Array]]
@@ -172,8 +172,9 @@ def respond(
     path = jax.lax.scan(body, start, (propagation.forward[:size], pushed[:size]))[1]
     rows = sum(d * reading[:, None] for d, reading in zip(path, readings, strict=True)) + direct
     if kicks is not None:
-        heard = zip(propagation.forward[size:], pushed[size:], strict=True)
-        rows = hear(
-            rows, Echo(*(sum((f[:, None] * d for f, d in zip(by, path, strict=True)), g) for by, g in heard))
+        read = zip(propagation.forward[size:], pushed[size:], strict=True)
+        rows = add_ringing(
+            rows,
+            Ringing(*(sum((f[:, None] * d for f, d in zip(by, path, strict=True)), g) for by, g in read)),
         )
     return rows * weight[:, None]

@@ -14,16 +14,16 @@ from jaxtyping import Array, Float
 from .._parameters import list_parameters
 from ..models import (
     RK4,
-    Echo,
     Isolator,
     Quantity,
+    Ringing,
     State,
     Table,
+    add_ringing,
     advance,
     at_stages,
-    find_echo,
     find_regime,
-    hear,
+    find_ringing,
     read_record,
     split_step,
 )
@@ -94,8 +94,8 @@ def _without_bend(mean: Float[Array, "time lanes"]) -> Float[Array, "time lanes"
 @eqx.filter_jit
 def follow_path(
     model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> tuple[State, Echo | None]:
-    """Simulate; give the states at the start of each integration step, and the echoes of jumps."""
+) -> tuple[State, Ringing | None]:
+    """Simulate; give the states at the start of each integration step, and the ringing of jumps."""
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
     drive, rate = steps_of(batch.drive), steps_of(batch.drive_rate)
@@ -105,17 +105,17 @@ def follow_path(
     step_time = sample_time / steps
     solver = RK4()
 
-    def body(state: State, table: tuple) -> tuple[State, tuple[State, Echo | None]]:
+    def body(state: State, table: tuple) -> tuple[State, tuple[State, Ringing | None]]:
         number, u, du, known = table
         stages = tuple(u[i] for i in range(3)), tuple(du[i] for i in range(3)), at_stages(known, 3)
         if not model.splits:
             return advance(current, solver, quantity, step_time, state, *stages), (state, None)
         ahead, jump = split_step(current, quantity, step_time, state, Table(*stages))
-        return ahead, (state, find_echo(jump, number, steps))
+        return ahead, (state, find_ringing(jump, number, steps))
 
     numbers = jnp.tile(jnp.arange(steps), time)
-    path, echo = jax.lax.scan(body, states, (numbers, drive, rate, channels))[1]
-    return path, jax.tree_util.tree_map(lambda one: one.reshape(time, steps, -1).sum(axis=1), echo)
+    path, ringing = jax.lax.scan(body, states, (numbers, drive, rate, channels))[1]
+    return path, jax.tree_util.tree_map(lambda one: one.reshape(time, steps, -1).sum(axis=1), ringing)
 
 
 class Change(NamedTuple):
@@ -151,7 +151,7 @@ def slopes_along(
     moving: tuple[int, ...],
     scale: Array,
     path: State,
-    echo: Echo | None,
+    ringing: Ringing | None,
     batch: Batch,
     quantity: Quantity,
 ) -> Slopes:
@@ -223,8 +223,8 @@ def slopes_along(
         now, rate = (table[:, stage] for table in coarse)
         base = present.base(now, rate, at)
         y = read_record(present, state, now, rate, quantity, at)
-        if echo is not None and stage == 0:
-            y = hear(y, echo)
+        if stage == 0:
+            y = add_ringing(y, ringing)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
     now, rate = (table[:, 0] for table in coarse)
     at = {name: table[:, 0] for name, table in beside.items()}
@@ -237,7 +237,7 @@ def slopes_along(
         rate,
         acted,
         jnp.broadcast_to(acted_rate, acted.shape),
-        sensed if echo is None else hear(sensed, echo),
+        add_ringing(sensed, ringing),
         tuple(jnp.stack(three, axis=1) for three in zip(*seen, strict=True)),
         {},
     )

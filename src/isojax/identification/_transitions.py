@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._parameters import list_parameters
-from ..models import Isolator, Quantity, State, Table, find_echo, split_step
+from ..models import Isolator, Quantity, State, Table, find_ringing, split_step
 from ._information import scaled_model
 from ._propagation import Matrix, Propagation, product
 from ._slopes import steps_of
@@ -80,7 +80,7 @@ def transitions_along(
         )
         at = Table(u, rate, channels, pushes)
         ahead, jump = split_step(current, quantity, step_time, state, at)
-        return jnp.stack([*ahead, *find_echo(jump, step_of_sample, steps)])
+        return jnp.stack([*ahead, *find_ringing(jump, step_of_sample, steps)])
 
     known = tuple(values[place] for place in moving)
     nothing = (
@@ -121,11 +121,11 @@ def _over_samples(each: list[Array], size: int) -> Transitions:
 
     def joined(onward: Matrix, so_far: Matrix) -> Matrix:
         moved = product(onward, so_far[:size])
-        heard = [
+        read = [
             [old + new for old, new in zip(*both, strict=True)]
             for both in zip(so_far[size:], moved[size:], strict=True)
         ]
-        return [*moved[:size], *heard]
+        return [*moved[:size], *read]
 
     for step, found in enumerate(each):
         onward = [[found[row, column] for column in range(size)] for row in rows]

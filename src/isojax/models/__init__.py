@@ -14,11 +14,11 @@ from ._shares import Regime as Regime
 from ._shares import share_internal as share_internal
 from ._simulate import Simulation as Simulation
 from ._simulate import simulate as simulate
-from ._split import Echo as Echo
+from ._split import Ringing as Ringing
 from ._split import Table as Table
-from ._split import find_echo as find_echo
+from ._split import add_ringing as add_ringing
 from ._split import find_regime as find_regime
-from ._split import hear as hear
+from ._split import find_ringing as find_ringing
 from ._split import split_step as split_step
 from ._storage import load_model as load_model
 from ._storage import model_to_dict as model_to_dict

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from .._types import Lanes
 from ..elements import Channels
 from ._isolator import NO_CHANNELS, Isolator, Quantity, State
-from ._split import Echo, Table, find_echo, find_regime, split_step
+from ._split import Ringing, Table, find_regime, find_ringing, split_step
 
 
 def sampled_term(model: Isolator, quantity: Quantity, sample_time: Lanes | float) -> diffrax.ODETerm:
@@ -113,7 +113,7 @@ def advance_record(
     drive: tuple[Array, ...],
     drive_rate: tuple[Array | float, ...],
     channels: tuple[Channels, ...] = (),
-) -> tuple[State, Echo | None]:
+) -> tuple[State, Ringing | None]:
     """Advance the state of a record by one sample: as `advance`, but split where a law jumps or bends.
 
     Args:
@@ -137,15 +137,15 @@ def advance_record(
     step_time = sample_time / substeps
     if substeps == 1:
         state, jump = split_step(model, quantity, step_time, state, Table(drive, drive_rate, channels))
-        return state, find_echo(jump, 0, 1)
+        return state, find_ringing(jump, 0, 1)
 
-    def body(carry: tuple[State, Echo], table: tuple) -> tuple[tuple[State, Echo], None]:
-        (state, heard), (step, *at) = carry, table
+    def body(carry: tuple[State, Ringing], table: tuple) -> tuple[tuple[State, Ringing], None]:
+        (state, so_far), (step, *at) = carry, table
         state, jump = split_step(model, quantity, step_time, state, Table(*at))
-        echo = find_echo(jump, step, substeps)
-        return (state, Echo(heard.before + echo.before, heard.after + echo.after)), None
+        ringing = find_ringing(jump, step, substeps)
+        return (state, Ringing(so_far.before + ringing.before, so_far.after + ringing.after)), None
 
-    silent = Echo(jnp.zeros_like(state[0]), jnp.zeros_like(state[0]))
+    silent = Ringing(jnp.zeros_like(state[0]), jnp.zeros_like(state[0]))
     tables = (jnp.arange(substeps), *_step_tables(drive, drive_rate, channels))
     return jax.lax.scan(body, (state, silent), tables)[0]
 
@@ -160,7 +160,7 @@ def read_record(
 ) -> Lanes:
     """Give what the sensor chain records: as `Isolator.reading`, but with laws that jump or bend as they are.
 
-    The echoes of jumps between samples are not in it: see `hear`.
+    The ringing of jumps between samples is not in it: see `add_ringing`.
 
     Args:
         model: the isolator.
@@ -200,7 +200,7 @@ def scan_records(
     drive_rate: Float[Array, "time stage lanes"] | None,
     observe: Callable[[State, Array, Array | float], Any],
     channels: dict[str, Float[Array, "time stage lanes"]] | None = None,
-) -> tuple[State, Any, Echo | None]:
+) -> tuple[State, Any, Ringing | None]:
     """Integrate records side by side and observe each sample before it is stepped over.
 
     Args:
@@ -215,7 +215,7 @@ def scan_records(
         channels: signals of the records at the same times, by name.
 
     Returns:
-        State after the last sample; the observations, time first; the echoes of jumps, None without any.
+        State after the last sample; the observations, time first; the ringing of jumps, or None.
     """
     stages = drive.shape[1]
 
@@ -225,8 +225,8 @@ def scan_records(
         du = (0.0,) * stages if slopes is None else tuple(slopes[stage] for stage in range(stages))
         kept = observe(carry, u[0], du[0])
         beside = at_stages(beside, stages)
-        ahead, echo = advance_record(model, solver, quantity, sample_time, carry, u, du, beside)
-        return ahead, (kept, echo)
+        ahead, ringing = advance_record(model, solver, quantity, sample_time, carry, u, du, beside)
+        return ahead, (kept, ringing)
 
-    last, (kept, echo) = jax.lax.scan(body, state, (drive, drive_rate, channels or {}))
-    return last, kept, echo
+    last, (kept, ringing) = jax.lax.scan(body, state, (drive, drive_rate, channels or {}))
+    return last, kept, ringing

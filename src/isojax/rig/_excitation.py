@@ -77,7 +77,7 @@ class Tones(Piece):
     @property
     def longest_step(self) -> float:
         """Half of the shortest period, s."""
-        return 2 * math.pi / 2 / max(self.angular_frequencies, default=0.1)
+        return math.pi / max(self.angular_frequencies, default=0.1)
 
     @no_type_check
     def force(self, t):
@@ -196,7 +196,7 @@ class Chirp(Piece):
     def longest_step(self) -> float:
         """Half of the shortest period, s."""
         highest = max(abs(self.frequency + self.sweep * (t - self.origin)) for t in (self.start, self.stop))
-        return 1 / 2 / (highest * max((order for order, _, _ in self.harmonics), default=1))
+        return 0.5 / (highest * max((order for order, _, _ in self.harmonics), default=1))
 
     @no_type_check
     def force(self, t):
