@@ -200,9 +200,7 @@ def test_a_broken_branch_that_comes_back_meets_no_fold_where_it_crosses(monkeypa
     )
     breaks = [point for point in branch.special_points if point.kind == "symmetry_breaking"][:2]
     monkeypatch.setattr("isojax.stability._special_points._BISECTIONS", 3)
-    jax.clear_caches()
     loop = ij.switch_branch(branch, breaks[0])
-    jax.clear_caches()
     assert bool(loop.closed)
     kinds = [point.kind for point in loop.special_points]
     doublings = ["period_doubling"] * 2

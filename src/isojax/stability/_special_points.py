@@ -107,6 +107,7 @@ def _locate(
     ends: tuple[Array, Array],
     before: Float[Array, " lane"],
     which: Int[Array, " lane"],
+    bisections: int,
 ) -> tuple[Array, Array, Array]:
     """Bisect; give the points, their matrices, and how far the two halves of each motion differ."""
 
@@ -138,7 +139,7 @@ def _locate(
             same = test * sign > 0.0
             return jnp.where(same, middle, low), jnp.where(same, high, middle)
 
-        low, high = jax.lax.fori_loop(0, _BISECTIONS, halve, (low, high))
+        low, high = jax.lax.fori_loop(0, bisections, halve, (low, high))
         found = correct(0.5 * (low + high))
         _, slope = _slopes(here, integrator, turns, scale, found)
         repeats = _repeats(here, integrator, scale, found[:states], found[states:])
@@ -203,7 +204,7 @@ def find_special_points(
     there = eqx.tree_at(lambda f: (f.amplitude, f.frequency), family, drives)
     before = jnp.asarray(tests[lane, place, which])
     found, matrices, repeats = _locate(
-        there, integrator, turns, scale[lane], ends, before, jnp.asarray(which)
+        there, integrator, turns, scale[lane], ends, before, jnp.asarray(which), _BISECTIONS
     )
     points = []
     for index in range(lanes.size):
