@@ -32,6 +32,7 @@ from _trial_campaign import CLASSES, kind_of
 from _trial_effects import COMMONEST
 from _trial_judge import line, print_table
 from _trial_run import crowded, run_one
+from isojax import compile_quickly
 
 Task = tuple[int, str, str, tuple[str, ...] | None]
 
@@ -115,6 +116,7 @@ def main() -> None:
         rows = [row for path in options.report for row in read(path)]
         sys.exit(0 if print_table(rows, options.verbose) else 1)
     jax.config.update("jax_enable_x64", True)
+    compile_quickly()
     if options.cache:
         jax.config.update("jax_compilation_cache_dir", os.fspath(options.cache))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)

@@ -4,6 +4,7 @@ from importlib.metadata import version as _version
 
 from . import elements as elements
 from . import paper as paper
+from ._compiling import compile_quickly as compile_quickly
 from ._results import RESULTS as RESULTS
 from ._results import is_successful as is_successful
 from .elements import CATALOGUE as CATALOGUE

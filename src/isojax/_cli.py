@@ -15,6 +15,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from ._compiling import compile_quickly
 from ._results import is_successful
 from .demo import campaign_folder
 from .identification import Fit, classical_guess, fit, read_campaign
@@ -57,6 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         the same), or 2 where an argument or a file is bad.
     """
     jax.config.update("jax_enable_x64", True)
+    compile_quickly()
     cache = os.environ.get("ISOJAX_CACHE")
     if cache:
         jax.config.update("jax_compilation_cache_dir", cache)
