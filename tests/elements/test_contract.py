@@ -361,3 +361,27 @@ def test_the_catalogue_holds_every_element_file():
     folder = Path(inspect.getfile(AbstractElement)).parent
     files = {path.stem[1:] for path in folder.glob("_*.py")} - {"_init__", "base"}
     assert files == set(CATALOGUE)
+
+
+TWINS = [
+    (kind, twin) for kind in CATALOGUE.values() for twin in with_strength(kind.guess(SCALES), 0.3).twins()
+]
+
+
+@pytest.mark.parametrize(("kind", "twin"), TWINS, ids=[f"{kind.name}-{twin.name}" for kind, twin in TWINS])
+def test_a_twin_is_the_law_and_a_linear_spring(kind, twin):
+    element = with_strength(kind.guess(SCALES), 0.3)
+    assert twin.name != kind.name
+    x = jnp.linspace(-2.0, 2.0, 41) * SCALES.displacement
+    v = 0.3 * SCALES.velocity * jnp.cos(jnp.arange(41.0))
+    sides = tuple(
+        tuple(jnp.where(value > 0.0, 1.0, -1.0) for value in law.corners(x, v, ())) for law in (element, twin)
+    )
+    rounded = [law.force(x, v, ()) for law in (element, twin)]
+    sharp = [law.sharp_force(x, v, (), v, side) for law, side in zip((element, twin), sides, strict=True)]
+    for one, other in (rounded, sharp):
+        apart = np.asarray(other - one)
+        slope = apart[-1] / float(x[-1])
+        np.testing.assert_allclose(apart, slope * np.asarray(x), atol=1e-9 * np.max(np.abs(apart)))
+        # Were the difference all there is, the test would say nothing.
+        assert np.max(np.abs(one - one[-1] / x[-1] * x)) > 0.05 * np.max(np.abs(one))

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from isojax import rig
+from isojax._results import RESULTS
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
-from isojax.identification import fit, scales
+from isojax.identification import diagnose, fit, scales
 from isojax.identification._fit import DEFAULT_SOLVER
 from isojax.identification._refit import is_determined, refit_candidate
 from isojax.identification._score import score_test
@@ -17,12 +18,15 @@ PLAN = rig.Multisine((150.0, 600.0), 2.0, 14.0, period=2.0, periods=2, lines="fu
 RIVALS = ("quintic_stiffness", "stribeck_friction", "end_stop", "freeplay", "quadratic_stiffness")
 
 
+def _measured(simulated, effect, rate=200.0, plan=PLAN):
+    """A plant with one effect, on the bench."""
+    bench = rig.Bench(rate=rate, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+    return simulated(PLANT.plus(effect), plan, 3, bench, stiffness=("linear", "cubic"), damping=("linear",))
+
+
 def _scored(simulated, effect, rate=200.0):
     """Score test of a few candidates on a plant with one effect."""
-    bench = rig.Bench(rate=rate, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
-    campaign = simulated(
-        PLANT.plus(effect), PLAN, 3, bench, stiffness=("linear", "cubic"), damping=("linear",)
-    )
+    campaign = _measured(simulated, effect, rate)
     found, magnitudes = fit(START, campaign), scales(campaign)
     probes = tuple(probe for name in RIVALS for probe in CATALOGUE[name].grid(magnitudes))
     return score_test(found.estimate, magnitudes, probes), magnitudes
@@ -74,3 +78,24 @@ def test_play_and_a_stop_explain_a_record_alike(simulated):
     np.testing.assert_allclose(
         float(play.model["freeplay.gap"]), float(stop.model["end_stop.gap"]), rtol=0.02
     )
+
+
+@pytest.mark.slow
+def test_play_is_reported_with_the_stop_even_where_the_search_for_the_stop_fails(simulated, monkeypatch):
+    def lost(test, index, *others):
+        if test.scores[index].element.name == "end_stop":
+            return test.fitted._replace(result=RESULTS.outdone)
+        return refit_candidate(test, index, *others)
+
+    monkeypatch.setattr("isojax.identification._diagnose.refit_candidate", lost)
+    # Enough levels that the gap carries over to each from the others.
+    plan = rig.Multisine((300.0, 450.0, 600.0), 2.0, 14.0, period=2.0, periods=4, lines="full")
+    campaign = _measured(simulated, rig.Freeplay(1e5, 5e-4), plan=plan)
+    excluded = tuple(name for name in CATALOGUE if name not in RIVALS)
+    verdict = diagnose(fit(START, campaign), excluded=excluded)
+    assert verdict.finding is not None
+    assert verdict.finding.effect == "freeplay"
+    assert verdict.indistinguishable == ("end_stop",)
+    (stop,) = verdict.finding.rivals
+    assert float(stop.gap) == pytest.approx(5e-4, rel=0.05)
+    assert float(stop.stiffness) == pytest.approx(1e5, rel=0.2)

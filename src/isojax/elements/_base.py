@@ -164,6 +164,16 @@ class AbstractElement(eqx.Module):
         """
         return None
 
+    def twins(self) -> "tuple[AbstractElement, ...]":
+        """Give the laws of other kinds that leave the very same trace beside a free linear spring.
+
+        No search need find them: what is proved of the law holds whatever the records are.
+
+        Returns:
+            Elements of other kinds, with the shape and strength that make them this one.
+        """
+        return ()
+
     def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
         """Give the functions of the state at whose zeros the law is continuous but not smooth.
 

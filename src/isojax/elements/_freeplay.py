@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
 from ._base import AbstractElement, Scales
+from ._end_stop import EndStop
 
 
 class Freeplay(AbstractElement):
@@ -65,6 +66,10 @@ class Freeplay(AbstractElement):
     def typical_strength(cls, scales: Scales) -> float:
         """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
+
+    def twins(self) -> tuple[AbstractElement, ...]:
+        """See `AbstractElement.twins`: the two-sided stop, whose linear spring is softer by K."""
+        return (EndStop(self.lost_stiffness, self.gap, 0.0, self.width),)
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
         """See `AbstractElement.force`."""

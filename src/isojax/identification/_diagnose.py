@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from .._results import RESULTS
-from ..elements import CATALOGUE, Scales
+from ..elements import CATALOGUE, AbstractElement, Scales
 from ._admissible import find_violation
 from ._balance_start import find_balance_start
 from ._bounds import GOOD, upper_bounds
@@ -284,6 +284,13 @@ def _needed_share(fitted: Estimate) -> float:
     return 0.0 if fitted.chi2 / fitted.dof <= GOOD else SMALLEST_SHARE
 
 
+def _twins(best: Refit) -> tuple[AbstractElement, ...]:
+    """Give the laws that are the finding's own by another name, whether their search got there or not."""
+    found = best.estimate
+    element = found.model.element(best.score.element.name)
+    return element.twins() if element is not None and "linear_stiffness.coefficient" in found.names else ()
+
+
 def _found(
     fit: Fit,
     test: ScoreTest,
@@ -309,6 +316,8 @@ def _found(
             or (np.isnan(entry.delta_bic) and abs(entry.likeness) > CLOSE_LIKENESS)
         )
     )
+    twins = tuple(twin for twin in _twins(best) if any(twin.name == entry.effect for entry in ranking))
+    together += tuple(twin.name for twin in twins if twin.name not in together)
     finding = Finding(
         name,
         together,
@@ -317,7 +326,7 @@ def _found(
         share,
         ranking,
         separating_experiment(name, together),
-        rivals(test.scores, usable, together),
+        rivals(test.scores, usable, twins, together),
     )
     good = is_good(best.estimate.chi2 / best.estimate.dof, best.estimate.excess, first_excess)
     if good and (is_clean(fitted, best.estimate) or explained >= MOST_OF_IT):

@@ -308,13 +308,17 @@ def follows_freely(fitted: Estimate, found: Estimate) -> bool:
 
 
 def rivals(
-    scores: tuple[Score, ...], refits: list[Refit], names: tuple[str, ...]
+    scores: tuple[Score, ...],
+    refits: list[Refit],
+    twins: tuple[AbstractElement, ...],
+    names: tuple[str, ...],
 ) -> tuple[AbstractElement, ...]:
     """Give effects as they imitate another: refitted where they were, else with the shape of their score.
 
     Args:
         scores: the scores of all absent effects.
         refits: those that were refitted.
+        twins: effects that are the other by another name.
         names: catalogue names of the effects.
 
     Returns:
@@ -325,4 +329,5 @@ def rivals(
         element = refit.estimate.model.element(refit.score.element.name)
         if element is not None:
             shapes[element.name] = element
+    shapes.update({twin.name: twin for twin in twins})
     return tuple(shapes[name] for name in names)
