@@ -16,8 +16,6 @@ _COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
 """Compiled code of this run: its workers, their modules and the processes that tests start share it."""
 
 os.environ["JAX_COMPILATION_CACHE_DIR"] = _COMPILED
-# Compiling is most of what the tests do, and without these emitters it takes half as long.
-os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --xla_cpu_use_fusion_emitters=false".strip()
 jax.config.update("jax_compilation_cache_dir", _COMPILED)
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 jax.config.update("jax_enable_x64", True)
@@ -38,6 +36,13 @@ def _let_compiled_code_go() -> Iterator[None]:
     if mappings.exists() and len(mappings.read_bytes().splitlines()) > _MOST_MAPPINGS:
         jax.clear_caches()
         gc.collect()
+
+
+def pytest_configure() -> None:
+    """Compile quickly, which is most of what tests do; here, because the hook above must see the import."""
+    from isojax import compile_quickly
+
+    compile_quickly()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

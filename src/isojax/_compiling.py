@@ -4,7 +4,7 @@ import os
 
 import jaxlib.version
 
-_KNOWN = (0, 11)
+_UNTRIED = (0, 11)
 """First jaxlib that was not tried: a flag that XLA does not know ends the process."""
 
 _FLAG = "--xla_cpu_use_fusion_emitters"
@@ -22,7 +22,7 @@ def compile_quickly() -> bool:
         newer than was tried.
     """
     flags = os.environ.get("XLA_FLAGS", "")
-    if _FLAG in flags or jaxlib.version.__version_info__ >= _KNOWN:
+    if _FLAG in flags or jaxlib.version.__version_info__ >= _UNTRIED:
         return f"{_FLAG}=false" in flags
     os.environ["XLA_FLAGS"] = f"{flags} {_FLAG}=false".strip()
     return True
