@@ -7,8 +7,8 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
+from . import _end_stop
 from ._base import AbstractElement, Scales
-from ._end_stop import EndStop
 
 
 class Freeplay(AbstractElement):
@@ -69,7 +69,7 @@ class Freeplay(AbstractElement):
 
     def twins(self) -> tuple[AbstractElement, ...]:
         """See `AbstractElement.twins`: the two-sided stop, whose linear spring is softer by K."""
-        return (EndStop(self.lost_stiffness, self.gap, 0.0, self.width),)
+        return (_end_stop.EndStop(self.lost_stiffness, self.gap, 0.0, self.width),)
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
         """See `AbstractElement.force`."""
