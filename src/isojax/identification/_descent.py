@@ -19,8 +19,9 @@ from ._problem import Bench, Point, one_hot
 FIRST_DAMPING = 1e-5
 """Marquardt's damping at the first step, over the diagonal of the normal equations: starts are good."""
 
-MOST_REFUSALS = 8
-"""Refused steps in a row after which the search stops."""
+MOST_REFUSALS = 10
+"""Refused steps in a row after which the search stops. Each counts for more than the one before, so that the
+last is 4^18 times shorter than the first (but for what the damping was): no descent is left untried."""
 
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
@@ -194,7 +195,7 @@ def descend(
         if state is None:
             scaled = trial / unit
             state = _init(solver, scaled, local)
-        for _ in range(1 if point.is_finite else SHRINKS):
+        for _ in range(1 + refused // 4 if point.is_finite else max(SHRINKS, 1 + refused // 4)):
             scaled, state = _step(solver, scaled, local, state)
         accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
@@ -213,14 +214,16 @@ def descend(
         reached.append(best.chi2)
         levels += [best.chi2] if accepted else []
         # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
+        # Where records are split the error itself has kinks, and a slope on either side of its least.
         idle = _gain(levels, IDLE) < tolerance * max(1.0, chi2)
+        is_least = decrement < STALLED * best.chi2 or model.splits
         if rival is not None:
             behind = best.chi2 - rival.chi2
             if behind > rival.far and _gain(reached, rival.patience) < rival.share * behind:
                 result = RESULTS.outdone
                 break
-        if refused == MOST_REFUSALS or (idle and decrement < STALLED * best.chi2):
-            result = RESULTS.successful if decrement < STALLED * best.chi2 else RESULTS.not_converged
+        if refused == MOST_REFUSALS or (idle and is_least):
+            result = RESULTS.successful if is_least else RESULTS.not_converged
             break
         if bool(state.terminate):
             result = RESULTS.successful

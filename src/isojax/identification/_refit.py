@@ -17,6 +17,7 @@ from ._elimination import Nuisances
 from ._errors import run_freely
 from ._estimate import Estimate, estimate
 from ._information import has_stiffness_scale
+from ._lengthening import fit_lengthening_windows
 from ._problem import one_hot
 from ._score import Score, ScoreTest
 
@@ -128,12 +129,7 @@ def refit_from(
     Returns:
         The refit.
     """
-    known = {entry.name for entry in list_parameters(fitted.model)}
-    places = tuple(
-        place
-        for place, entry in enumerate(list_parameters(model))
-        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
-    )
+    places = _shared_places(fitted, model)
     # The scatter of a stiffness that the fitted model lacks is still to be found.
     nuisances = None
     if has_stiffness_scale(fitted.model) == has_stiffness_scale(model):
@@ -152,6 +148,43 @@ def refit_from(
         max_steps=max_steps,
         progress=progress,
         tolerance=_rough(fitted),
+    )
+
+
+def refit_from_far(
+    fitted: Estimate,
+    model: Isolator,
+    scales: Scales,
+    solver: Any,
+    max_steps: int,
+    progress: Callable[[str], None],
+) -> Estimate:
+    """As `refit_from`, but where records are left whole windows of them are fitted first.
+
+    Args:
+        fitted: the estimate whose records and free coefficients count.
+        model: the start; elements that the estimate lacks have all their fitted kinds free.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations at most, those of the windows not counted.
+        progress: told a line a step.
+
+    Returns:
+        The refit.
+    """
+    if fitted.bench.problem.heads:
+        places, tolerance = _shared_places(fitted, model), _rough(fitted)
+        model = fit_lengthening_windows(fitted, model, places, scales, solver, tolerance, progress)
+    return refit_from(fitted, model, scales, solver, max_steps, progress)
+
+
+def _shared_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
+    """Give the coefficients that are free in a model that shares some with a fitted one."""
+    known = {entry.name for entry in list_parameters(fitted.model)}
+    return tuple(
+        place
+        for place, entry in enumerate(list_parameters(model))
+        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
     )
 
 

@@ -1,6 +1,7 @@
 """Where each record is cut, so that every piece can start from its own measured state."""
 
 import itertools
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import jax
@@ -12,6 +13,10 @@ from ..records import Record
 
 MEMORIES_A_WINDOW = 25.0
 """A window of so many decay times loses less than a tenth of its information to its free start."""
+
+
+SHORTEST = 8
+"""Samples below which a piece of a record says nothing."""
 
 
 class Segment(NamedTuple):
@@ -68,11 +73,37 @@ def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment,
         else:
             window = count if decay == 0.0 else max(400, int(MEMORIES_A_WINDOW / decay * record.rate))
             pieces = max(1, count // window)
-            edges = np.linspace(0, count, (pieces if pieces >= 4 else 1) + 1).astype(int)
-            bounds = list(itertools.pairwise(edges))
-        segments += [
-            Segment(place, int(start), int(stop), min(max(int(start), record.settle), int(stop)))
-            for start, stop in bounds
-            if stop - start >= 8 and record.settle < stop
-        ]
+            bounds = cut_evenly(count, pieces if pieces >= 4 else 1)
+        segments += segments_between(place, record, bounds)
     return tuple(segments)
+
+
+def cut_evenly(count: int, pieces: int) -> list[tuple[int, int]]:
+    """Cut samples into windows of one length.
+
+    Args:
+        count: samples.
+        pieces: windows.
+
+    Returns:
+        First sample of each window, and the sample after its last.
+    """
+    return list(itertools.pairwise(np.linspace(0, count, pieces + 1).astype(int).tolist()))
+
+
+def segments_between(place: int, record: Record, bounds: Iterable[tuple[int, int]]) -> list[Segment]:
+    """Give the pieces of a record between given samples; those that say nothing are left out.
+
+    Args:
+        place: place of the record among the records.
+        record: the record.
+        bounds: first sample of each piece, and the sample after its last.
+
+    Returns:
+        Segments.
+    """
+    return [
+        Segment(place, int(start), int(stop), min(max(int(start), record.settle), int(stop)))
+        for start, stop in bounds
+        if stop - start >= SHORTEST and record.settle < stop
+    ]
