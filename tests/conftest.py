@@ -39,10 +39,14 @@ def _let_compiled_code_go() -> Iterator[None]:
 
 
 def pytest_configure() -> None:
-    """Compile quickly, which is most of what tests do; here, because the hook above must see the import."""
+    """Compile quickly, which is most of what tests do; here, because the hook above must see the import.
+
+    Nor is the code optimised: small records run no slower than they would compile.
+    """
     from isojax import compile_quickly
 
-    compile_quickly()
+    if compile_quickly() and "_optimization_level" not in os.environ["XLA_FLAGS"]:
+        os.environ["XLA_FLAGS"] += " --xla_backend_optimization_level=0"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
