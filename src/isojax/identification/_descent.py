@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .._parameters import ParameterSpec, list_parameters, replace_parameters, to_free, to_physical
 from .._results import RESULTS
@@ -22,6 +22,9 @@ FIRST_DAMPING = 1e-5
 MOST_REFUSALS = 10
 """Refused steps in a row after which the search stops. Each counts for more than the one before, so that the
 last is 4^18 times shorter than the first (but for what the damping was): no descent is left untried."""
+
+DOUBTFUL = 5
+"""Refused steps in a row after which the nuisances of the best point are asked to keep what they promised."""
 
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
@@ -228,12 +231,32 @@ def descend(
         if bool(state.terminate):
             result = RESULTS.successful
             break
-        trial = state.y_eval * unit
         assert best is not None
         owner = bench.prepared(best.model, len(best.model.elements)).record
+        if refused == DOUBTFUL and evaluations < max_steps - 1:
+            settled = _settled(bench, best, places, physical(best_free)[1], owner)
+            evaluations += 1
+            if settled.is_finite and settled.chi2 - best.chi2 > tolerance * max(1.0, chi2):
+                progress("the best point promised too much: again from where its nuisances come to lie")
+                trial, trial_nuisances, best, state, refused = best_free, settled.nuisances, None, None, 0
+                continue
+        trial = state.y_eval * unit
         trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
     assert best is not None
     return Descent(_in_physical_units(best, physical(best_free)[1]), result, evaluations)
+
+
+def _settled(
+    bench: Bench, best: Point, places: tuple[int, ...], slopes: list[float], owner: Int[np.ndarray, " lanes"]
+) -> Point:
+    """Give a point again with the nuisances that it implies.
+
+    Its chi2 is that at the end of one linear step of the initial states. From far, that step promises what no
+    later point reaches, however short the step of the coefficients.
+    """
+    still = np.zeros(len(places))
+    moved = step_nuisances(best.reduced, owner, best.nuisances, still)
+    return bench.evaluate(best.model, one_hot(best.model, places, slopes), moved)
 
 
 def _gain(reached: list[float], evaluations: int) -> float:

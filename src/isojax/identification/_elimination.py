@@ -146,7 +146,9 @@ def eliminate(
         stiffness_map, variance = row / pivot[:, None], STIFFNESS_SCALE_UNIT**2 / pivot
         reduced = np.delete(np.delete(per_record, columns, axis=1), columns, axis=2)
         reduced[:, -1, -1] += (nuisances.stiffness / spread) ** 2
-        reduced = reduced - stiffness_map[:, :, None] * row[:, None, :]
+        # Of a simulation that ran away, finite or not, nothing is asked but that it did.
+        with np.errstate(over="ignore", invalid="ignore"):
+            reduced = reduced - stiffness_map[:, :, None] * row[:, None, :]
         eliminated += 1.0 - 1.0 / (pivot * spread**2)
     raw = np.diagonal(matrices, axis1=1, axis2=2).sum(axis=0)[:columns]
     return Reduced(reduced, eliminated, raw, stiffness_map, variance, states_map)
