@@ -1,12 +1,15 @@
 """The positioning axis of EMPS, measured by others: dry friction is found and its free run is right."""
 
-import json
+import sys
+from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from isojax.elements import CATALOGUE
 from isojax.identification import close_loop
 from isojax.records import read_campaign
+from measured import EMPS
 
 RIVALS = {
     "coulomb_friction",
@@ -20,35 +23,8 @@ RIVALS = {
 
 
 def test_dry_friction_is_found_and_the_axis_followed_without_a_spring_to_hold_it(shared_data, tmp_path):
-    data = shared_data / "emps" / "DATA_EMPS.mat"
-    (tmp_path / "campaign.toml").write_text(
-        f"""
-[campaign]
-title = "EMPS"
-mass = 95.0
-mass_free = true
-[input]
-quantity = "force"
-column = "vir"
-unit = "V"
-gain = 35.15065
-offset_free = true
-[output]
-quantity = "displacement"
-column = "qm"
-unit = "m"
-[sampling]
-rate = 1000.0
-time = "t"
-[model]
-stiffness = []
-damping = ["linear"]
-[[record]]
-file = {json.dumps(str(data))}
-role = "fit"
-settle = 2000
-"""
-    )
+    declaration = EMPS.format(data=shared_data.as_posix(), settle=2000)
+    (tmp_path / "campaign.toml").write_text(declaration, encoding="utf-8")
     loop = close_loop(
         read_campaign(tmp_path), max_iterations=1, excluded=tuple(sorted(set(CATALOGUE) - RIVALS))
     )

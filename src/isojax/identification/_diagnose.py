@@ -25,7 +25,7 @@ from ._refit import (
     is_determined,
     polish,
     refit_candidate,
-    refit_from_far,
+    refit_from,
     rivals,
 )
 from ._scales import scales as campaign_scales
@@ -224,7 +224,7 @@ def _refit_from_balance(
     if start is None:
         return None
     progress(f"refit with {start.element.name}, from the balance of measured forces")
-    found = refit_from_far(fit.estimate, start.model, scales, solver, max_steps, progress)
+    found = refit_from(fit.estimate, start.model, scales, solver, max_steps, progress, far=True)
     score = next(one for one in test.scores if one.element.name == start.element.name)
     # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
     drop = max(0.0, fit.estimate.chi2 - found.chi2) / max(1.0, found.chi2 / found.dof)

@@ -115,6 +115,7 @@ def refit_from(
     solver: Any,
     max_steps: int,
     progress: Callable[[str], None],
+    far: bool = False,
 ) -> Estimate:
     """Fit a model that shares coefficients with a fitted one, everything free, from its own numbers.
 
@@ -125,11 +126,14 @@ def refit_from(
         solver: an optimistix least-squares solver.
         max_steps: evaluations at most.
         progress: told a line a step.
+        far: whether the start may be far off: windows of records that are left whole are then fitted first.
 
     Returns:
         The refit.
     """
     places = _shared_places(fitted, model)
+    if far and fitted.bench.problem.heads:
+        model = fit_lengthening_windows(fitted, model, places, scales, solver, _rough(fitted), progress)
     # The scatter of a stiffness that the fitted model lacks is still to be found.
     nuisances = None
     if has_stiffness_scale(fitted.model) == has_stiffness_scale(model):
@@ -149,33 +153,6 @@ def refit_from(
         progress=progress,
         tolerance=_rough(fitted),
     )
-
-
-def refit_from_far(
-    fitted: Estimate,
-    model: Isolator,
-    scales: Scales,
-    solver: Any,
-    max_steps: int,
-    progress: Callable[[str], None],
-) -> Estimate:
-    """As `refit_from`, but where records are left whole windows of them are fitted first.
-
-    Args:
-        fitted: the estimate whose records and free coefficients count.
-        model: the start; elements that the estimate lacks have all their fitted kinds free.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        max_steps: evaluations at most, those of the windows not counted.
-        progress: told a line a step.
-
-    Returns:
-        The refit.
-    """
-    if fitted.bench.problem.heads:
-        places, tolerance = _shared_places(fitted, model), _rough(fitted)
-        model = fit_lengthening_windows(fitted, model, places, scales, solver, tolerance, progress)
-    return refit_from(fitted, model, scales, solver, max_steps, progress)
 
 
 def _shared_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
