@@ -20,8 +20,8 @@ FIRST_DAMPING = 1e-5
 """Marquardt's damping at the first step, over the diagonal of the normal equations: starts are good."""
 
 MOST_REFUSALS = 10
-"""Refused steps in a row after which the search stops. Each counts for more than the one before, so that the
-last is 4^18 times shorter than the first (but for what the damping was): no descent is left untried."""
+"""Refused steps in a row after which the search stops. The later ones count for several, so that the last has
+4^15 times the damping of the first: no descent is left untried."""
 
 DOUBTFUL = 5
 """Refused steps in a row after which the nuisances of the best point are asked to keep what they promised."""
@@ -198,9 +198,11 @@ def descend(
         if state is None:
             scaled = trial / unit
             state = _init(solver, scaled, local)
-        for _ in range(1 + refused // 4 if point.is_finite else max(SHRINKS, 1 + refused // 4)):
-            scaled, state = _step(solver, scaled, local, state)
         accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
+        # Only a refusal may count for several: an accepted point is one step on.
+        refusals = 1 if accepted else max(1 if point.is_finite else SHRINKS, 1 + refused // 4)
+        for _ in range(refusals):
+            scaled, state = _step(solver, scaled, local, state)
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
         progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
         if best is None or accepted:
@@ -239,6 +241,8 @@ def descend(
             if settled.is_finite and settled.chi2 - best.chi2 > tolerance * max(1.0, chi2):
                 progress("the best point promised too much: again from where its nuisances come to lie")
                 trial, trial_nuisances, best, state, refused = best_free, settled.nuisances, None, None, 0
+                # What was promised is no measure of what is gained from here on.
+                reached, levels = [], []
                 continue
         trial = state.y_eval * unit
         trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))

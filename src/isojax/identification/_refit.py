@@ -131,7 +131,12 @@ def refit_from(
     Returns:
         The refit.
     """
-    places = _shared_places(fitted, model)
+    known = {entry.name for entry in list_parameters(fitted.model)}
+    places = tuple(
+        place
+        for place, entry in enumerate(list_parameters(model))
+        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
+    )
     if far and fitted.bench.problem.heads:
         model = fit_lengthening_windows(fitted, model, places, scales, solver, _rough(fitted), progress)
     # The scatter of a stiffness that the fitted model lacks is still to be found.
@@ -152,16 +157,6 @@ def refit_from(
         max_steps=max_steps,
         progress=progress,
         tolerance=_rough(fitted),
-    )
-
-
-def _shared_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
-    """Give the coefficients that are free in a model that shares some with a fitted one."""
-    known = {entry.name for entry in list_parameters(fitted.model)}
-    return tuple(
-        place
-        for place, entry in enumerate(list_parameters(model))
-        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
     )
 
 
