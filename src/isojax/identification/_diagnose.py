@@ -15,7 +15,7 @@ from ._descent import Rival
 from ._estimate import Estimate
 from ._evidence import CLOSE_BIC, by_evidence, least_difference, rank_candidates, smallest_inflation
 from ._findings import Candidate, Finding, Verdict
-from ._fit import DEFAULT_SOLVER, Fit, silent
+from ._fit import DEFAULT_SOLVER, MOST_STEPS, Fit, silent
 from ._look_ahead import outdone_by_two
 from ._refit import (
     SMALLEST_GAIN,
@@ -91,7 +91,7 @@ def diagnose(
     significance: float = 0.01,
     excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
-    max_steps: int = 40,
+    max_steps: int = MOST_STEPS,
     progress: Callable[[str], None] = silent,
 ) -> Verdict:
     """Name the effect that a fitted model lacks, with its evidence; or say that it lacks none.
@@ -104,7 +104,7 @@ def diagnose(
         significance: family-wise level of the score test.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver for the refits.
-        max_steps: evaluations a refit at most; twice as many from the balance of forces.
+        max_steps: evaluations a refit at most.
         progress: told a line a step.
 
     Returns:
@@ -224,8 +224,7 @@ def _refit_from_balance(
     if start is None:
         return None
     progress(f"refit with {start.element.name}, from the balance of measured forces")
-    # From far, and past the kinks that a law with jumps puts into the error, the way is longer.
-    found = refit_from(fit.estimate, start.model, scales, solver, 2 * max_steps, progress, far=True)
+    found = refit_from(fit.estimate, start.model, scales, solver, max_steps, progress, far=True)
     score = next(one for one in test.scores if one.element.name == start.element.name)
     # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
     drop = max(0.0, fit.estimate.chi2 - found.chi2) / max(1.0, found.chi2 / found.dof)
