@@ -25,8 +25,8 @@ from ._steps import find_integrator
 DEFAULT_SOLVER = eqx.tree_at(
     lambda solver: solver.search,
     optx.LevenbergMarquardt(rtol=1e-9, atol=1e-9),
-    # optimistix lowers the damping after a step that keeps 99 % of its promise only. Along the curved valley of
-    # coefficients that the records hardly tell apart no step does, and the search would creep.
+    # optimistix lowers the damping after a step that keeps 99 % of its promise only. Along the curved valley
+    # of coefficients that the records hardly tell apart no step does, and the search would creep.
     optx.ClassicalTrustRegion(high_cutoff=0.75),
 )
 """Levenberg-Marquardt whose damping falls where a step keeps three quarters of what it promised.
