@@ -7,7 +7,7 @@ import pytest
 
 from isojax import rig
 from isojax._parameters import list_parameters
-from isojax.elements import CATALOGUE, LinearDamping, LinearStiffness
+from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.identification import fit, scales
 from isojax.identification._admissible import find_violation
 from isojax.identification._fit import DEFAULT_SOLVER, silent
@@ -111,3 +111,18 @@ def test_its_coefficients_come_back_within_their_errors(case, simulated):
         value, error = values[field]
         assert abs(value - truth) < 3.5 * error
         assert error < 0.3 * truth
+
+
+@pytest.mark.slow
+def test_a_coupled_channel_leaves_the_springs_as_they_are(simulated):
+    """The leak that makes the absent effect computable must not show in what is fitted beside it."""
+    laws = rig.LinearStiffness(1.08e6), rig.CubicStiffness(2.5e11), rig.LinearDamping(1e4)
+    plant = rig.Plant(laws).plus(rig.AcCoupling(0.05))
+    plan = rig.SteppedSine((60.0, 150.0), (4.5, 5.0, 5.5, 6.0), 20, ("forward",))
+    quiet = rig.Bench(rate=250.0, noise=1e-5, drift=0.0, force_noise=0.0, tolerance=1e-9)
+    campaign = simulated(plant, plan, 3, quiet, stiffness=("linear", "cubic"), damping=("linear",))
+    springs = LinearStiffness(1.08e6), CubicStiffness(2.5e11), LinearDamping(1e4)
+    start = Isolator(800.0, (*springs, CATALOGUE["ac_coupling"].guess(scales(campaign))))
+    found = fit(start.replace(ac_coupling__corner=0.05), campaign).model
+    assert float(found["ac_coupling.corner"]) == pytest.approx(0.05, rel=2e-3)
+    assert float(found["cubic_stiffness.coefficient"]) == pytest.approx(2.5e11, rel=2e-3)

@@ -14,8 +14,8 @@ class AcCoupling(AbstractElement):
     `y -> y - wc s`, `s' = y - (wc + wl) s`, `wc = 2 pi fc`, `wl = 2 pi fl`: the response
     `(i w + wl) / (i w + wc + wl)`, a high-pass `i w / (i w + wc)` but for the declared leak fl. Without it s
     would be the plain integral of the reading where the effect is absent, and grow from any constant in it.
-    With fl a fiftieth of the excited frequency s forgets within some ten cycles, and the phase lead `wc / w`
-    in the excited band is `fl^2 / f^2`, 0.04 %, short.
+    In the excited band the leak adds `-fc fl / f^2` to the gain, which a fit puts into the other coefficients:
+    with fl a 500th of the excited frequency, which forgets within some hundred cycles, less than the noise.
 
     Attributes:
         corner: fc [Hz].
@@ -35,7 +35,7 @@ class AcCoupling(AbstractElement):
     @classmethod
     def guess(cls, scales: Scales) -> "AcCoupling":
         """See `AbstractElement.guess`."""
-        return cls(0.0, 0.02 * scales.angular_frequency / (2.0 * math.pi))
+        return cls(0.0, 0.002 * scales.angular_frequency / (2.0 * math.pi))
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
