@@ -30,7 +30,9 @@ TRIES = 4
 """Times that the size is halved where the plant runs away."""
 
 
-def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = None) -> Row:
+def run_one(
+    seed: int, kind: str, task: str, names: tuple[str, ...] | None = None, beside_oracle: bool = True
+) -> Row:
     """Draw a campaign, do a task on it, and say all that the judge needs.
 
     Args:
@@ -39,6 +41,7 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
         task: "loop" (diagnosed blind), "leave_out" (the true effect is no candidate), "coverage" (the true
             structure fitted, nothing diagnosed) or "wall_time" (a loop by the clock, twice).
         names: what is hidden, drawn if omitted; of "wall_time" the sampling rate [Hz].
+        beside_oracle: whether the true structure is fitted as well.
 
     Returns:
         What goes into a line of the output file; "error" where something raised.
@@ -59,7 +62,8 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
         elif task == "leave_out":
             excluded = exact_class(hidden[0].name)
             row |= {"excluded": excluded} | _said_of(close_loop(campaign, excluded=excluded))
-        if kind != "outside" and (task == "coverage" or (kind != "none" and task == "loop")):
+        known = kind not in ("none", "outside")
+        if beside_oracle and known and task in ("coverage", "loop"):
             row |= _oracle(drawn, hidden, campaign, with_errors=task == "loop")
     except Exception as problem:  # one campaign that fails is a failure of the trial, not its end
         row["error"] = "".join(traceback.format_exception(problem))[-2000:]

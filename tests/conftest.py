@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import jax
+import jaxtyping
 import pytest
-from jaxtyping import install_import_hook
 
 _ALREADY = os.environ.get("JAX_COMPILATION_CACHE_DIR")
 _COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
@@ -20,7 +20,7 @@ jax.config.update("jax_compilation_cache_dir", _COMPILED)
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
-install_import_hook("isojax", "beartype.beartype")
+jaxtyping.install_import_hook("isojax", "beartype.beartype")
 
 
 _MOST_MAPPINGS = 40_000
@@ -38,20 +38,47 @@ def _let_compiled_code_go() -> Iterator[None]:
         gc.collect()
 
 
-def pytest_configure() -> None:
-    """Compile quickly, which is most of what tests do; here, because the hook above must see the import.
-
-    Nor is the code optimised: small records run no slower than they would compile.
-    """
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile quickly, which is most of what tests do; here, because the hook above must see the import."""
+    if config.getoption("numprocesses") and not hasattr(config, "workerinput"):
+        return  # who only hands out tests needs no package, which takes long to import with its checks
     from isojax import compile_quickly
 
-    if compile_quickly() and "_optimization_level" not in os.environ["XLA_FLAGS"]:
-        os.environ["XLA_FLAGS"] += " --xla_backend_optimization_level=0"
+    compile_quickly()
+
+
+_WORTH_OPTIMISING = ("stability", "test_cli_map", "test_stability_figures", "test_paper")
+"""Tests that run longer than they compile: orbits, branches and maps."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Optimise compiled code, and check shapes, where that is worth its time; before any fixture is made.
+
+    Small records run no slower than they would compile. Slow tests call again what the others check, with
+    the annotations looked up at every call of the hundred thousands that tracing takes.
+    """
+    optimise = any(part in item.nodeid for part in _WORTH_OPTIMISING)
+    jax.config.update("jax_disable_most_optimizations", not optimise)
+    jaxtyping.config.update("jaxtyping_disable", item.get_closest_marker("slow") is not None)
+
+
+_LONGEST = (
+    "test_blind_sample.py",
+    "test_fold_curve.py",
+    "test_special_points.py",
+    "test_orbit.py",
+    "test_cli.py",
+    "test_notebooks.py",
+    "test_transients.py",
+)
+"""Files that take minutes, the longest first."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the file that takes longest: no worker is then left alone with it at the end."""
-    items.sort(key=lambda item: item.path.name != "test_blind_sample.py")
+    """Begin with the files that take longest: no worker is then left alone with one at the end."""
+    places = {name: place for place, name in enumerate(_LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.name, len(places)))
 
 
 def pytest_sessionfinish() -> None:

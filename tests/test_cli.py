@@ -127,6 +127,7 @@ def failing_campaign(folder):
     return campaign
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "file"), [("fit", "fit.txt"), ("close-loop", "report.html")])
 def test_a_fit_that_failed_ends_with_code_one_and_its_report_says_so(
     command, file, tmp_path, capsys, monkeypatch

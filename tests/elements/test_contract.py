@@ -346,6 +346,7 @@ def closed(model):
     return multipliers(jax.jacfwd(moved)(state)), (moved(state) - state)[:2]
 
 
+@pytest.mark.slow
 @every_element
 def test_an_orbit_of_the_isolator_with_the_effect_has_finite_multipliers(kind):
     # All other effects absent: one compilation serves all elements.

@@ -69,6 +69,7 @@ def held_response(drive: np.ndarray, kind: str) -> np.ndarray:
     return y[drive.size :, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "order"), [("zoh", 0.0), ("foh", 1.0)])
 def test_a_hold_other_than_declared_is_named_with_a_share_of_one(campaign_of, kind, order):
     rng = np.random.default_rng(1)
@@ -189,6 +190,7 @@ def test_the_score_of_a_chosen_phase_is_normal_where_there_is_only_noise():
     assert abs(np.mean(scores)) < 0.2
 
 
+@pytest.mark.slow
 def test_a_cubic_spring_is_still_a_cubic_spring(campaign_of):
     # The effects that follow a record's signals take nothing from the laws of the motion.
     drive = multisine(3)

@@ -126,6 +126,7 @@ def test_a_known_mass_parts_a_mass_error_from_a_gain_as_far_as_promised(heavier)
     assert 0.5 < apart / promised < 2.0
 
 
+@pytest.mark.slow
 def test_a_lopsided_spring_is_parted_from_an_offset_by_a_mean_as_far_as_promised(
     lopsided, simulated, campaign_of
 ):

@@ -190,6 +190,7 @@ def _deviation(found: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.max(np.abs(found - wanted) / np.outer(size, size)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_information_is_that_of_a_dense_jacobian(name):
     case = CASES[name]

@@ -120,6 +120,7 @@ def test_a_spring_that_the_declared_model_lacks_is_found_from_afar(plan, bench, 
     assert verdict.refit.chi2 / verdict.refit.dof == pytest.approx(1.0, abs=GOOD - 1.0)
 
 
+@pytest.mark.slow
 def test_no_bound_is_given_beside_a_fit_that_is_not_good(simulated):
     campaign = simulated(
         LINEAR.plus(rig.CoulombFriction(8.0)), PLAN, 3, BENCH, stiffness=("linear",), damping=("linear",)

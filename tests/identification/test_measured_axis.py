@@ -22,6 +22,7 @@ RIVALS = {
 """Effects that are weighed here; the whole catalogue is in the benchmark of measured records."""
 
 
+@pytest.mark.slow
 def test_dry_friction_is_found_and_the_axis_followed_without_a_spring_to_hold_it(shared_data, tmp_path):
     declaration = EMPS.format(data=shared_data.as_posix(), settle=2000)
     (tmp_path / "campaign.toml").write_text(declaration, encoding="utf-8")

@@ -18,6 +18,7 @@ PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1.03e4)), 800.
 PLAN = rig.SteppedSine((80.0,), (4.5, 5.5, 6.5), 12)
 
 
+@pytest.mark.slow
 def test_a_measured_floor_is_named_with_its_share(simulated):
     campaign = simulated(PLANT.plus(rig.FloorMotion(0.7, 0.02)), PLAN, seed=3)
     verdict = diagnose(fit(BASE, campaign))

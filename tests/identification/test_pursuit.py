@@ -25,6 +25,7 @@ def left_by(simulated):
     return describe
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "formula"), [(Grip(3e6), "|x| v"), (Governor(6e6), "x |v|")])
 def test_a_law_outside_the_catalogue_is_pursued_with_its_coefficient(left_by, law, formula):
     pursuit = left_by(law)
@@ -37,6 +38,7 @@ def test_a_law_outside_the_catalogue_is_pursued_with_its_coefficient(left_by, la
     assert pursuit.linear < 1.03
 
 
+@pytest.mark.slow
 def test_relaxation_is_pursued_as_a_memory_that_fades(left_by):
     pursuit = left_by(rig.MaxwellBranch(4e4, 0.03))
     first = pursuit.laws[0]
@@ -45,6 +47,7 @@ def test_relaxation_is_pursued_as_a_memory_that_fades(left_by):
     assert first.share > 0.9
 
 
+@pytest.mark.slow
 def test_nothing_is_pursued_in_noise(left_by):
     pursuit = left_by()
     assert pursuit.laws == ()

@@ -34,6 +34,7 @@ def gripped(fitted):
     return found, latent, split_dwells(found, latent)
 
 
+@pytest.mark.slow
 def test_exponents_of_damping_that_grows_with_x_are_three_and_one(gripped):
     exponents = find_exponents(gripped[2])
     assert exponents is not None
@@ -81,6 +82,7 @@ def test_delay_and_memory_leave_what_only_a_memory_explains(fitted, hidden):
     assert black_box.share > 0.7
 
 
+@pytest.mark.slow
 def test_broadband_records_are_described_without_dwells(fitted):
     plan = rig.Multisine((60.0, 110.0), 2.0, 12.0, holdout_levels=(80.0,))
     remainder = explain_remainder(fitted(Grip(1e7), plan=plan), refit=True)
@@ -93,6 +95,7 @@ def test_broadband_records_are_described_without_dwells(fitted):
     assert remainder.static.share > 0.7
 
 
+@pytest.mark.slow
 def test_a_machine_beside_the_bench_follows_no_motion(fitted):
     remainder = explain_remainder(fitted(Machine(6.0, 2.0 * np.pi * 11.3)), refit=False)
     assert remainder.pursuit.laws == ()
@@ -102,6 +105,7 @@ def test_a_machine_beside_the_bench_follows_no_motion(fitted):
     assert abs(remainder.black_box.share) < 0.1
 
 
+@pytest.mark.slow
 def test_noise_leaves_nothing_to_describe(fitted):
     remainder = explain_remainder(fitted(), refit=False)
     assert remainder.pursuit.laws == ()

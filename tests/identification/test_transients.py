@@ -30,6 +30,7 @@ def written(folder, kind, stiffness):
     return campaign
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PLANS)
 def test_the_loop_comes_to_none_where_the_model_is_complete(kind, tmp_path):
     loop = close_loop(written(tmp_path, kind, '["linear", "cubic"]'))
@@ -65,6 +66,7 @@ def test_the_loop_finds_a_hidden_cubic_spring(kind, tmp_path):
     assert float(loop.after.model["cubic_stiffness.coefficient"]) == pytest.approx(2.5e11, rel=0.02)
 
 
+@pytest.mark.slow
 def test_without_leave_to_add_a_missing_effect_is_named_and_not_called_found(tmp_path):
     loop = close_loop(written(tmp_path, "impulse", '["linear"]'), max_iterations=0)
     assert loop.verdict == "unexplained"
@@ -104,6 +106,7 @@ def test_decays_of_few_swings_start_linear_and_the_fit_goes_on_from_there(simula
         assert abs(float(found.model[name]) - truth) < 4.0 * found.standard_errors[name]
 
 
+@pytest.mark.slow
 def test_a_start_that_runs_away_is_taken_up_again_from_its_linear_part(simulated):
     bench = rig.Bench(rate=500.0, noise=0.01, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
     campaign = simulated(rig.y_plant(), rig.FreeDecay((4e-4, 8e-4), seconds=3.0), 3, bench)

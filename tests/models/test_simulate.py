@@ -188,6 +188,7 @@ def test_adaptive_steps_without_an_error_estimate_are_refused():
         Integrator(rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_single_precision_is_refused_and_the_message_says_what_to_write(tmp_path):
     script = """
 from isojax import paper

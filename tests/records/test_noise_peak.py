@@ -24,6 +24,7 @@ def campaign(folder: Path, what: rig.Plant, plan: rig.Plan, seed: int = 1, bench
     return read_campaign(rig.write_campaign(folder, what, plan, seed, "peak", bench))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", [STEPPED, RANDOM], ids=["stepped sine", "multisine"])
 def test_a_floor_that_moves_unmeasured_shows_as_a_peak_at_the_resonance(plan, tmp_path):
     floor = rig.FloorMotion(1.0, 0.02, 0.5, 40.0, measured=False)
@@ -54,6 +55,7 @@ def test_dwells_that_still_ring_are_no_noise(tmp_path):
     assert noise_peak(campaign(tmp_path, plant(damping=1.2e3), STEPPED)) is None
 
 
+@pytest.mark.slow
 def test_a_measured_floor_is_left_to_the_diagnosis(tmp_path):
     floor = rig.FloorMotion(1.0, 0.02, 0.5, 40.0)
     held = campaign(tmp_path, plant().plus(floor), STEPPED)

@@ -71,6 +71,7 @@ def test_pictures_leave_out_what_is_not_known(what):
         assert float(drawn[0].get_ydata()[0]) > 30.0
 
 
+@pytest.mark.slow
 def test_page_and_result_hold_the_health_of_the_campaign(written, found):
     page = (written / "report.html").read_text(encoding="utf-8")
     for words in ("Drift budget", "By the fitted model", "Repeatability limits dry (Coulomb) friction"):

@@ -28,12 +28,14 @@ def unexplained(found):
     return found._replace(extensions=(), after=found.before, verdict="unexplained", last=verdict, bounds={})
 
 
+@pytest.mark.slow
 def test_what_is_left_is_described_once(unexplained):
     first = loop_remainder(unexplained)
     assert first is not None
     assert loop_remainder(unexplained) is first
 
 
+@pytest.mark.slow
 def test_nothing_is_described_where_the_verdict_is_another(found, written):
     assert loop_remainder(found) is None
     assert "What is left" not in (written / "report.html").read_text(encoding="utf-8")
@@ -51,6 +53,7 @@ def test_dry_friction_grows_with_amplitude_and_not_with_frequency(unexplained):
     assert "dry friction" in exponents.like
 
 
+@pytest.mark.slow
 def test_the_page_has_the_section_with_its_pictures(unexplained):
     page = render_page(unexplained)
     section = page.partition("<h2>What is left</h2>")[2].partition("<h2>")[0]

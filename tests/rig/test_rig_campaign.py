@@ -93,6 +93,7 @@ def test_csv_holds_what_npz_holds(tmp_path):
             np.testing.assert_array_equal(table[name].astype(np.float32), columns[name])
 
 
+@pytest.mark.slow
 def test_demo_in_the_package_is_the_one_that_its_script_writes(tmp_path):
     write_demo_campaign(tmp_path)
     packaged = campaign_folder()

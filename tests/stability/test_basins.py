@@ -51,6 +51,7 @@ def test_basins_of_the_turned_drive_are_the_basins_seen_through_the_centre():
     np.testing.assert_allclose(ends, -turned[::-1, ::-1], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_attractors_between_the_folds_are_the_stable_orbits_of_the_map():
     model, force, frequency = ij.paper.y_direction(), 175.0, 4.2
     basins = ij.basins_of_attraction(

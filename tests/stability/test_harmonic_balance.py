@@ -35,6 +35,7 @@ def test_the_linear_answer_is_exact_with_internal_states_too():
     np.testing.assert_allclose(found.velocity(times), (s * x * np.exp(s * times)).real, atol=1e-9 * abs(x))
 
 
+@pytest.mark.slow
 def test_a_duffing_orbit_is_that_of_scipy_ever_more_closely():
     law = polynomial(k=(1.0, 0.0, 0.5), c=(0.2, 0.0, 0.0), mass=1.0)
     balances = [harmonic_balance(DUFFING, DRIVE, harmonics=count) for count in (1, 3, 7, 15)]

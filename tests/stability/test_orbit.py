@@ -79,6 +79,7 @@ def test_a_symmetric_orbit_repeats_with_the_opposite_sign_and_its_multipliers_ar
     assert bool(jnp.all(jnp.isnan(y_orbit_full.floquet.half_period_multipliers)))
 
 
+@pytest.mark.slow
 def test_two_periods_of_an_orbit_have_the_squares_of_its_multipliers(y_orbit):
     twice = find_periodic_orbit(y_orbit.model, y_orbit.excitation, start=y_orbit.y0, periods=2)
     np.testing.assert_allclose(twice.y0, y_orbit.y0, rtol=1e-9)

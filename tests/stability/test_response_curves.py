@@ -66,6 +66,7 @@ def test_derivative_of_free_vibration_is_that_of_the_elliptic_integral():
     np.testing.assert_allclose(slope.elements[1].coefficient, numeric, rtol=1e-8, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_free_vibration_with_kinks_and_without_symmetry_is_that_of_scipy():
     sizes = [3e-4, 1.2e-3]
     kinked = ij.backbone_curve(ij.paper.y_direction(), sizes).natural_frequency
@@ -145,6 +146,7 @@ def test_response_folds_where_the_force_is_a_fold_force():
         assert unstable.max() < max(folds) + 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("excitation", ["force", "base_acceleration"])
 def test_transmissibility_of_a_linear_isolator_is_the_textbooks(excitation):
     model = ij.Isolator(LINEAR.mass, LINEAR.elements, excitation)

@@ -45,6 +45,7 @@ LETTERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LETTERS)
 def test_amplitude_of_the_linear_isolator_moves_as_its_receptance(of_orbit: ij.Sensitivity, name: str):
     letter, value = LETTERS[name]
@@ -81,6 +82,7 @@ def test_relative_sensitivities_of_the_amplitude_keep_its_dimension(of_orbit: ij
     assert sum(shares[name] for name in STATIC) == pytest.approx(-1.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_map_of_the_linear_isolator_moves_as_its_receptance_in_every_cell():
     amplitudes, frequencies = np.linspace(50.0, 100.0, 3), np.linspace(3.0, 7.0, 5)
     sens = ij.sensitivity(ij.stability_map(linear(), amplitudes, frequencies))

@@ -55,6 +55,7 @@ def reference(law, point, turns):
     return end, scipy_map.eigenvalues(matrix)
 
 
+@pytest.mark.slow
 def test_symmetry_breaks_at_minus_one_of_the_half_period_map_by_scipy(symmetric):
     point = only(symmetric.special_points, "symmetry_breaking")
     end, values = reference(UEDA_LAW, point, 0.5)
@@ -70,6 +71,7 @@ def test_the_symmetric_branch_never_doubles(symmetric):
     assert kinds == ["fold", "fold", "symmetry_breaking"]
 
 
+@pytest.mark.slow
 def test_the_broken_branch_holds_asymmetric_orbits_of_period_one_by_scipy(broken):
     assert ij.is_successful(broken.result)
     assert broken.periods == 1
@@ -94,6 +96,7 @@ def test_the_broken_orbit_doubles_at_minus_one_by_scipy(broken):
     assert complex(point.multipliers[0]) == pytest.approx(-1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_doubled_branch_repeats_after_two_periods_by_scipy(doubled):
     assert doubled.periods == 2
     assert ij.is_successful(doubled.result)
@@ -114,6 +117,7 @@ def test_the_doubled_orbit_doubles_again_by_scipy(doubled):
     assert values[0] == pytest.approx(-1.0, abs=2e-9)
 
 
+@pytest.mark.slow
 def test_what_the_located_points_say_is_what_the_motion_does(symmetric, broken):
     # Steady motion by SciPy from a start off the symmetric orbit, either side of each point.
     def settled(force):
@@ -135,6 +139,7 @@ def test_what_the_located_points_say_is_what_the_motion_does(symmetric, broken):
     assert repeat > 0.05
 
 
+@pytest.mark.slow
 def test_forced_van_der_pol_loses_its_lock_where_averaging_says():
     # x'' - e (1 - x^2) x' + x = F sin(w t), x = 2 r cos(.): to first order in e the torus leaves at
     # r^2 = 1/2, and (1 - r^2)^2 + s^2 = (F / (2 e r w))^2 with s = (1 - w^2) / (e w).
@@ -161,6 +166,7 @@ def test_forced_van_der_pol_loses_its_lock_where_averaging_says():
     assert np.all(radius[value > float(point.value)] < 1.0)
 
 
+@pytest.mark.slow
 def test_a_saddle_with_reciprocal_multipliers_is_no_torus():
     branch = ij.continue_branch(
         van_der_pol(0.1), parameter="frequency", amplitude=0.1, start=0.8 * ONE, stop=1.2 * ONE
@@ -176,6 +182,7 @@ def test_a_saddle_with_reciprocal_multipliers_is_no_torus():
     assert all(np.abs(np.asarray(point.multipliers).imag).min() > 1e-3 for point in tori)
 
 
+@pytest.mark.slow
 def test_an_asymmetric_spring_doubles_without_breaking_a_symmetry():
     spring = (ij.LinearDamping(0.1), ij.LinearStiffness(1.0), ij.QuadraticStiffness(1.0))
     branch = ij.continue_branch(
@@ -193,6 +200,7 @@ def test_an_asymmetric_spring_doubles_without_breaking_a_symmetry():
         assert abs((values[0] - value) * (values[1] - value)) < 1e-8
 
 
+@pytest.mark.slow
 def test_a_broken_branch_that_comes_back_meets_no_fold_where_it_crosses(monkeypatch):
     # There the search for the point is singular; badly located, it must still be told for what it is.
     branch = ij.continue_branch(
@@ -209,6 +217,7 @@ def test_a_broken_branch_that_comes_back_meets_no_fold_where_it_crosses(monkeypa
     np.testing.assert_allclose(met, [float(point.value) for point in breaks[::-1]], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_doubling_are_central_differences(broken):
     start = broken.points.y0[-40]
     force = float(broken.points.value[-40])
