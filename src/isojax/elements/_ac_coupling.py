@@ -14,8 +14,8 @@ class AcCoupling(AbstractElement):
     `y -> y - wc s`, `s' = y - (wc + wl) s`, `wc = 2 pi fc`, `wl = 2 pi fl`: the response
     `(i w + wl) / (i w + wc + wl)`, a high-pass `i w / (i w + wc)` but for the declared leak fl. Without it s
     would be the plain integral of the reading where the effect is absent, and grow from any constant in it.
-    In the excited band the leak adds `-fc fl / f^2` to the gain, which a fit puts into the other coefficients:
-    with fl a 500th of the excited frequency, which forgets within some hundred cycles, less than the noise.
+    In the excited band the leak adds `-fc fl / f^2` to the gain, which a fit puts into other coefficients:
+    less than the noise with fl a 500th of the excited frequency, which forgets within some hundred cycles.
 
     Attributes:
         corner: fc [Hz].

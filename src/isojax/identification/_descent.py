@@ -273,6 +273,8 @@ def _in_physical_units(point: Point, slopes: list[float]) -> Point:
     # At the very end of an interval nothing moves with the variable: no column, and no error bar.
     still = np.asarray(slopes) == 0.0
     factor = np.append(np.where(still, 0.0, 1.0 / np.where(still, 1.0, slopes)), 1.0)
-    by_record = point.reduced.by_record * np.outer(factor, factor)
-    stiffness_map = point.reduced.stiffness_map * factor
+    # Close to the end of an interval the factor may be out of range: then there is no error bar either.
+    with np.errstate(over="ignore", invalid="ignore"):
+        by_record = point.reduced.by_record * np.outer(factor, factor)
+        stiffness_map = point.reduced.stiffness_map * factor
     return point._replace(reduced=point.reduced._replace(by_record=by_record, stiffness_map=stiffness_map))
