@@ -30,9 +30,7 @@ TRIES = 4
 """Times that the size is halved where the plant runs away."""
 
 
-def run_one(
-    seed: int, kind: str, task: str, names: tuple[str, ...] | None = None, beside_oracle: bool = True
-) -> Row:
+def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = None) -> Row:
     """Draw a campaign, do a task on it, and say all that the judge needs.
 
     Args:
@@ -41,7 +39,6 @@ def run_one(
         task: "loop" (diagnosed blind), "leave_out" (the true effect is no candidate), "coverage" (the true
             structure fitted, nothing diagnosed) or "wall_time" (a loop by the clock, twice).
         names: what is hidden, drawn if omitted; of "wall_time" the sampling rate [Hz].
-        beside_oracle: whether the true structure is fitted as well.
 
     Returns:
         What goes into a line of the output file; "error" where something raised.
@@ -62,8 +59,7 @@ def run_one(
         elif task == "leave_out":
             excluded = exact_class(hidden[0].name)
             row |= {"excluded": excluded} | _said_of(close_loop(campaign, excluded=excluded))
-        known = kind not in ("none", "outside")
-        if beside_oracle and known and task in ("coverage", "loop"):
+        if kind != "outside" and (task == "coverage" or (kind != "none" and task == "loop")):
             row |= _oracle(drawn, hidden, campaign, with_errors=task == "loop")
     except Exception as problem:  # one campaign that fails is a failure of the trial, not its end
         row["error"] = "".join(traceback.format_exception(problem))[-2000:]

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import jax
-import jaxtyping
 import pytest
+from jaxtyping import install_import_hook
 
 _ALREADY = os.environ.get("JAX_COMPILATION_CACHE_DIR")
 _COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
@@ -20,7 +20,7 @@ jax.config.update("jax_compilation_cache_dir", _COMPILED)
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
-jaxtyping.install_import_hook("isojax", "beartype.beartype")
+install_import_hook("isojax", "beartype.beartype")
 
 
 _MOST_MAPPINGS = 40_000
@@ -53,14 +53,12 @@ _WORTH_OPTIMISING = ("stability", "test_cli_map", "test_stability_figures", "tes
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Optimise compiled code, and check shapes, where that is worth its time; before any fixture is made.
+    """Optimise compiled code where that is worth its time; before any fixture is made.
 
-    Small records run no slower than they would compile. Slow tests call again what the others check, with
-    the annotations looked up at every call of the hundred thousands that tracing takes.
+    Elsewhere small records run no slower than they would compile.
     """
     optimise = any(part in item.nodeid for part in _WORTH_OPTIMISING)
     jax.config.update("jax_disable_most_optimizations", not optimise)
-    jaxtyping.config.update("jaxtyping_disable", item.get_closest_marker("slow") is not None)
 
 
 _LONGEST = (

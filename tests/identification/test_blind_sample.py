@@ -22,7 +22,7 @@ def test_a_small_sample_is_judged_right():
     """Twenty campaigns: too few for the marks of the whole trial, enough to see that nothing is broken."""
     rows = []
     for seed in SAMPLE:
-        rows.append(run_one(seed, ("none", "one")[seed % 2], "loop", beside_oracle=False))
+        rows.append(run_one(seed, ("none", "one")[seed % 2], "loop"))
         if crowded():
             jax.clear_caches()
     assert not [row["error"] for row in rows if "error" in row]

@@ -205,7 +205,7 @@ def descend(
             scaled, state = _step(solver, scaled, local, state)
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
         progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
-        if best is None or accepted:
+        if accepted:
             gained = float("inf") if best is None or refused else best.chi2 - point.chi2
             best, best_free, refused = point, trial, 0
             # What a full linear step would still gain, and what the last one did gain: either may say that it
@@ -216,6 +216,7 @@ def descend(
                 break
         else:
             refused += 1
+        assert best is not None
         reached.append(best.chi2)
         levels += [best.chi2] if accepted else []
         # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
@@ -233,7 +234,6 @@ def descend(
         if bool(state.terminate):
             result = RESULTS.successful
             break
-        assert best is not None
         owner = bench.prepared(best.model, len(best.model.elements)).record
         if refused == DOUBTFUL and evaluations < max_steps - 1:
             settled = _settled(bench, best, places, physical(best_free)[1], owner)

@@ -25,11 +25,11 @@ from ._steps import find_integrator
 DEFAULT_SOLVER = eqx.tree_at(
     lambda solver: solver.search,
     optx.LevenbergMarquardt(rtol=1e-9, atol=1e-9),
-    # optimistix lowers the damping after a step that keeps 99 % of its promise only. Along the curved valley
-    # of coefficients that the records hardly tell apart no step does, and the search would creep.
+    # optimistix lowers the damping only after a step that attains 99 % of the predicted decrease. Along the
+    # curved valley of coefficients that the records hardly tell apart none does, and the search would creep.
     optx.ClassicalTrustRegion(high_cutoff=0.75),
 )
-"""Levenberg-Marquardt whose damping falls where a step keeps three quarters of what it promised.
+"""Levenberg-Marquardt whose damping falls after a step that attains 75 % of the predicted decrease of chi2.
 
 Source: Nocedal & Wright 2006, *Numerical Optimization*, algorithm 4.1.
 """
