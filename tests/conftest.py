@@ -8,8 +8,27 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import jax
+import jaxlib.version
 import pytest
 from jaxtyping import install_import_hook
+
+
+def _keep_to_own_cores() -> None:
+    """Give each worker cores of its own: the threads of several on the same few wait for each other."""
+    worker, count = os.environ.get("PYTEST_XDIST_WORKER"), int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1))
+    if worker is None or count == 1 or not hasattr(os, "sched_setaffinity"):
+        return
+    cores, place = sorted(os.sched_getaffinity(0)), int(worker.removeprefix("gw"))
+    os.sched_setaffinity(0, cores[place::count] or [cores[place % len(cores)]])
+    if jaxlib.version.__version_info__ < (0, 11):  # XLA ends a process for a flag that it does not know
+        flags = os.environ.get("XLA_FLAGS", "")
+        os.environ["XLA_FLAGS"] = f"{flags} --xla_cpu_parallel_codegen_split_count=1".strip()
+
+
+_keep_to_own_cores()
+
+# Tracing makes a million small objects that stay: looking through them for cycles takes a tenth of the time.
+gc.set_threshold(100_000, 50, 100)
 
 _ALREADY = os.environ.get("JAX_COMPILATION_CACHE_DIR")
 _COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
@@ -83,6 +102,18 @@ def pytest_sessionfinish() -> None:
     """Clear the compiled code away, in the process that made its folder: workers inherit it."""
     if _ALREADY is None:
         shutil.rmtree(_COMPILED, ignore_errors=True)
+
+
+@pytest.fixture
+def every_core() -> Iterator[None]:
+    """Let one test have all cores of the machine, so that work is shared among threads."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    own = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    yield
+    os.sched_setaffinity(0, own)
 
 
 @pytest.fixture(scope="session")

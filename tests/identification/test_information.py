@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from isojax import rig
+from isojax._cores import usable_cores
 from isojax._parameters import list_parameters, parameter, replace_parameters
 from isojax._types import Scalar
 from isojax.elements import (
@@ -31,6 +32,7 @@ from isojax.elements import (
     SensorOffset,
 )
 from isojax.excitations import Sampled
+from isojax.identification import _batch
 from isojax.identification._batch import Prepared, prepare
 from isojax.identification._columns import column_information
 from isojax.identification._information import STIFFNESS_SCALE_UNIT, Unknowns, information, readings
@@ -188,6 +190,21 @@ def _columns(case: Case, unknowns: Unknowns, lane: int, length: int) -> np.ndarr
 def _deviation(found: np.ndarray, wanted: np.ndarray) -> float:
     size = np.sqrt(np.maximum(np.diag(wanted), 1e-20))
     return float(np.max(np.abs(found - wanted) / np.outer(size, size)))
+
+
+@pytest.mark.parametrize("name", ["instruments", "delay"])
+def test_threads_give_what_one_thread_gives(monkeypatch, every_core, name):
+    shared, unknowns, _ = _setting(CASES[name])
+    assert len(shared.batches) == min(2, usable_cores())
+    found = information(unknowns, shared), readings(unknowns.model, *unknowns[2:4], shared)
+    with monkeypatch.context() as one_thread:
+        one_thread.setattr(_batch, "usable_cores", lambda: 1)
+        alone, same, _ = _setting(CASES[name])
+        assert len(alone.batches) == 1
+        wanted = information(same, alone), readings(same.model, *same[2:4], alone)
+    assert _deviation(found[0][0], wanted[0][0]) < 1e-12
+    assert _deviation(found[0][1], wanted[0][1]) < 1e-12
+    np.testing.assert_allclose(found[1], wanted[1], rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.slow

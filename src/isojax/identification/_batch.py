@@ -1,7 +1,6 @@
 """Segments side by side: what one compiled scan takes."""
 
 import dataclasses
-import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -12,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from .._cores import usable_cores
 from ..excitations import Hold, tabulate
 from ..models import Isolator, Quantity
 from ..records import Record, measured_state
@@ -94,9 +94,7 @@ def coordinate_motion(
 
 def workers() -> int:
     """Give the number of threads that share a batch: the cores on a CPU, one elsewhere."""
-    if jax.default_backend() != "cpu":
-        return 1
-    return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    return usable_cores() if jax.default_backend() == "cpu" else 1
 
 
 _Table = tuple[Float[np.ndarray, "time stage"], Float[np.ndarray, "time stage"]]

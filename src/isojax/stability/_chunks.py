@@ -3,7 +3,6 @@
 import hashlib
 import io
 import json
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -12,6 +11,7 @@ import jax
 import numpy as np
 from jax.experimental import multihost_utils
 
+from .._cores import usable_cores
 from ..models import write_whole
 from ._pass import CellSolver, Found
 from ._starts import Candidates
@@ -87,7 +87,7 @@ def run_chunks(
         return part
 
     # A pass keeps one core busy; each core runs its own. Chunks over several devices go one by one.
-    cores = 1 if solver.sharding.num_devices > 1 else (os.cpu_count() or 1)
+    cores = 1 if solver.sharding.num_devices > 1 else usable_cores()
     with ThreadPoolExecutor(cores) as pool:
         parts = list(pool.map(one, range(len(begins))))
     whole = (
