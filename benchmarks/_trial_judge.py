@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from _trial_effects import exact_class, family, known_by
+from _trial_wall_time import PARTS_TIMED
 
 Row = dict[str, Any]
 CLEAR = 3.0
@@ -208,16 +209,14 @@ def table(rows: list[Row]) -> list[Mark]:
         )
     for row in (row for row in rows if row["task"] == "wall_time"):
         what = f"{len(row['records'])} records of {np.mean(row['records']):.0f} s at {row['rate']:.0f} Hz"
-        marks += [
-            _seconds(f"seconds of a loop, {what}, compile included: at most 60", row["first"], 60.0),
-            _seconds("the same again in the same process: at most 10", row["second"], 10.0),
-            _seconds("the diagnosis alone, compiled: at most 10", row["diagnosis"], 10.0),
-        ]
+        for when, most, figures in (
+            ("compile included", 60.0, row["first"]),
+            ("again in the same process", 10.0, row["second"]),
+        ):
+            for part, figure in zip(PARTS_TIMED, figures, strict=True):
+                words = f"seconds of {part}, {what}, {when}: at most {most:.0f}"
+                marks.append(Mark(words, figure, 1, None, figure <= most))
     return marks
-
-
-def _seconds(words: str, figure: float, most: float) -> Mark:
-    return Mark(words, figure, 1, None, figure <= most)
 
 
 def _clear(row: Row) -> bool:

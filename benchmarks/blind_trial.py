@@ -9,9 +9,10 @@ shares no code with the models. Levels, noise, distortion and drift of the stiff
 dwells beside a fold occur. Six records of 32 s at 250 Hz: stepped or swept sines up and down, or stepped ones
 with a multisine; two are held out. A campaign hides nothing, one effect, two, or a law that the catalogue
 lacks, at 1 to 30 times the detection limit (3.5 standard errors of the strength beside the true model).
-`--leave-out` diagnoses those with one effect again while it is no candidate. `--wall-time` times one loop
-over six records of 60 s at 250 Hz (or as given), compile included, and a second one. `--coverage N` fits the
-true structure to N campaigns of each of ten effects, and asks whether the 95 % intervals hold the truth.
+`--leave-out` diagnoses those with one effect again while it is no candidate. `--wall-time` times one
+diagnosis and a whole loop over six records of 60 s at 250 Hz (or as given), compile included and again in the
+same process. `--coverage N` fits the true structure to N campaigns of each of ten effects, and asks whether
+the 95 % intervals hold the truth.
 
 The report prints for each criterion: PASS or FAIL, the figure, how many campaigns it rests on, its 95 %
 interval (Wilson), and with `--verbose` each campaign that speaks against it. The exit status is 1 after a
@@ -100,7 +101,11 @@ def main() -> None:
     parser.add_argument("--leave-out", action="store_true", help="the true effect is no candidate")
     parser.add_argument("--coverage", type=int, metavar="N", help="true structure only, N repeats an effect")
     parser.add_argument(
-        "--wall-time", nargs="?", const="250", metavar="HZ", help="one loop by the clock, without --cache"
+        "--wall-time",
+        nargs="?",
+        const="250",
+        metavar="HZ",
+        help="a diagnosis and a loop by the clock, without --cache",
     )
     parser.add_argument("--minutes", type=float, help="begin no campaign after so long")
     parser.add_argument("--cache", type=Path, help="folder in which compiled code is kept between runs")
