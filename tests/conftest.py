@@ -36,6 +36,7 @@ _COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
 
 os.environ["JAX_COMPILATION_CACHE_DIR"] = _COMPILED
 jax.config.update("jax_compilation_cache_dir", _COMPILED)
+os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
@@ -66,8 +67,8 @@ def pytest_configure(config: pytest.Config) -> None:
     compile_quickly()
 
 
-_WORTH_OPTIMISING = ("stability", "test_cli_map", "test_stability_figures", "test_paper")
-"""Tests that run longer than they compile: orbits, branches and maps."""
+_WORTH_OPTIMISING = ("stability", "test_cli_map", "test_stability_figures", "test_paper", "test_blind_sample")
+"""Tests that run longer than they compile: orbits, branches, maps, and many campaigns of one shape."""
 
 
 @pytest.hookimpl(tryfirst=True)
