@@ -11,8 +11,8 @@ with a multisine; two are held out. A campaign hides nothing, one effect, two, o
 lacks, at 1 to 30 times the detection limit (3.5 standard errors of the strength beside the true model).
 `--leave-out` diagnoses those with one effect again while it is no candidate. `--wall-time` times one
 diagnosis and a whole loop over six records of 60 s at 250 Hz (or as given), compile included and again in the
-same process. `--coverage N` fits the true structure to N campaigns of each of ten effects, and asks whether
-the 95 % intervals hold the truth.
+same process. `--coverage N` fits the true structure to N campaigns of each of ten effects, or of those of
+`--effects`, and asks whether the 95 % intervals hold the truth.
 
 The report prints for each criterion: PASS or FAIL, the figure, how many campaigns it rests on, its 95 %
 interval (Wilson), and with `--verbose` each campaign that speaks against it. The exit status is 1 after a
@@ -30,7 +30,7 @@ from pathlib import Path
 import jax
 
 from _trial_campaign import CLASSES, kind_of
-from _trial_effects import COMMONEST
+from _trial_effects import COMMONEST, EFFECTS
 from _trial_judge import line, print_table
 from _trial_run import crowded, run_one
 from isojax import compile_quickly
@@ -47,7 +47,7 @@ def tasks(options: argparse.Namespace) -> Iterator[Task]:
         return
     if options.coverage:
         for repeat in range(options.coverage):
-            for name in COMMONEST:
+            for name in options.effects:
                 yield 100_000 + seeds.start + repeat, "coverage", "coverage", (name,)
         return
     for seed in seeds:
@@ -100,6 +100,14 @@ def main() -> None:
     )
     parser.add_argument("--leave-out", action="store_true", help="the true effect is no candidate")
     parser.add_argument("--coverage", type=int, metavar="N", help="true structure only, N repeats an effect")
+    parser.add_argument(
+        "--effects",
+        nargs="+",
+        default=list(COMMONEST),
+        choices=sorted(EFFECTS),
+        metavar="NAME",
+        help="of --coverage, by their catalogue names; the ten commonest if omitted",
+    )
     parser.add_argument(
         "--wall-time",
         nargs="?",
