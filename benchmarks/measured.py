@@ -219,11 +219,13 @@ CASES = {"emps": emps, "silverbox": silverbox, "boucwen": boucwen}
 
 def main() -> int:
     """Run the cases named on the command line, all by default."""
+    names = sys.argv[1:] or list(CASES)
+    unknown = [name for name in names if name not in CASES]
+    if unknown:
+        print(f"Argument must be one of {', '.join(CASES)}, but is {unknown[0]!r}.", file=sys.stderr)
+        return 2
     passed = True
-    for name in sys.argv[1:] or CASES:
-        if name not in CASES:
-            print(f"Argument must be one of {', '.join(CASES)}, but is {name!r}.", file=sys.stderr)
-            return 2
+    for name in names:
         print(f"== {name}: {CASES[name].__doc__}")
         begin = time.perf_counter()
         passed = CASES[name]() and passed
