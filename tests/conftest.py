@@ -14,7 +14,10 @@ from jaxtyping import install_import_hook
 
 
 def _keep_to_own_cores() -> None:
-    """Give each worker cores of its own: the threads of several on the same few wait for each other."""
+    """Give each worker cores of its own: the threads of several on the same few wait for each other.
+
+    XLA then need not cut what it compiles into parts for threads.
+    """
     worker, count = os.environ.get("PYTEST_XDIST_WORKER"), int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1))
     if worker is None or count == 1 or not hasattr(os, "sched_setaffinity"):
         return
@@ -27,7 +30,7 @@ def _keep_to_own_cores() -> None:
 
 _keep_to_own_cores()
 
-# Tracing makes a million small objects that stay: looking through them for cycles takes a tenth of the time.
+# Tracing makes a million small objects that stay: looking for cycles among them takes up to a tenth of the time.
 gc.set_threshold(100_000, 50, 100)
 
 _ALREADY = os.environ.get("JAX_COMPILATION_CACHE_DIR")

@@ -15,7 +15,8 @@ class AcCoupling(AbstractElement):
     `(i w + wl) / (i w + wc + wl)`, a high-pass `i w / (i w + wc)` but for the declared leak fl. Without it s
     would be the plain integral of the reading where the effect is absent, and grow from any constant in it.
     In the excited band the leak adds `-fc fl / f^2` to the gain, which a fit puts into other coefficients:
-    less than the noise with fl a 500th of the excited frequency, which forgets within some hundred cycles.
+    less than 1e-3 of a cubic stiffness with fl a 500th of the excited frequency, which forgets within some
+    hundred cycles.
 
     Attributes:
         corner: fc [Hz].
