@@ -30,7 +30,7 @@ def _keep_to_own_cores() -> None:
 
 _keep_to_own_cores()
 
-# Tracing makes a million small objects that stay: to look for cycles among them takes up to a tenth of it all.
+# Tracing makes a million small objects that stay: looking for cycles among them takes a tenth of it all.
 gc.set_threshold(100_000, 50, 100)
 
 _ALREADY = os.environ.get("JAX_COMPILATION_CACHE_DIR")
