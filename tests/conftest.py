@@ -70,8 +70,15 @@ def pytest_configure(config: pytest.Config) -> None:
     compile_quickly()
 
 
-_WORTH_OPTIMISING = ("stability", "test_cli_map", "test_stability_figures", "test_paper", "test_blind_sample")
-"""Tests that run longer than they compile: orbits, branches, maps, and many campaigns of one shape."""
+_WORTH_OPTIMISING = (
+    "test_map.py",
+    "test_cli_map.py",
+    "test_bifurcation_diagram.py",
+    "test_fold_curve.py",
+    "test_paper.py",
+    "test_blind_sample.py",
+)
+"""Tests that run longer than they compile: maps, attractors, many curves or campaigns of one shape."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -86,14 +93,15 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 _LONGEST = (
     "test_blind_sample.py",
+    "test_cli.py",
     "test_fold_curve.py",
     "test_special_points.py",
     "test_orbit.py",
-    "test_cli.py",
     "test_notebooks.py",
     "test_transients.py",
 )
-"""Files that take minutes, the longest first."""
+"""Files that take minutes, the longest first; the demo before the notebook that runs the same loop again, so
+that the latter finds it compiled."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

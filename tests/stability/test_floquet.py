@@ -16,7 +16,7 @@ from isojax._parameters import parameter
 from isojax.stability._floquet import modulus, multipliers
 
 
-@eqx.filter_jit
+@jax.jit  # which compiles once for all numbers; equinox would for each
 def linear(stiffness, damping, frequency):
     model = ij.Isolator(800.0, (ij.LinearStiffness(stiffness), ij.LinearDamping(damping)))
     return find_periodic_orbit(model, Harmonic(100.0, frequency)).floquet

@@ -35,8 +35,13 @@ def assert_equal_to(reference, orbit, tolerance=1e-7):
 
 
 @eqx.filter_jit
+def orbit_of(model, excitation, start):
+    return find_periodic_orbit(model, excitation, start=start)
+
+
 def found_from(model, force, frequency, start):
-    return find_periodic_orbit(model, Harmonic(force, frequency), start=start)
+    """Give an orbit by code that is compiled once a model: the excitation holds arrays, no Python numbers."""
+    return orbit_of(model, Harmonic(force, frequency), start)
 
 
 def test_an_orbit_of_the_papers_model_is_that_of_scipy(y_orbit):

@@ -106,7 +106,8 @@ def column_information(
         width = -(-lanes // blocks)
         done = []
         for first in range(0, lanes, width):
-            chosen = np.minimum(np.arange(first, first + width), lanes - 1)
+            # All of them are not picked one by one, which would copy them and take a tenth of it all.
+            chosen = slice(None) if blocks == 1 else np.minimum(np.arange(first, first + width), lanes - 1)
             some = jax.tree_util.tree_map(
                 lambda values, chosen=chosen: values[..., chosen], (batch, scale, states, scales)
             )

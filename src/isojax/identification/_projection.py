@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from .._parameters import find_parameter
+from .._parameters import list_parameters
 from ..elements import AbstractElement
 from ..models import Isolator
 from ._estimate import Estimate
@@ -72,8 +72,9 @@ def project(
     carried, count = len(fitted.model.elements), len(fitted.places)
     own = np.sqrt(1.0 / np.maximum(np.diag(fitted.point.reduced.matrix)[:-1], 1e-300))
     names = element_names(model)[carried:]
+    place_of = {entry.name: place for place, entry in enumerate(list_parameters(model))}
     strengths = (f"{name}.{one.strength}" for name, one in zip(names, absent, strict=True))
-    places = [*fitted.places, *(find_parameter(model, name) for name in strengths)]
+    places = [*fitted.places, *(place_of[name] for name in strengths)]
     directions = one_hot(model, places, [*own, *units])
     point = fitted.bench.evaluate(model, directions, fitted.point.nuisances, carried)
     by_record = point.reduced.by_record

@@ -4,9 +4,11 @@ import itertools
 from collections.abc import Iterable
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from ..models import Isolator
 from ..records import Record
@@ -44,11 +46,15 @@ def slowest_decay(model: Isolator) -> float:
     Returns:
         Smallest decay rate; 0 where something does not decay (a mass without a spring).
     """
-    size = 2 + model.internal_states
-    rest = jnp.zeros(size)
-    jacobian = jax.jacfwd(lambda z: jnp.stack(model.rates(tuple(z), jnp.zeros(()), 0.0)))(rest)
-    rates = np.linalg.eigvals(np.asarray(jacobian)).real
+    rates = np.linalg.eigvals(np.asarray(_rates_about_rest(model))).real
     return float(max(0.0, -rates.max()))
+
+
+@eqx.filter_jit
+def _rates_about_rest(model: Isolator) -> Float[Array, "state state"]:
+    """Give the derivative of the states' rates by the states, at rest."""
+    rest = jnp.zeros(2 + model.internal_states)
+    return jax.jacfwd(lambda z: jnp.stack(model.rates(tuple(z), jnp.zeros(()), 0.0)))(rest)
 
 
 def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment, ...]:
