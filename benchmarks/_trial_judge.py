@@ -121,10 +121,10 @@ def admits_outside(row: Row) -> bool:
 
 
 def stays_unnamed(row: Row) -> bool:
-    """Say whether a left-out effect is unexplained, too small to need explaining, or known by that name."""
+    """Say whether a left-out effect is owned up to, or known by the names that were given."""
     known = known_by(row["truth"][0]["effect"])
     named = [one["effect"] for one in row["findings"]]
-    return admits_outside(row) or not named or all(name in known for name in named)
+    return admits_outside(row) or (bool(named) and all(name in known for name in named))
 
 
 def table(rows: list[Row]) -> list[Mark]:

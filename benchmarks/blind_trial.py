@@ -64,15 +64,20 @@ def key(row: dict) -> tuple:
 
 
 def read(path: Path) -> list[dict]:
-    """Read the campaigns that are there."""
+    """Read the campaigns that are there; a last line that was cut short is as if it were not."""
     if not path.exists():
         return []
-    return [json.loads(text) for text in path.read_text().splitlines() if text.strip()]
+    lines = path.read_text().splitlines(keepends=True)
+    whole = [text for text in lines if text.strip() and text.endswith("\n")]
+    return [json.loads(text) for text in whole]
 
 
 def run(options: argparse.Namespace) -> None:
     """Run what is not there yet."""
-    done = {key(row) for row in read(options.out)}
+    rows = read(options.out)
+    if options.out.exists() and not options.out.read_text().endswith("\n"):
+        options.out.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    done = {key(row) for row in rows}
     begin = time.perf_counter()
     for seed, kind, task, names in tasks(options):
         if (seed, task, tuple(names or ())) in done:

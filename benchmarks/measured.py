@@ -24,7 +24,7 @@ jax.config.update("jax_enable_x64", True)
 import numpy as np  # noqa: E402  (float64 first)
 
 import isojax as ij  # noqa: E402
-from isojax.identification import Loop, close_loop  # noqa: E402
+from isojax.identification import Candidate, Loop, close_loop  # noqa: E402
 
 EMPS = """
 [campaign]
@@ -134,17 +134,33 @@ def run_loop(declaration: str, **fields: object) -> Loop:
     return close_loop(campaign)
 
 
+def tell_ranking(ranking: tuple[Candidate, ...]) -> None:
+    """Print the candidates that were refitted, best first."""
+    for one in ranking:
+        if np.isfinite(one.chi2_per_dof):
+            refused = "" if one.admissible else " (refused)"
+            print(f"    refitted: {one.effect:24s} chi2/dof {one.chi2_per_dof:.6g}{refused}")
+
+
 def tell(loop: Loop) -> None:
-    """Print the story of a loop."""
+    """Print the story of a loop, step by step."""
     print(f"declared: {', '.join(element.name for element in loop.before.model.elements)}")
     for step in loop.extensions:
         finding = step.verdict.finding
-        others = ", ".join(finding.indistinguishable) or "nothing"
+        others = ", ".join(name for name in finding.indistinguishable if name != finding.effect) or "nothing"
         print(
             f"  added {finding.effect}: explains {100 * finding.excess_explained:.2f} % of the excess, "
             f"{100 * finding.transfer:.1f} % on data left out of its refit; not to be told from it: {others}"
         )
+        goodness = (fit.estimate.chi2 / fit.estimate.dof for fit in (step.before, step.after))
+        print("    chi2/dof before and after: {:.6g} -> {:.6g}".format(*goodness))
+        for role, words in (("fit", "fitted"), ("holdout", "held-out")):
+            pair = [fit.errors[role] for fit in (step.before, step.after)]
+            if None not in pair:
+                print(f"    free run of {words} records, RMSE: {pair[0].rmse:.4g} -> {pair[1].rmse:.4g} (SI)")
+        tell_ranking(finding.ranking)
     print(f"  verdict {loop.verdict}; {loop.last.reason}")
+    tell_ranking(loop.last.ranking)
     errors = loop.after.standard_errors
     for parameter in loop.after.model.parameters:
         if parameter.name in errors:
@@ -206,13 +222,27 @@ def boucwen() -> bool:
     print(f"  held-back period RMSE before: {loop.before.errors['holdout'].rmse:.3g} m")
     hysteresis = bool(names) and names[0] in ("bouc_wen", "dahl_friction")
     print(f"  {'PASS' if hysteresis else 'FAIL'}  first finding: {names[:1]}")
+    static = [name for name in names if name in STATIC]
+    print(f"  {'FAIL' if static else 'PASS'}  no static polynomial among the findings: {names}")
+    hysteresis = hysteresis and not static
     with np.load(data_folder() / "boucwen" / "boucwen_train.npz") as arrays:
         mean = arrays["y"].reshape(-1, 8192).mean(axis=0)
     run = next(run for run in loop.after.free_runs if run.record.role == "holdout")
     against_mean = float(np.sqrt(np.mean((run.simulated - mean) ** 2)))
-    passed = judge("held-back period, with its noise", loop.after.errors["holdout"].rmse, 1.2e-5, "m")
-    return judge("against the mean of the periods", against_mean, 1e-5, "m") and passed and hysteresis
+    passed = judge("held-back period, with its noise", loop.after.errors["holdout"].rmse, 8.5e-6, "m")
+    return judge("against the mean of the periods", against_mean, 5e-6, "m") and passed and hysteresis
 
+
+STATIC = (
+    "abs_quadratic_stiffness",
+    "quadratic_stiffness",
+    "cubic_stiffness",
+    "quintic_stiffness",
+    "abs_quadratic_damping",
+    "cubic_damping",
+    "position_damping",
+)
+"""Polynomials in displacement and velocity."""
 
 CASES = {"emps": emps, "silverbox": silverbox, "boucwen": boucwen}
 

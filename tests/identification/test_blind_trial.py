@@ -18,6 +18,7 @@ from _trial_campaign import kind_of, sketch
 from _trial_effects import COMMONEST, EFFECTS, Motion, element_of, generator, shuffled_effects
 from _trial_judge import table, wilson
 from _trial_outside import OUTSIDE
+from blind_trial import read
 
 MOTION = Motion(40.0, 1e-3, 1.0, 31.0, 1.08e6, 1.03e4)
 SCALES = Scales(800.0, 150.0, 1e-3, 0.031, 1.0, 31.0, 0.004, 0.01, 1.0)
@@ -153,6 +154,23 @@ def _row(seed, kind, truth, findings, **more):
         **errors,
         **more,
     }
+
+
+def test_a_left_out_effect_must_be_owned_up_to_or_named_by_a_name_it_is_known_by():
+    hidden = (("coulomb_friction", 9.0),)
+    rows = [
+        _row(0, "one", hidden, (), verdict="unexplained") | {"task": "leave_out"},
+        _row(1, "one", hidden, (("stribeck_friction",),)) | {"task": "leave_out"},
+        _row(2, "one", hidden, (("input_delay",),)) | {"task": "leave_out"},
+        _row(3, "one", hidden, (), verdict="none") | {"task": "leave_out"},
+    ]
+    assert _figure(rows, "left out").figure == 0.5
+
+
+def test_a_line_that_was_cut_short_is_run_again(tmp_path):
+    file = tmp_path / "trial.jsonl"
+    file.write_text('{"seed": 1, "task": "loop"}\n{"seed": 2, "ta', encoding="utf-8")
+    assert [row["seed"] for row in read(file)] == [1]
 
 
 def _figure(rows, words):

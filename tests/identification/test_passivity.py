@@ -5,7 +5,10 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from strange_laws import BASE
 
+import isojax as ij
+from isojax import rig
 from isojax.elements import (
     CATALOGUE,
     BoucWen,
@@ -15,6 +18,7 @@ from isojax.elements import (
     Scales,
     SecondMode,
 )
+from isojax.identification._admissible import find_violation, visited_range
 from isojax.identification._linear_balance import with_strength
 from isojax.identification._passivity import find_activity, work_per_cycle
 
@@ -104,3 +108,19 @@ def test_every_catalogue_shape_takes_energy_at_positive_strength(kind):
 
 def test_a_law_without_memory_is_not_asked():
     assert find_activity(CubicStiffness(-1e12), 1e-3, 0.03) is None
+
+
+@pytest.mark.parametrize(("coefficient", "physical"), [(4e9, True), (-4e9, False), (-1e8, True)])
+def test_damping_must_take_energy_away_from_the_middle_too(coefficient, physical, simulated):
+    # c1 + c x^2 is negative beyond x = sqrt(-c1 / c): 1.6 mm and 10 mm, were 3 mm visited.
+    plan = rig.SteppedSine((100.0,), (3.0, 4.0, 5.0))
+    campaign = simulated(rig.Plant(BASE), plan)
+    model = ij.Isolator(
+        800.0,
+        (ij.LinearStiffness(1e6), ij.LinearDamping(1e4), ij.PositionDamping(coefficient)),
+    )
+    largest = visited_range(model, campaign.fit_records, "acceleration")[0]
+    scaled = model.replace(position_damping__coefficient=coefficient * (3e-3 / largest) ** 2)
+    violation = find_violation(scaled, campaign.fit_records, "acceleration")
+    assert (violation is None) == physical
+    assert physical or "feeds energy in" in violation

@@ -1,5 +1,7 @@
 """What is left by laws outside the catalogue: exponents, harmonics and ceilings, against the rig's truth."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from strange_laws import BASE, Grip, Machine
@@ -113,6 +115,16 @@ def test_noise_leaves_nothing_to_describe(fitted):
     assert remainder.parts == {}
     assert np.isnan(remainder.static.share)
     assert np.isnan(remainder.black_box.share)
+
+
+def test_what_no_other_samples_can_predict_has_no_ceiling(gripped):
+    found, latent, _ = gripped
+    record = latent[0].record
+    whole = (dataclasses.replace(record.dwells[0], start=0, stop=record.time.size),)
+    alone = latent[0]._replace(record=dataclasses.replace(record, dwells=whole))
+    for ceiling in find_ceilings((alone,), scales(found.campaign)):
+        assert np.isnan(ceiling.share)
+        assert np.isnan(ceiling.error)
 
 
 def test_a_failed_fit_is_refused(gripped):

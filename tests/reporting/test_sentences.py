@@ -1,9 +1,13 @@
 import dataclasses
+import math
 
 import pytest
 
+from isojax.elements import StribeckFriction
+from isojax.identification import DriftBudget
 from isojax.records import NoisePeak, data_health
 from isojax.reporting import render_text, verdict_summary
+from isojax.reporting._health_words import budget_words
 from isojax.reporting._sentences import caveats, finding_words, headline, health_words
 
 
@@ -32,6 +36,25 @@ def test_headline_without_findings_names_nothing(found):
         sentence = headline(alone._replace(verdict=verdict))
         assert sentence.startswith("Something is missing that no known effect explains; held-out χ²/dof")
         assert "→" not in sentence
+
+
+def test_a_finding_that_a_later_one_contains_is_told_by_that(found):
+    (step,) = found.extensions
+    finding = step.verdict.finding._replace(effect="stribeck_friction")
+    later = step._replace(verdict=step.verdict._replace(finding=finding))
+    model = found.after.model.with_elements(StribeckFriction(4.0, 0.8, 0.01, 1e-4))
+    after = found.after._replace(model=model)
+    both = found._replace(extensions=(step, later), after=after)
+    assert [one.effect for one in both.findings] == ["stribeck_friction"]
+    assert headline(both).startswith("Falling (Stribeck) friction")
+    assert len(budget_words(DriftBudget(math.nan, ()), after, both.findings)) == 0
+
+
+def test_more_than_two_findings_of_a_good_fit_are_said_to_explain_it(found):
+    (step,) = found.extensions
+    sentence = headline(found._replace(extensions=(step,) * 3, verdict="partly_explained"))
+    assert "explain the records together" in sentence
+    assert "something else is too" not in sentence
 
 
 def test_finding_without_rivals_asks_for_no_experiment(found):

@@ -137,6 +137,8 @@ np.savez(sys.argv[1], **{name: np.asarray(getattr(smap, name)) for name in names
 
 def elsewhere(arguments, flags=""):
     """Start the map in an interpreter of its own."""
+    # Beside the flags of this process, so that it compiles as quickly.
+    flags = f"{os.environ.get('XLA_FLAGS', '')} {flags}".strip()
     environment = {**os.environ, "JAX_PLATFORMS": "cpu", "XLA_FLAGS": flags}
     return subprocess.Popen(
         [sys.executable, "-c", SCRIPT, *map(str, arguments)],

@@ -34,8 +34,8 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
     """Find what is unphysical in a model over the visited motion, if anything.
 
     The static tangent stiffness must be positive wherever the model has a spring, and the static damping
-    force must not drive the motion. A force with memory must take energy over the loops that it was driven
-    around; a static law cannot say so.
+    force must not drive the motion, wherever that passes. A force with memory must take energy over the loops
+    that it was driven around; a static law cannot say so.
 
     Args:
         model: the isolator.
@@ -57,9 +57,14 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
     if model.element("linear_stiffness") is not None and float(tangent.min()) <= 0.0:
         where = 1e3 * float(xs[int(jnp.argmin(tangent))])
         return f"its stiffness is lost at {where:.3g} mm, within the visited motion"
-    power = jax.vmap(lambda v: static(jnp.zeros(()), v) * v - static(jnp.zeros(()), jnp.zeros(())) * v)(vs)
+    # Over the ellipse that a sine of that size runs along, and its inside: all states that were visited.
+    turns, sizes = jnp.linspace(0.0, 2.0 * jnp.pi, 80, endpoint=False), jnp.linspace(0.0, 1.0, 26)[1:]
+    angle, size = (each.ravel() for each in jnp.meshgrid(turns, sizes))
+    places = jnp.concatenate([jnp.zeros(101), largest_x * size * jnp.cos(angle)])
+    speeds = jnp.concatenate([vs, largest_v * size * jnp.sin(angle)])
+    power = jax.vmap(lambda x, v: (static(x, v) - static(x, jnp.zeros(()))) * v)(places, speeds)
     if float(power.min()) < -1e-9 * float(jnp.abs(power).max()):
-        where = 1e3 * float(vs[int(jnp.argmin(power))])
+        where = 1e3 * float(speeds[int(jnp.argmin(power))])
         return f"its damping feeds energy in at {where:.3g} mm/s, within the visited motion"
     activities = (find_activity(element, largest_x, largest_v) for element in model.elements)
     return next((sentence for sentence in activities if sentence is not None), None)

@@ -47,7 +47,8 @@ class Ceiling(NamedTuple):
 
     Attributes:
         share: of the mean square beyond the noise that refitted coefficients leave, 1 at most; below zero
-            where the regression does worse than they do; NaN where next to nothing stands out of the noise.
+            where the regression does worse than they do; NaN where next to nothing stands out of the noise,
+            or where there is but one block of samples (a single dwell), which no other can predict.
         error: its standard error, from the scatter between blocks of samples [1].
         weights: numbers that were fitted.
         held_out: whether held-out records were scored, or else blocks of samples left out in turn.
@@ -98,7 +99,8 @@ def _blocks(one: LatentForce, scales: Scales) -> Int[np.ndarray, " time"]:
         edges = [dwell.start for dwell in one.record.dwells][1:]
     else:
         length = _PERIODS_A_BLOCK * 2.0 * np.pi / scales.angular_frequency * one.record.rate
-        edges = [round(length * place) for place in range(1, max(2, int(size / length)))]
+        length = min(length, size / 2)  # one block could not be predicted from others
+        edges = [round(length * place) for place in range(1, int(size / length))]
     return np.searchsorted(np.array(edges), np.arange(size), side="right")
 
 
@@ -215,7 +217,7 @@ def _ceiling(table: _Table, features: _Features | None, held_out: bool) -> Float
 
     penalties = _PENALTIES if features is not None else (0.0,)
     errors = {penalty: crossed(penalty) for penalty in penalties}
-    penalty = min(errors, key=lambda one: float(np.nanmean(errors[one] ** 2)))
+    penalty = min(errors, key=lambda one: float(np.nansum(errors[one] ** 2)))
     if not held_out:
         return errors[penalty]
     error = np.full(table.force.size, np.nan)
@@ -234,7 +236,7 @@ def _score(
     draws = np.random.default_rng(0).integers(0, names.size, (_DRAWS, names.size))
     total = there.sum()
     noise = float(np.sum(table.noise[seen]))
-    if total < _STANDS_OUT * noise:
+    if not total > _STANDS_OUT * noise:
         return float("nan"), float("nan")
     several = gained[draws].sum(axis=1) / np.maximum(there[draws].sum(axis=1), 0.3 * total)
     return min(1.0, float(gained.sum() / total)), float(np.std(several))

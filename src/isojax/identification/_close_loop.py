@@ -10,7 +10,7 @@ from ..records import Campaign
 from ._classical_guess import classical_guess
 from ._diagnose import MOST_OF_IT, diagnose, is_clean, is_good
 from ._find_separation import with_separating_experiment
-from ._findings import Extension, Loop, Verdict, VerdictWord
+from ._findings import Extension, Loop, Verdict, VerdictWord, findings_in
 from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
 from ._look_ahead import find_superfluous
 from ._refit import bic
@@ -88,7 +88,7 @@ def close_loop(
     current = extensions[-1].after if extensions else before
     if not is_successful(current.result):
         verdict = _without_evidence(current)
-    elif verdict.refit is not None and not extensions:
+    elif verdict.refit is not None:
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
     # Asked for here, so that the time of the loop counts it.
@@ -100,7 +100,7 @@ def close_loop(
         before,
         extensions,
         current,
-        _overall(before, current, len(extensions), verdict),
+        _overall(before, current, len(findings_in(current.model, extensions)), verdict),
         verdict,
         verdict.bounds,
         time.perf_counter() - begin,

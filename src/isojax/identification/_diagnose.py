@@ -200,6 +200,9 @@ def _violation(fit: Fit, found: Estimate, score: Score) -> str | None:
         return "its refit did not converge"
     if not is_determined(found, score):
         return "its strength is not determined"
+    element = found.model.element(score.element.name)
+    if element is not None and not element.signed and float(getattr(element, element.strength)) < 0.0:
+        return "its refit ends at a strength below zero"
     if not follows_freely(fitted, found):
         return "its free run is worse than without it"
     return find_violation(found.model, fit.campaign.fit_records, fitted.bench.problem.quantity)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..elements import AbstractElement
+from ..models import Isolator
 from ..records import Campaign
 from ._classical_guess import ClassicalGuess
 from ._estimate import Estimate
@@ -154,7 +155,7 @@ class Loop(NamedTuple):
         extensions: each effect that was added, in the order of discovery.
         after: the final fit (the same as `before` where nothing was added).
         verdict: over all iterations.
-        last: the last diagnosis: of the final fit where that found nothing, else of the fit before it.
+        last: the diagnosis of the final fit; what it found, if anything, is not added any more.
         bounds: for each effect that was not found, how large its strength could still be beside the
             final model, with its unit; empty where its fit is not good.
         seconds: wall time.
@@ -172,5 +173,19 @@ class Loop(NamedTuple):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """The effects found, in the order of discovery."""
-        return tuple(step.verdict.finding for step in self.extensions if step.verdict.finding is not None)
+        """The effects found, in the order of discovery; one that a later one contains is told by that."""
+        return findings_in(self.after.model, self.extensions)
+
+
+def findings_in(model: Isolator, extensions: tuple[Extension, ...]) -> tuple[Finding, ...]:
+    """List what was found and is part of a model.
+
+    Args:
+        model: the isolator.
+        extensions: each effect that was added.
+
+    Returns:
+        The findings, in the order of discovery, but for those that a later one took the place of.
+    """
+    found = (step.verdict.finding for step in extensions)
+    return tuple(one for one in found if one is not None and model.element(one.effect) is not None)

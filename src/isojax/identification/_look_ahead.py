@@ -148,6 +148,8 @@ def find_superfluous(
         Its catalogue name, or None where each is needed.
     """
     for name in names:
+        if final.model.element(name) is None:  # a later one contains it
+            continue
         progress(f"is {name} still needed?")
         left = tuple(element for element in final.model.elements if element.name != name)
         model = Isolator(final.model.mass, left, final.model.excitation)

@@ -90,7 +90,8 @@ def transferred_share(
 
     Returns:
         1 - (excess with the effect)/(excess without it) on the unseen part; not positive where it does not
-        carry over, 1 where the motion without it runs away there.
+        carry over or a refit runs away on the part that it sees, 1 where only the motion without it runs away
+        on the unseen part.
     """
     seen, unseen = _split(fit.estimate, extended)
     excess = []

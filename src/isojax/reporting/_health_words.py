@@ -117,7 +117,9 @@ def mains_words(health: CampaignHealth, unit: str) -> tuple[str, ...]:
             f"{typeset_number(max(own), 2)} {typeset_unit(unit)}; it does not count as noise."
         )
     if places:
-        lines.append(f"That harmonic is masked where hum falls on it: {shown}.")
+        lines.append(
+            f"Where hum falls on a harmonic of a dwell, that harmonic is left out of its summary: {shown}."
+        )
     return tuple(lines)
 
 

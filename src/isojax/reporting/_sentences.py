@@ -97,6 +97,11 @@ def headline(loop: Loop) -> str:
         return f"Nothing is missing: the declared model explains the records down to their noise; {error}."
     if loop.verdict == "found" and found:
         return f"{_capital(effects)}, {verb} missing; {error}."
+    if loop.verdict == "partly_explained" and len(found) > 2 and loop.bounds:
+        return (
+            f"{_capital(effects)}, explain the records together; so many may be parts that imitate one law "
+            f"which is not known here; {error} (noise alone: 1)."
+        )
     if loop.verdict == "partly_explained" and found:
         return f"{_capital(effects)}, {verb} missing, but something else is too; {error} (noise alone: 1)."
     pending = loop.last.finding
