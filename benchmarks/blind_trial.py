@@ -22,6 +22,7 @@ FAIL.
 import argparse
 import json
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -72,20 +73,30 @@ def read(path: Path) -> list[dict]:
     return [json.loads(text) for text in whole]
 
 
+def commit() -> str | None:
+    """Give the commit of this checkout, with which a row says what code it is of."""
+    try:
+        words = ["git", "describe", "--always", "--dirty"]
+        done = subprocess.run(words, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    except OSError:
+        return None
+    return done.stdout.strip() or None
+
+
 def run(options: argparse.Namespace) -> None:
     """Run what is not there yet."""
     rows = read(options.out)
     if options.out.exists() and not options.out.read_text().endswith("\n"):
         options.out.write_text("".join(json.dumps(row) + "\n" for row in rows))
     done = {key(row) for row in rows}
-    begin = time.perf_counter()
+    begin, version = time.perf_counter(), commit()
     for seed, kind, task, names in tasks(options):
         if (seed, task, tuple(names or ())) in done:
             continue
         if options.minutes and time.perf_counter() - begin > 60.0 * options.minutes:
             print("time is up", flush=True)
             return
-        row = run_one(seed, kind, task, names) | {"names": names}
+        row = run_one(seed, kind, task, names) | {"names": names, "commit": version}
         with options.out.open("a") as file:
             file.write(json.dumps(row) + "\n")
         print(f"{row['total_seconds']:6.1f} s  {line(row)}", flush=True)
