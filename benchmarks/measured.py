@@ -187,6 +187,8 @@ def emps() -> bool:
     print(f"  without settle (the first second sets the state and counts): {pair[0]:.3f} -> {pair[1]:.3f} mm")
     kinds = [element.name for element in loop.after.model.elements]
     alone = not {"asymmetric_friction", "input_offset"} <= set(kinds)
+    hidden = "asymmetric_friction" in loop.last.hidden
+    print(f"  asymmetric friction beside the free offset: {'hidden by it' if hidden else 'not hidden by it'}")
     print(f"  {'PASS' if names[:1] == ['coulomb_friction'] else 'FAIL'}  first finding: {names[:1]}")
     print(f"  {'PASS' if alone else 'FAIL'}  asymmetric friction and offset never both free")
     return (
