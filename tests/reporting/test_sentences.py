@@ -4,11 +4,11 @@ import math
 import pytest
 
 from isojax.elements import StribeckFriction
-from isojax.identification import DriftBudget
+from isojax.identification import DriftBudget, Errors, Fit
 from isojax.records import NoisePeak, data_health
 from isojax.reporting import render_text, verdict_summary
 from isojax.reporting._health_words import budget_words
-from isojax.reporting._sentences import caveats, finding_words, headline, health_words
+from isojax.reporting._sentences import caveats, doubt_words, finding_words, headline, health_words
 
 
 @pytest.mark.parametrize(
@@ -27,6 +27,37 @@ def test_headline_says_what_the_verdict_says(found, verdict, start):
     assert sentence.startswith(start)
     assert ("something else is too" in sentence) == (verdict == "partly_explained")
     assert sentence.endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "verdict", "said"),
+    [
+        (1.16, 1.32, "found", "speak against it: they are predicted worse than without it."),
+        (1.16, 1.32, "partly_explained", "speak against it: they are predicted worse than without it."),
+        (1.16, 1.12, "found", "not explained down to their noise: there the law may be another."),
+        (1.16, 1.12, "partly_explained", ""),
+        (1.16, 1.04, "found", ""),
+        (0.98, 1.03, "found", ""),
+        (3.00, math.nan, "found", ""),
+    ],
+)
+def test_what_held_out_records_say_against_a_finding_is_told(
+    before, after, verdict, said, found, monkeypatch
+):
+    def errors(held):
+        return {"holdout": Errors(0.01, 0.04, 0.04, before if held is found.before else after)}
+
+    monkeypatch.setattr(Fit, "errors", property(errors))
+    told = doubt_words(found._replace(verdict=verdict))
+    assert told.endswith(said)
+    assert bool(told) == bool(said)
+    assert doubt_words(found._replace(verdict="none", extensions=())) == ""
+
+
+def test_a_doubt_stands_in_the_headline(found, monkeypatch):
+    plain = headline(found)
+    monkeypatch.setattr("isojax.reporting._sentences.doubt_words", lambda loop: "But they do not agree.")
+    assert headline(found) == f"{plain} But they do not agree."
 
 
 def test_headline_without_findings_names_nothing(found):

@@ -1,6 +1,7 @@
 """From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop."""
 
 from ._base_model import base_model as base_model
+from ._bounds import GOOD as GOOD
 from ._ceiling import Ceiling as Ceiling
 from ._circle_fit import CircleFit as CircleFit
 from ._circle_fit import fit_circle as fit_circle

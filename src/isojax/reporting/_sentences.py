@@ -5,7 +5,7 @@ import math
 from .._parameters import Parameter, list_parameters
 from .._results import RESULTS, is_successful
 from ..elements import CATALOGUE
-from ..identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
+from ..identification import GOOD, OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
 from ..records import DataHealth
 from ._quantities import (
     typeset_goodness,
@@ -79,15 +79,45 @@ def error_words(before: Fit, after: Fit) -> str:
     return f"{place} {typeset_goodness(first.chi2_per_dof, 2)} → {typeset_goodness(last.chi2_per_dof, 2)}"
 
 
+WORSE = 0.01
+"""Rise of the held-out chi2/dof that chance does not explain: the noise is common to both figures, so that
+their difference scatters by 2 sqrt(rise / samples) only, 0.002 for 10000 samples."""
+
+
 def headline(loop: Loop) -> str:
-    """Give the verdict in one sentence.
+    """Give the verdict in one sentence, and in a second one what held-out records say against it.
 
     Args:
         loop: the closed loop.
 
     Returns:
-        The sentence.
+        The sentences.
     """
+    return " ".join(part for part in (_verdict_words(loop), doubt_words(loop)) if part)
+
+
+def doubt_words(loop: Loop) -> str:
+    """Give what held-out records say against what was named.
+
+    They never move a verdict, or they would not be held out; but who reads it must hear them.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        A sentence, or nothing where they agree.
+    """
+    before, after = loop.before.errors["holdout"], loop.after.errors["holdout"]
+    if before is None or after is None or not loop.findings or not after.chi2_per_dof > GOOD:
+        return ""
+    if after.chi2_per_dof > before.chi2_per_dof + WORSE:
+        return "The held-out records speak against it: they are predicted worse than without it."
+    if loop.verdict == "found":
+        return "The held-out records are not explained down to their noise: there the law may be another."
+    return ""
+
+
+def _verdict_words(loop: Loop) -> str:
     if not is_successful(loop.after.result):
         return f"The fit failed, so nothing can be said of the model. {RESULTS[loop.after.result]}"
     found = [_found(loop.after, one) for one in loop.findings]
