@@ -1,6 +1,6 @@
 """Laws of which the catalogue knows nothing, for the rig."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, no_type_check
 
 import numpy as np
@@ -68,3 +68,47 @@ class Machine(rig.Law):
     def force(self, t, x, v, z, s):
         """Force in N; see `Law.force`."""
         return self.size * np.sin(self.angular * t)
+
+
+@dataclass(frozen=True)
+class RestlessSpring(rig.Law):
+    """A spring that is another in each dwell: f = k d x, with a d of its own for each stretch of a record.
+
+    Args:
+        stiffness: k, N/m.
+        spread: standard deviation of d.
+        edges: for each record the share of the test at which it begins, and where its dwells begin, s.
+        deviations: d of the record's dwells; drawn when the law is placed.
+    """
+
+    name: ClassVar[str] = "restless_spring"
+    stiffness: float
+    spread: float
+    edges: tuple[tuple[float, tuple[float, ...]], ...]
+    starts: tuple[float, ...] = ()
+    deviations: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, plan, stiffness, spread, seed, bench):
+        """The spring in the dwells of a plan."""
+        trials = plan.trials(bench.shaker, seed)
+        ends = np.cumsum([0.0, *(trial.seconds for trial in trials)])
+        shares = (ends / ends[-1]).tolist()
+        edges = tuple(
+            (share, tuple(start for start, _, _ in trial.schedule))
+            for share, trial in zip(shares, trials, strict=False)
+        )
+        return cls(stiffness, spread, edges)
+
+    @no_type_check
+    def placed(self, stretch, draw):
+        """The spring in one record."""
+        starts = next(starts for share, starts in self.edges if abs(share - stretch.begin) < 1e-12)
+        drawn = self.spread * draw.standard_normal(len(starts))
+        return replace(self, starts=starts, deviations=tuple(drawn.tolist()))
+
+    @no_type_check
+    def force(self, t, x, v, z, s):
+        """Force in N; see `Law.force`."""
+        place = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, len(self.starts) - 1)
+        return self.stiffness * np.asarray(self.deviations)[place] * x

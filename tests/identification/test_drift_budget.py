@@ -7,10 +7,11 @@ import isojax as ij
 from isojax import rig
 from isojax.identification import drift_budget
 from isojax.identification._drift_budget import noise_and_pretence
-from isojax.identification._elimination import Nuisances, eliminate
+from isojax.identification._elimination import Nuisances, Spread, eliminate
 from isojax.identification._problem import one_hot
 
 SPREAD, RECORDS, SAMPLES, COEFFICIENTS = 3e-3, 5, 60, 3
+OWNER = np.repeat(np.arange(RECORDS), 2)  # two segments a record
 UNIT = 1e-3  # one unit of the scale's column: a tenth of a percent
 
 
@@ -23,37 +24,51 @@ def dense():
     return columns, scale, rng.normal(size=(RECORDS, SAMPLES))
 
 
-def reduced_of(dense):
+@pytest.fixture(params=[0.0, 4e-3], ids=["between records", "within them, too"])
+def spread(request):
+    return Spread(SPREAD, request.param)
+
+
+def reduced_of(dense, spread):
     columns, scale, residual = dense
     # A state that no sample sees costs nothing and changes nothing.
     states = np.zeros((RECORDS, SAMPLES, 2))
     whole = np.concatenate([columns, scale[..., None], states, residual[..., None]], axis=2)
+    whole = whole.reshape(OWNER.size, SAMPLES // 2, -1)
     matrices = np.einsum("rti,rtj->rij", whole, whole)
-    nuisances = Nuisances(np.zeros((RECORDS, 2)), np.zeros(RECORDS), SPREAD)
-    return eliminate(matrices, 1.0, np.arange(RECORDS), RECORDS, RECORDS, COEFFICIENTS, True, nuisances)
+    lanes = OWNER.size
+    nuisances = Nuisances(np.zeros((lanes, 2)), np.zeros(RECORDS), np.zeros(lanes), spread)
+    return eliminate(matrices, 1.0, OWNER, lanes, RECORDS, COEFFICIENTS, True, nuisances)
 
 
-def test_noise_alone_is_ordinary_least_squares(dense):
+def test_noise_alone_is_ordinary_least_squares(dense, spread):
     columns = dense[0].reshape(-1, COEFFICIENTS)
     expected = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
-    np.testing.assert_allclose(noise_and_pretence(reduced_of(dense), SPREAD)[0], expected, rtol=1e-9)
+    np.testing.assert_allclose(
+        noise_and_pretence(reduced_of(dense, spread), OWNER, spread)[0], expected, rtol=1e-9
+    )
 
 
-def test_noise_and_scatter_together_are_generalised_least_squares(dense):
+def test_noise_and_scatter_together_are_generalised_least_squares(dense, spread):
     columns, scale, _ = dense
     information = np.zeros((COEFFICIENTS, COEFFICIENTS))
     for own, stiffness in zip(columns, scale, strict=True):
-        noise = np.eye(SAMPLES) + (SPREAD / UNIT) ** 2 * np.outer(stiffness, stiffness)
+        noise = np.eye(SAMPLES) + (spread.records / UNIT) ** 2 * np.outer(stiffness, stiffness)
+        for half in np.split(np.arange(SAMPLES), 2):
+            alone = np.where(np.isin(np.arange(SAMPLES), half), stiffness, 0.0)
+            noise += (spread.segments / UNIT) ** 2 * np.outer(alone, alone)
         information += own.T @ np.linalg.solve(noise, own)
-    np.testing.assert_allclose(reduced_of(dense).matrix[:-1, :-1], information, rtol=1e-9)
+    np.testing.assert_allclose(reduced_of(dense, spread).matrix[:-1, :-1], information, rtol=1e-9)
 
 
-def test_what_the_scatter_pretends_is_what_ordinary_least_squares_makes_of_it(dense):
+def test_what_the_scatter_pretends_is_what_ordinary_least_squares_makes_of_it(dense, spread):
     columns, scale, _ = dense
-    drawn = np.random.default_rng(8).normal(size=(4000, RECORDS)) * SPREAD / UNIT
-    seen = (drawn[:, :, None] * scale).reshape(4000, -1)
+    draw = np.random.default_rng(8)
+    drawn = draw.normal(size=(4000, RECORDS, 1)) * spread.records
+    drawn = drawn + draw.normal(size=(4000, RECORDS, 2)) * spread.segments
+    seen = (np.repeat(drawn, SAMPLES // 2, axis=2) / UNIT * scale).reshape(4000, -1)
     fitted = np.linalg.lstsq(columns.reshape(-1, COEFFICIENTS), seen.T, rcond=None)[0]
-    pretended = noise_and_pretence(reduced_of(dense), SPREAD)[1]
+    pretended = noise_and_pretence(reduced_of(dense, spread), OWNER, spread)[1]
     np.testing.assert_allclose(pretended, fitted.std(axis=1), rtol=0.04)
 
 
@@ -84,7 +99,7 @@ def test_parts_add_up_and_a_loose_stiffness_limits_itself(drifting):
 
 
 def test_noise_alone_is_what_a_fit_leaves_that_knows_of_no_scatter(drifting):
-    steady = drifting.estimate.point.nuisances._replace(stiffness_spread=1e-9)
+    steady = drifting.estimate.point.nuisances._replace(spread=Spread(1e-9))
     bench, places = drifting.estimate.bench, drifting.estimate.places
     directions = one_hot(drifting.model, places, [1.0] * len(places))
     point = bench.evaluate(drifting.model, directions, steady._replace(stiffness=0.0 * steady.stiffness))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from isojax.identification._elimination import Nuisances, eliminate, step_nuisances
+from isojax.identification._elimination import Nuisances, Spread, eliminate, step_nuisances
 from isojax.identification._information import STIFFNESS_SCALE_UNIT
 
-NOISE, SPREAD = 0.3, 2e-3
+NOISE, SPREAD, WITHIN = 0.3, 2e-3, 1e-3
 COLUMNS, STATES, SAMPLES = 3, 2, 40
 OWNER = np.array([0, 0, 1, 1, 1, 0])
 USED, RECORDS = 5, 2
@@ -24,7 +24,8 @@ def _blocks(has_scale):
 def _dense(blocks, has_scale, nuisances):
     """Stack every sample and every prior as a row; unknowns: coefficients, scales, states of each lane."""
     scales = RECORDS if has_scale else 0
-    unknowns = COLUMNS + scales + USED * STATES
+    within = USED if nuisances.spread.segments else 0
+    unknowns = COLUMNS + scales + USED * STATES + within
     rows, right, owner = [], [], []
     for lane in range(USED):
         block = blocks[lane] / NOISE
@@ -41,6 +42,14 @@ def _dense(blocks, has_scale, nuisances):
         rows.append(prior)
         right.append(-nuisances.states[lane])
         owner += [OWNER[lane]] * (SAMPLES + STATES)
+        if within:
+            own = unknowns - within + lane
+            part[:, own] = block[:, COLUMNS]
+            prior = np.zeros((1, unknowns))
+            prior[0, own] = STIFFNESS_SCALE_UNIT / WITHIN
+            rows.append(prior)
+            right.append(-nuisances.segments[[lane]] * STIFFNESS_SCALE_UNIT / WITHIN)
+            owner.append(OWNER[lane])
     for record in range(scales):
         prior = np.zeros((1, unknowns))
         prior[0, COLUMNS + record] = STIFFNESS_SCALE_UNIT / SPREAD
@@ -50,11 +59,20 @@ def _dense(blocks, has_scale, nuisances):
     return np.concatenate(rows), np.concatenate(right), np.array(owner)
 
 
-@pytest.fixture(params=[True, False], ids=["spring", "no spring"])
+def _nuisances(rng, within=0.0):
+    """Deviations of everything; of the segments' own stiffness only where it scatters."""
+    states, stiffness = rng.standard_normal((OWNER.size, STATES)), rng.standard_normal(RECORDS)
+    segments = rng.standard_normal(OWNER.size) if within else np.zeros(OWNER.size)
+    return Nuisances(states, stiffness, segments, Spread(SPREAD, within))
+
+
+@pytest.fixture(
+    params=[(True, 0.0), (False, 0.0), (True, WITHIN)], ids=["spring", "no spring", "scatter within records"]
+)
 def setting(request):
-    has_scale = request.param
+    has_scale, within = request.param
     rng = np.random.default_rng(8)
-    nuisances = Nuisances(rng.standard_normal((OWNER.size, STATES)), rng.standard_normal(RECORDS), SPREAD)
+    nuisances = _nuisances(rng, within)
     blocks = _blocks(has_scale)
     matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)
     reduced = eliminate(matrices, NOISE, OWNER, USED, RECORDS, COLUMNS, has_scale, nuisances)
@@ -85,13 +103,17 @@ def test_a_step_of_coefficients_and_nuisances_is_that_of_dense_least_squares(set
             moved.stiffness - nuisances.stiffness, solution[COLUMNS : COLUMNS + scales], rtol=1e-9
         )
     states = (moved.states - nuisances.states)[:USED].ravel()
-    np.testing.assert_allclose(states, solution[COLUMNS + scales :], rtol=1e-8, atol=1e-10)
+    end = COLUMNS + scales + states.size
+    np.testing.assert_allclose(states, solution[COLUMNS + scales : end], rtol=1e-8, atol=1e-10)
+    segments = (moved.segments - nuisances.segments)[:USED]
+    own = solution[end:] if nuisances.spread.segments else np.zeros(USED)
+    np.testing.assert_allclose(segments, own, rtol=1e-8, atol=1e-10)
     np.testing.assert_array_equal(moved.states[USED:], nuisances.states[USED:])
 
 
 def test_a_column_that_is_not_finite_leaves_the_steps_of_the_others_alone():
     rng = np.random.default_rng(8)
-    nuisances = Nuisances(rng.standard_normal((OWNER.size, STATES)), rng.standard_normal(RECORDS), SPREAD)
+    nuisances = _nuisances(rng, WITHIN)
     blocks = _blocks(True)
     matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)
     spoilt = matrices.copy()
@@ -107,6 +129,7 @@ def test_a_column_that_is_not_finite_leaves_the_steps_of_the_others_alone():
     (whole, expected), (without, found) = moved(matrices, np.array([], int)), moved(spoilt, np.array([1]))
     np.testing.assert_allclose(found.states, expected.states, rtol=1e-12)
     np.testing.assert_allclose(found.stiffness, expected.stiffness, rtol=1e-12)
+    np.testing.assert_allclose(found.segments, expected.segments, rtol=1e-12)
     left = np.delete(np.delete(whole.matrix, 1, 0), 1, 1)
     np.testing.assert_allclose(np.delete(np.delete(without.matrix, 1, 0), 1, 1), left, rtol=1e-12)
     assert not without.matrix[1].any()
@@ -114,13 +137,14 @@ def test_a_column_that_is_not_finite_leaves_the_steps_of_the_others_alone():
 
 
 def test_eliminated_degrees_of_freedom_are_those_of_the_dense_projection(setting):
-    reduced, _, has_scale, rows, _, owner = setting
+    reduced, nuisances, has_scale, rows, _, owner = setting
     inner = rows[:, COLUMNS:]
+    own = STATES + bool(nuisances.spread.segments)
     hat = inner @ np.linalg.pinv(inner)
     priors = np.zeros(rows.shape[0], dtype=bool)
     for lane in range(USED):
-        first = lane * (SAMPLES + STATES) + SAMPLES
-        priors[first : first + STATES] = True
+        first = lane * (SAMPLES + own) + SAMPLES
+        priors[first : first + own] = True
     if has_scale:
         priors[-RECORDS:] = True
     for record in range(RECORDS):

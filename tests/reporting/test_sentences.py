@@ -109,6 +109,15 @@ def test_health_counts_dwells_and_gives_the_noise(found):
     assert f"{found.after.noise.sigma:.3g} m/s² rms" in text
 
 
+def test_scatter_within_records_is_told_where_repeats_show_it(found):
+    plain = " ".join(health_words(data_health(found.campaign), found.after))
+    assert "within them" not in plain
+    stats = found.after.stats._replace(stiffness_scatter=4e-4, segment_scatter=1e-3)
+    told = " ".join(health_words(data_health(found.campaign), found.after._replace(stats=stats)))
+    assert "scatters by 0.0400 % between records and 0.100 % within them." in told
+    assert "0.04 % between records, 0.1 % within them" in str(found.after._replace(stats=stats))
+
+
 def test_a_peak_in_the_scatter_is_said_in_numbers_and_a_flat_one_is_not(found):
     quiet = data_health(found.campaign)
     assert quiet.noise_peak is None

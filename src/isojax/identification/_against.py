@@ -41,10 +41,10 @@ class Against:
             free_runs = run_freely(everything, found.model)
             if everything.records == fitted.records and everything.segments == fitted.segments:
                 restarts = restart_records(
-                    found.bench, found.model, nuisances.stiffness_spread, nuisances, found.places
+                    found.bench, found.model, nuisances.spread, nuisances, found.places
                 )
             else:
-                restarts = restart_records(Bench(everything), found.model, nuisances.stiffness_spread)
+                restarts = restart_records(Bench(everything), found.model, nuisances.spread)
         if not is_successful(found.result):
             free_runs = tuple(without_values(run) for run in free_runs)
             restarts = restarts._replace(runs=tuple(without_values(run) for run in restarts.runs))

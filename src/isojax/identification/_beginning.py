@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from ..models import Isolator
 from ..records import Record, ringing_frequency
-from ._elimination import Nuisances, step_nuisances
+from ._elimination import Nuisances, Spread, step_nuisances
 from ._problem import Bench, Point, Problem, one_hot
 from ._segments import Segment
 
@@ -21,7 +21,7 @@ WORSE = 1.1
 HALVINGS = 5
 """How often the step of a record is halved before it is given up."""
 
-HELD = 1e-9
+HELD = Spread(1e-9)
 """Spread of the linear stiffness between records that leaves it where it is."""
 
 SETTLED = 1e-2
@@ -37,7 +37,7 @@ SMALL_STEP = 1e-4
 def best_nuisances(
     bench: Bench,
     model: Isolator,
-    spread: float,
+    spread: Spread,
     known: Nuisances | None = None,
     places: tuple[int, ...] = (),
 ) -> Point:
@@ -46,7 +46,7 @@ def best_nuisances(
     Args:
         bench: the records.
         model: the isolator.
-        spread: prior standard deviation of each record's linear stiffness.
+        spread: prior standard deviations of the linear stiffness.
         known: where to begin; at the measured states if omitted.
         places: coefficients that have columns at the point; they stay as they are. A search for the same ones
             shares the compiled code.
@@ -125,13 +125,19 @@ def _shortened(
         if not np.any(worse):
             break
         share = np.where(worse, 0.5 * share if halving < HALVINGS else 0.0, share)
-        moved = share[owner][:, None]
+        moved = share[owner]
         between = old._replace(
-            states=old.states + np.where(moved > 0.0, moved * (new.states - old.states), 0.0),
-            stiffness=old.stiffness + np.where(share > 0.0, share * (new.stiffness - old.stiffness), 0.0),
+            states=_between(old.states, new.states, moved[:, None]),
+            stiffness=_between(old.stiffness, new.stiffness, share),
+            segments=_between(old.segments, new.segments, moved),
         )
         found = bench.evaluate(before.model, directions, between)
     return found
+
+
+def _between(old: np.ndarray, new: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Give what lies a share of the way from old to new; what does not move may lead to no number."""
+    return old + np.where(share > 0.0, share * (new - old), 0.0)
 
 
 def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:

@@ -277,4 +277,11 @@ def _in_physical_units(point: Point, slopes: list[float]) -> Point:
     with np.errstate(over="ignore", invalid="ignore"):
         by_record = point.reduced.by_record * np.outer(factor, factor)
         stiffness_map = point.reduced.stiffness_map * factor
-    return point._replace(reduced=point.reduced._replace(by_record=by_record, stiffness_map=stiffness_map))
+        # The stiffness scale stands between the coefficients and the residual.
+        wide = np.insert(factor, -1, [1.0] * (point.reduced.segments_map.shape[1] - factor.size))
+        segments_map = point.reduced.segments_map * wide
+    return point._replace(
+        reduced=point.reduced._replace(
+            by_record=by_record, stiffness_map=stiffness_map, segments_map=segments_map
+        )
+    )

@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from .._parameters import list_parameters
 from .._results import is_successful
-from ._elimination import Reduced
+from ._elimination import Reduced, Spread
 from ._fit import Fit
 from ._information import STIFFNESS_SCALE_UNIT, has_stiffness_scale
 
@@ -36,16 +36,18 @@ class Share(NamedTuple):
 
 
 class DriftBudget(NamedTuple):
-    """How far the scatter of the linear stiffness between records limits a fit.
+    """How far the scatter of the linear stiffness limits a fit.
 
     Attributes:
         scatter: standard deviation of the linear stiffness between records [relative]; NaN where the model
             has none, a single record shows none, or the fit failed.
         shares: each fitted coefficient; none where the scatter is not known.
+        within: the same between the segments of a record; 0 where no repeat shows one.
     """
 
     scatter: float
     shares: tuple[Share, ...]
+    within: float = 0.0
 
     def of(self, name: str) -> Share | None:
         """Give the share of one coefficient.
@@ -76,8 +78,9 @@ def drift_budget(fit: Fit) -> DriftBudget:
     single = len(found.bench.problem.records) < 2
     if single or not is_successful(fit.result) or not has_stiffness_scale(fit.model):
         return DriftBudget(float("nan"), ())
-    spread = found.point.nuisances.stiffness_spread
-    noise, pretended = noise_and_pretence(found.point.reduced, spread)
+    spread = found.point.nuisances.spread
+    owner = np.array([segment.record for segment in found.bench.problem.segments])
+    noise, pretended = noise_and_pretence(found.point.reduced, owner, spread)
     inflation = np.sqrt(max(1.0, found.chi2 / found.dof))
     listed = list_parameters(fit.model)
     errors = fit.standard_errors
@@ -97,28 +100,36 @@ def drift_budget(fit: Fit) -> DriftBudget:
                 float(pretended[column]) if np.isfinite(whole) else float("nan"),
             )
         )
-    return DriftBudget(spread, tuple(shares))
+    return DriftBudget(spread.records, tuple(shares), spread.segments)
 
 
 def noise_and_pretence(
-    reduced: Reduced, spread: float
+    reduced: Reduced, owner: Int[np.ndarray, " segment"], spread: Spread
 ) -> tuple[Float[np.ndarray, " column"], Float[np.ndarray, " column"]]:
     """Give the errors that noise alone leaves, and those that the scatter of the stiffness puts in unawares.
 
     With J_r the whitened columns of a record after its initial states and g_r that of its stiffness scale,
     `A = sum J_r'J_r`: noise alone leaves `A^-1`; a scale off by delta_r moves the unaware estimate by
-    `A^-1 J_r'g_r delta_r`.
+    `A^-1 J_r'g_r delta_r`. So does the scale of a segment where the stiffness scatters within records.
 
     Args:
         reduced: the equations, stiffness scales eliminated.
-        spread: standard deviation of the scales [relative stiffness].
+        owner: record of each segment.
+        spread: standard deviations of the scales [relative stiffness].
 
     Returns:
         Standard deviations of the coefficients; NaN where the data determine none of them.
     """
+    count = reduced.raw.size
     pivot = STIFFNESS_SCALE_UNIT**2 / reduced.stiffness_variance
     cross = pivot[:, None] * reduced.stiffness_map[:, :-1]
+    own_pivot = STIFFNESS_SCALE_UNIT**2 / reduced.segments_variance
+    own = reduced.segments_map[:, : count + 1]
+    shares = own_pivot[:, None] * own[:, :count]
+    # As it was before the segments took their own share of it.
+    np.add.at(cross, owner[: own.shape[0]], shares * own[:, count:])
     undone = np.einsum("r,ri,rj->ij", pivot, reduced.stiffness_map[:, :-1], reduced.stiffness_map[:, :-1])
+    undone += shares.T @ own[:, :count]
     whole = reduced.matrix[:-1, :-1] + undone
     # Stiffness in N/m and in N/m^3 must not spoil each other.
     size = np.sqrt(np.maximum(np.diag(whole), 0.0))
@@ -128,5 +139,6 @@ def noise_and_pretence(
     except np.linalg.LinAlgError:
         unknown = np.full(size.size, np.nan)
         return unknown, unknown
-    moved = inverse @ cross.T * (spread / STIFFNESS_SCALE_UNIT)
+    scatter = np.concatenate([cross * spread.records, shares * spread.segments])
+    moved = inverse @ scatter.T / STIFFNESS_SCALE_UNIT
     return np.sqrt(np.maximum(np.diag(inverse), 0.0)), np.sqrt(np.sum(moved**2, axis=1))

@@ -13,6 +13,18 @@ from jaxtyping import Float, Int
 from ._information import STIFFNESS_SCALE_UNIT
 
 
+class Spread(NamedTuple):
+    """Standard deviations of the linear stiffness, which are the priors of its deviations.
+
+    Attributes:
+        records: from record to record [relative stiffness].
+        segments: from segment to segment within a record [relative stiffness]; 0 where it has none.
+    """
+
+    records: float
+    segments: float = 0.0
+
+
 class Nuisances(NamedTuple):
     """Where the nuisances stand, and their priors.
 
@@ -20,12 +32,29 @@ class Nuisances(NamedTuple):
         states: deviation of each segment's initial states from the measured ones, in the states' own scales
             (which are also the standard deviations of their priors).
         stiffness: deviation of each record's linear stiffness [units of `STIFFNESS_SCALE_UNIT`].
-        stiffness_spread: standard deviation of its prior [relative stiffness].
+        segments: further deviation of each segment's [the same units].
+        spread: standard deviations of the priors of both.
     """
 
     states: Float[np.ndarray, "lanes state"]
     stiffness: Float[np.ndarray, " record"]
-    stiffness_spread: float
+    segments: Float[np.ndarray, " lanes"]
+    spread: Spread
+
+    def afresh(self) -> "Nuisances":
+        """Give what is known of the records alone: other segments or states are to be found anew."""
+        return self._replace(states=np.zeros((0, 0)), segments=np.zeros(0))
+
+    def factor(self, owner: Int[np.ndarray, " lanes"]) -> Float[np.ndarray, " lanes"]:
+        """Give the factor on the linear stiffness of each lane.
+
+        Args:
+            owner: record of each lane.
+
+        Returns:
+            Factors, 1 where nothing deviates.
+        """
+        return 1.0 + STIFFNESS_SCALE_UNIT * (self.stiffness[owner] + self.segments)
 
 
 class Reduced(NamedTuple):
@@ -40,6 +69,10 @@ class Reduced(NamedTuple):
             squared].
         states_map: step of the states = map[..., -1] - map[..., :-1] @ [step of coefficients, of the
             stiffness scale].
+        segments_map: the same of the segments' own stiffness; no rows where it does not scatter.
+        segments_variance: of each, given all else [relative stiffness squared].
+        by_segment: information of each segment on its own stiffness scale after its states, and the score
+            [units of `STIFFNESS_SCALE_UNIT`]; before any prior.
     """
 
     by_record: Float[np.ndarray, "record column column"]
@@ -48,6 +81,9 @@ class Reduced(NamedTuple):
     stiffness_map: Float[np.ndarray, "record column"]
     stiffness_variance: Float[np.ndarray, " record"]
     states_map: Float[np.ndarray, "lanes state column2"]
+    segments_map: Float[np.ndarray, "segment column3"]
+    segments_variance: Float[np.ndarray, " segment"]
+    by_segment: Float[np.ndarray, "lanes 2"]
 
     @property
     def matrix(self) -> Float[np.ndarray, "column column"]:
@@ -65,13 +101,17 @@ class Reduced(NamedTuple):
         """
         by_record, raw = self.by_record.copy(), self.raw.copy()
         states, stiffness = self.states_map.copy(), self.stiffness_map.copy()
+        segments = self.segments_map.copy()
         residual = raw.size
         by_record[:, columns], by_record[:, :, columns] = 0.0, 0.0
         stiffness[:, columns] = 0.0
-        # In the map of the states the stiffness scale may stand between the coefficients and the residual.
+        # In the other maps the stiffness scale may stand between the coefficients and the residual.
         states[..., np.where(columns == residual, -1, columns)] = 0.0
+        segments[:, np.where(columns == residual, -1, columns)] = 0.0
         raw[columns[columns < residual]] = 0.0
-        return self._replace(by_record=by_record, raw=raw, stiffness_map=stiffness, states_map=states)
+        return self._replace(
+            by_record=by_record, raw=raw, stiffness_map=stiffness, states_map=states, segments_map=segments
+        )
 
 
 def eliminate(
@@ -85,7 +125,7 @@ def eliminate(
     nuisances: Nuisances,
     heads: Float[np.ndarray, "lanes column column"] | None = None,
 ) -> Reduced:
-    """Eliminate the initial states of each segment, then the stiffness scale of each record.
+    """Eliminate the initial states of each segment, then its own stiffness and that of its record.
 
     Where `heads` is given, the initial states follow from the beginnings of the records alone, as those of a
     free run do; the rest of a record then has no say in its own start.
@@ -133,13 +173,27 @@ def eliminate(
     eliminated = np.zeros(records)
     np.add.at(eliminated, owner[:used], taken)
 
+    by_segment = left[:, columns, [columns, -1]] if has_scale else np.zeros((used, 2))
+    segments_map, segments_variance = np.zeros((0, shared + 1)), np.zeros(0)
+    if has_scale and nuisances.spread.segments > 0.0:
+        spread = nuisances.spread.segments / STIFFNESS_SCALE_UNIT
+        own = nuisances.segments[:used]
+        pivot = left[:, columns, columns] + 1.0 / spread**2
+        row = left[:, columns, :].copy()
+        row[:, -1] -= own / spread**2
+        segments_map, segments_variance = row / pivot[:, None], STIFFNESS_SCALE_UNIT**2 / pivot
+        left[:, -1, -1] += (own / spread) ** 2
+        with np.errstate(over="ignore", invalid="ignore"):
+            left -= segments_map[:, :, None] * row[:, None, :]
+        np.add.at(eliminated, owner[:used], 1.0 - 1.0 / (pivot * spread**2))
+
     per_record = np.zeros((records, shared + 1, shared + 1))
     np.add.at(per_record, owner[:used], left)
     stiffness_map = np.zeros((records, columns + 1))
     variance = np.zeros(records)
     reduced = per_record.copy()
     if has_scale:
-        spread = nuisances.stiffness_spread / STIFFNESS_SCALE_UNIT
+        spread = nuisances.spread.records / STIFFNESS_SCALE_UNIT
         pivot = per_record[:, columns, columns] + 1.0 / spread**2
         row = np.delete(per_record[:, columns, :], columns, axis=1)
         row[:, -1] -= nuisances.stiffness / spread**2
@@ -151,7 +205,17 @@ def eliminate(
             reduced = reduced - stiffness_map[:, :, None] * row[:, None, :]
         eliminated += 1.0 - 1.0 / (pivot * spread**2)
     raw = np.diagonal(matrices, axis1=1, axis2=2).sum(axis=0)[:columns]
-    return Reduced(reduced, eliminated, raw, stiffness_map, variance, states_map)
+    return Reduced(
+        reduced,
+        eliminated,
+        raw,
+        stiffness_map,
+        variance,
+        states_map,
+        segments_map,
+        segments_variance,
+        by_segment,
+    )
 
 
 def step_nuisances(
@@ -173,11 +237,16 @@ def step_nuisances(
     """
     stiffness_step = reduced.stiffness_map[:, -1] - reduced.stiffness_map[:, :-1] @ step
     used = reduced.states_map.shape[0]
+    factor_step = stiffness_step[owner[:used]]
+    segments = nuisances.segments.copy()
+    if reduced.segments_map.shape[0]:
+        own = reduced.segments_map
+        segments_step = own[:, -1] - own[:, : step.size] @ step - own[:, step.size] * factor_step
+        segments[:used] += segments_step
+        factor_step = factor_step + segments_step
     coefficients = reduced.states_map[:, :, : step.size] @ step
     if reduced.states_map.shape[2] == step.size + 2:
-        coefficients = (
-            coefficients + reduced.states_map[:, :, step.size] * stiffness_step[owner[:used]][:, None]
-        )
+        coefficients = coefficients + reduced.states_map[:, :, step.size] * factor_step[:, None]
     states = nuisances.states.copy()
     states[:used] += reduced.states_map[:, :, -1] - coefficients
-    return Nuisances(states, nuisances.stiffness + stiffness_step, nuisances.stiffness_spread)
+    return Nuisances(states, nuisances.stiffness + stiffness_step, segments, nuisances.spread)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from ..models import Isolator
 from ..records import Record
 from ._beginning import beginning_states, best_nuisances
-from ._elimination import Nuisances
+from ._elimination import Nuisances, Spread
 from ._information import readings
 from ._problem import Bench, Point, Problem, stiffness_deviation
 from ._segments import Segment
@@ -85,7 +85,7 @@ def _simulate_lanes(
     prepared = bench.prepared(model, len(model.elements))
     starts, scales = bench.starts(model, prepared)
     states = starts + scales * nuisances.states.T
-    factor = 1.0 + stiffness_deviation(nuisances)[prepared.record]
+    factor = nuisances.factor(prepared.record)
     simulated = readings(model, factor, states, prepared)
     return [simulated[: part.stop - part.start, lane] for lane, part in enumerate(prepared.segments)]
 
@@ -93,7 +93,7 @@ def _simulate_lanes(
 def restart_records(
     bench: Bench,
     model: Isolator,
-    spread: float,
+    spread: Spread,
     known: Nuisances | None = None,
     places: tuple[int, ...] = (),
 ) -> Restarts:
@@ -102,7 +102,7 @@ def restart_records(
     Args:
         bench: the records.
         model: the isolator.
-        spread: prior standard deviation of each record's linear stiffness.
+        spread: prior standard deviations of the linear stiffness.
         known: nuisances to begin with; the measured states if omitted.
         places: see `best_nuisances`.
 

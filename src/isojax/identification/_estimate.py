@@ -19,11 +19,12 @@ from ..records import Record
 from ._beginning import HELD, best_nuisances
 from ._covariance import Uncertainty, uncertainty, unknown
 from ._descent import Rival, descend
-from ._elimination import Nuisances
+from ._elimination import Nuisances, Spread
 from ._information import STIFFNESS_SCALE_UNIT, has_stiffness_scale
 from ._problem import Bench, Point
+from ._segment_scatter import segment_scatter
 
-FIRST_STIFFNESS_SPREAD = 1e-2
+FIRST_STIFFNESS_SPREAD = Spread(1e-2)
 """Prior of the stiffness scales before the records have said how much they scatter: one percent."""
 
 SMALLEST_STIFFNESS_SPREAD = 1e-5
@@ -230,7 +231,7 @@ def estimate(
         # A release is largest where its integral is least known: the states are sought before a coefficient.
         settled = best_nuisances(bench, model, HELD)
         if settled.is_finite:
-            start = settled.nuisances._replace(stiffness_spread=FIRST_STIFFNESS_SPREAD)
+            start = settled.nuisances._replace(spread=FIRST_STIFFNESS_SPREAD)
     sizes = magnitudes(model, places, scales)
     # The scatter of the stiffness is found from a rough solution; the search goes on from there.
     rough = max(tolerance, 1.0) if has_stiffness_scale(model) and not known else tolerance
@@ -256,8 +257,12 @@ def estimate(
             if single
             else stiffness_scatter(bench.problem.records, found.point, inflation)
         )
-        progress(f"linear stiffness scatters by {100 * spread:.2g} % between records")
-        again = found.point.nuisances._replace(stiffness_spread=spread)
+        within = segment_scatter(bench.problem.records, bench.problem.segments, found.point)
+        progress(
+            f"linear stiffness scatters by {100 * spread:.2g} % between records"
+            + (f" and by {100 * within:.2g} % within them" if within else "")
+        )
+        again = found.point.nuisances._replace(spread=Spread(spread, within))
         found = descend(
             bench,
             found.point.model,

@@ -282,7 +282,7 @@ def _of_trial(
     # Nothing may be told by a prior: an offset is no less likely than the motion is large.
     np.multiply(prepared.spread, LOOSE, out=prepared.spread)
     assumed, units = bench.starts(model, prepared)
-    nuisances = bench.settle(None, model, carried, question.fitted.point.nuisances.stiffness_spread)
+    nuisances = bench.settle(None, model, carried, question.fitted.point.nuisances.spread)
     states = nuisances.states.copy()
     # The records tell neither a mean nor a memory: the states are those of the simulation.
     states[: starts.shape[1]] = ((starts - assumed[:, : starts.shape[1]]) / units[:, : starts.shape[1]]).T

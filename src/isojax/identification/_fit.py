@@ -50,6 +50,7 @@ class Statistics(NamedTuple):
         bic: Schwarz's criterion, chi2 + coefficients ln(samples).
         steps: simulations with derivatives that the search took.
         stiffness_scatter: standard deviation of the linear stiffness between records [relative].
+        segment_scatter: the same between the segments of a record; 0 where no repeat shows one.
         integration_error: rms change of the readings when the integration steps are halved, over the noise;
             NaN where the steps were given.
     """
@@ -62,6 +63,7 @@ class Statistics(NamedTuple):
     bic: float
     steps: int
     stiffness_scatter: float
+    segment_scatter: float
     integration_error: float
 
 
@@ -276,7 +278,7 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         found.chi2 + 2.0 * count,
         found.chi2 + count * float(np.log(samples)),
         found.steps,
-        found.point.nuisances.stiffness_spread,
+        *found.point.nuisances.spread,
         found.bench.problem.step_error,
     )
     return Fit(

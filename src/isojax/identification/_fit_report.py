@@ -60,9 +60,12 @@ def _model(fit: Fit) -> list[str]:
 def _statistics(fit: Fit) -> list[str]:
     stats, unit = fit.stats, OUTPUT_UNITS[fit.campaign.output.quantity]
     if not is_successful(fit.result):
-        nothing = dict.fromkeys(("chi2", "aic", "bic", "stiffness_scatter"), math.nan)
+        nothing = dict.fromkeys(("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter"), math.nan)
         stats = stats._replace(**nothing)
     integrator = fit.estimate.bench.problem.integrator
+    scatter = f"{100 * stats.stiffness_scatter:.2g} % between records"
+    if stats.segment_scatter > 0.0:
+        scatter += f", {100 * stats.segment_scatter:.2g} % within them"
     rows = [
         ("samples", f"{stats.samples}"),
         ("coefficients", f"{stats.coefficients}"),
@@ -73,7 +76,7 @@ def _statistics(fit: Fit) -> list[str]:
         ("AIC", f"{stats.aic:.8g}"),
         ("BIC", f"{stats.bic:.8g}"),
         ("noise", f"{fit.noise.sigma:.4g} {unit} rms, from {fit.noise.method.replace('_', ' ')}"),
-        ("stiffness scatter", f"{100 * stats.stiffness_scatter:.2g} % between records"),
+        ("stiffness scatter", scatter),
         (
             "integration",
             f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample",

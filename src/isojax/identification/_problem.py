@@ -12,7 +12,7 @@ from ..models import Integrator, Isolator, Quantity
 from ..records import Record
 from ._batch import Prepared, prepare
 from ._columns import column_information
-from ._elimination import Nuisances, Reduced, eliminate
+from ._elimination import Nuisances, Reduced, Spread, eliminate
 from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, information
 from ._memories import internal_starts
 from ._segments import Segment
@@ -188,14 +188,14 @@ class Bench:
             rows[:, 2:] = 0.0
         return rows[0], rows[1]
 
-    def settle(self, nuisances: Nuisances | None, model: Isolator, carried: int, spread: float) -> Nuisances:
+    def settle(self, nuisances: Nuisances | None, model: Isolator, carried: int, spread: Spread) -> Nuisances:
         """Give nuisances to begin with: those given, else none but the measured states.
 
         Args:
             nuisances: known ones, or None.
             model: the isolator.
             carried: count of its elements that move the state.
-            spread: prior standard deviation of the stiffness scales.
+            spread: prior standard deviations of the stiffness scales.
 
         Returns:
             The nuisances.
@@ -205,8 +205,10 @@ class Bench:
         if nuisances is not None and nuisances.states.shape == (lanes, states):
             return nuisances
         stiffness = np.zeros(len(self.problem.records)) if nuisances is None else nuisances.stiffness
-        spread = spread if nuisances is None else nuisances.stiffness_spread
-        return Nuisances(np.zeros((lanes, states)), stiffness, spread)
+        spread = spread if nuisances is None else nuisances.spread
+        known = nuisances is not None and nuisances.segments.size == lanes
+        segments = nuisances.segments if nuisances is not None and known else np.zeros(lanes)
+        return Nuisances(np.zeros((lanes, states)), stiffness, segments, spread)
 
     def evaluate(
         self,
@@ -232,7 +234,7 @@ class Bench:
         own = nuisances.states.shape[1]
         states = starts.copy()
         states[:own] += scales[:own] * nuisances.states.T
-        factor = 1.0 + stiffness_deviation(nuisances)[prepared.record]
+        factor = nuisances.factor(prepared.record)
         unknowns = Unknowns(model, directions, factor, states, scales)
         matrices = self._matrices(unknowns, carried, prepared)
         heads = None

@@ -76,7 +76,8 @@ def refit_candidate(
         states = old.states + share * (new.states - old.states)
         states = _states_of(model, fitted.model, states)
         stiffness = old.stiffness + share * (new.stiffness - old.stiffness)
-        nuisances = Nuisances(states, stiffness, old.stiffness_spread)
+        segments = old.segments + share * (new.segments - old.segments)
+        nuisances = Nuisances(states, stiffness, segments, old.spread)
         # The columns are not needed yet, but with them the search shares the compiled code.
         directions = one_hot(model, places, [1.0] * len(places))
         point = fitted.bench.evaluate(model, directions, nuisances)
@@ -143,9 +144,9 @@ def refit_from(
     nuisances = None
     if has_stiffness_scale(fitted.model) == has_stiffness_scale(model):
         old = fitted.point.nuisances
-        fresh = old._replace(states=np.zeros((0, 0)))
+        fresh = old.afresh()
         # Eliminated by one linear step from far, initial states promise a chi2 that no later step reaches.
-        settled = best_nuisances(fitted.bench, model, old.stiffness_spread, fresh, places)
+        settled = best_nuisances(fitted.bench, model, old.spread, fresh, places)
         nuisances = settled.nuisances if settled.is_finite else fresh
     return estimate(
         fitted.bench,

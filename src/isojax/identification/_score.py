@@ -27,7 +27,6 @@ class Score(NamedTuple):
     Attributes:
         element: the effect at zero strength, with the shape parameters of its largest score.
         z: score over its standard deviation; its sign is that of the strength.
-        robust_z: the same with the scatter between records (or segments) as its standard deviation.
         strength: strength by one linear step [its unit].
         error: standard deviation of the strength for white noise [its unit].
         visibility: share of the column that the fitted coefficients and nuisances leave.
@@ -38,7 +37,6 @@ class Score(NamedTuple):
 
     element: AbstractElement
     z: float
-    robust_z: float
     strength: float
     error: float
     visibility: float
@@ -117,23 +115,15 @@ def score_test(
     count, carried = len(fitted.places), len(fitted.model.elements)
     units = np.array([1e-3 * probe.typical_strength(scales) for probe in probes])
     traces = project(fitted, probes, units)
-    absorbed, by_record, seen = traces.absorbed, traces.point.reduced.by_record, traces.seen
+    absorbed, seen = traces.absorbed, traces.seen
     information, score = traces.information, traces.score
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)
     z = score / safe
     # A phase that each record chose for itself makes the sum of as many Rayleigh amplitudes of noise.
     chosen = np.array([probe.phased for probe in probes], dtype=bool)
-    z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(by_record.shape[0])) / _RAYLEIGH[1], z)
-    # Each record's own share of the projected score: its scatter is the honest standard deviation.
-    shares = by_record[:, count:-1, -1] - by_record[:, count:-1, :count] @ absorbed[:, -1]
-    shares -= np.einsum(
-        "pq,rp->rq",
-        absorbed[:, :-1],
-        by_record[:, :count, -1] - by_record[:, :count, :count] @ absorbed[:, -1],
-    )
-    spread = np.sqrt(np.maximum(np.sum(shares**2, axis=0), size**2))
-    robust = np.where(seen, score / np.maximum(spread, 1e-300), 0.0)
+    records = len(fitted.bench.problem.records)
+    z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(records)) / _RAYLEIGH[1], z)
 
     # Within a family a shape of admissible sign goes before any other: the others are evidence against those
     # shapes.
@@ -161,7 +151,6 @@ def score_test(
             Score(
                 probe,
                 float(z[column]),
-                float(robust[column]),
                 float(amount * unit),
                 float(unit / size[column]),
                 float(traces.visibility[column]),

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from .._results import RESULTS
 from ..elements import Scales
 from ._beginning import best_nuisances
+from ._elimination import Spread
 from ._estimate import Estimate, estimate
 from ._fit import Fit
 from ._problem import Bench, Problem, one_hot
@@ -53,7 +54,7 @@ def _misfit_by_record(found: Estimate) -> Float[np.ndarray, " record"]:
     return found.point.reduced.by_record[:, -1, -1] + found.point.reduced.eliminated
 
 
-def _excess_unseen(part: Estimate, unseen: Problem, spread: float) -> float:
+def _excess_unseen(part: Estimate, unseen: Problem, spread: Spread) -> float:
     """Give chi2 - dof of data that a refit did not see, its coefficients no surer than the refit made them.
 
     With r the whitened error, J its slopes and C the covariance of the coefficients, chi2 is
@@ -98,7 +99,7 @@ def transferred_share(
     for found in (fit.estimate, extended):
         progress("carry-over: refit on a part of the data")
         nuisances = found.point.nuisances
-        start = nuisances._replace(states=np.zeros((0, 0)))
+        start = nuisances.afresh()
         part = estimate(
             Bench(seen, like=found.bench),
             found.model,
@@ -111,7 +112,7 @@ def transferred_share(
         )
         if part.result == RESULTS.not_finite:
             return 0.0
-        excess.append(_excess_unseen(part, unseen, nuisances.stiffness_spread))
+        excess.append(_excess_unseen(part, unseen, nuisances.spread))
     without, with_effect = excess
     if not np.isfinite(with_effect):
         return 0.0

@@ -7,7 +7,7 @@ from .._parameters import list_parameters
 from ..health import REACH, CampaignHealth, DwellStability
 from ..identification import DriftBudget, Finding, Fit, plain_unit
 from ._quantities import INPUT_WORDS, typeset_number, typeset_share, typeset_unit, typeset_with_error
-from ._sentences import effect_words, own_strength
+from ._sentences import effect_words, own_strength, scatter_words
 
 _MOST_PLACES = 6
 
@@ -146,7 +146,7 @@ def budget_words(budget: DriftBudget, fit: Fit, findings: Sequence[Finding]) -> 
             f"Repeatability limits {effect_words(finding.effect)}, {entry.spec.symbol} = {found}, to "
             f"± {typeset_number(share.repeatability, 2)} {unit}; noise alone to "
             f"± {typeset_number(share.noise, 2)} {unit}. Were the scatter of the stiffness "
-            f"({typeset_share(budget.scatter)} between records) not counted, it would pretend "
+            f"({scatter_words(budget.scatter, budget.within)}) not counted, it would pretend "
             f"± {typeset_number(share.pretended, 2)} {unit}."
         )
     return tuple(" ".join(line.split()) for line in lines)
@@ -222,6 +222,7 @@ def health_dict(health: CampaignHealth) -> dict[str, object]:
             for one in health.collisions
         ],
         "stiffness_scatter": number(health.budget.scatter),
+        "stiffness_scatter_within_records": number(health.budget.within),
         "repeatability": {
             share.name: {
                 "noise": number(share.noise),

@@ -181,6 +181,20 @@ def finding_words(finding: Finding) -> tuple[str, ...]:
     return tuple(lines)
 
 
+def scatter_words(between: float, within: float) -> str:
+    """Give the scatter of the linear stiffness.
+
+    Args:
+        between: standard deviation from record to record [relative].
+        within: standard deviation from segment to segment of a record [relative]; 0 where none shows.
+
+    Returns:
+        Such as "0.05 % between records and 0.1 % within them".
+    """
+    words = f"{typeset_share(between)} between records"
+    return f"{words} and {typeset_share(within)} within them" if within > 0.0 else words
+
+
 def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
     """Give the state of the data, before a model is blamed.
 
@@ -226,7 +240,7 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
         )
     scatter = fit.stats.stiffness_scatter
     if math.isfinite(scatter):
-        lines.append(f"The linear stiffness scatters by {typeset_share(scatter)} between records.")
+        lines.append(f"The linear stiffness scatters by {scatter_words(scatter, fit.stats.segment_scatter)}.")
     return tuple(lines)
 
 

@@ -1,0 +1,119 @@
+"""Stiffness that scatters from dwell to dwell: told by repeats, and taken for no effect."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from strange_laws import BASE, RestlessSpring
+
+from isojax import rig
+from isojax.elements import (
+    AbsQuadraticDamping,
+    AbsQuadraticStiffness,
+    CubicDamping,
+    CubicStiffness,
+    LinearDamping,
+    LinearStiffness,
+)
+from isojax.identification import fit, scales
+from isojax.identification._elimination import Nuisances, Reduced, Spread
+from isojax.identification._information import STIFFNESS_SCALE_UNIT
+from isojax.identification._problem import Point
+from isojax.identification._score import absent_effects, score_test
+from isojax.identification._segment_scatter import segment_scatter
+from isojax.identification._segments import Segment
+from isojax.models import Isolator
+from isojax.records import Record
+
+PLAN = rig.SteppedSine((40.0, 80.0, 120.0), tuple(np.arange(4.2, 6.3, 0.3)), 12, repeats=2)
+BENCH = rig.Bench(rate=250.0, noise=5e-3, drift=3e-4, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+START = Isolator(
+    800.0,
+    (
+        LinearStiffness(1.0805e6),
+        AbsQuadraticStiffness(-6.974e8),
+        CubicStiffness(2.51667e11),
+        LinearDamping(1.027e4),
+        AbsQuadraticDamping(-3.688e5),
+        CubicDamping(5.3753e6),
+    ),
+)
+DWELLS, LENGTH = 300, 10
+
+
+@pytest.mark.slow
+def test_scatter_from_dwell_to_dwell_is_told_by_repeats_and_taken_for_no_effect(simulated, monkeypatch):
+    plant = rig.Plant(BASE).plus(RestlessSpring.of(PLAN, 1.0805e6, 1e-3, 2, BENCH))
+    campaign = simulated(plant, PLAN, 2, BENCH)
+    magnitudes = scales(campaign)
+
+    def surest(found):
+        test = score_test(found.estimate, magnitudes, absent_effects(found.model, magnitudes))
+        return min(score.p_value for score in test.scores)
+
+    found = fit(START, campaign)
+    # Of 42 dwells a standard deviation is known to a tenth, and half of what is seen of it is noise.
+    assert found.stats.segment_scatter == pytest.approx(1e-3, rel=0.4)
+    assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.02)
+    assert surest(found) > 0.05
+    # With one stiffness for all dwells of a record the same campaign lacks something beyond any doubt.
+    monkeypatch.setattr("isojax.identification._estimate.segment_scatter", lambda *records: 0.0)
+    assert surest(fit(START, campaign)) < 1e-20
+
+
+def _record(repeat, drive, output, direction="forward"):
+    time = np.arange(drive.size) / 100.0
+    name = f"{direction} {repeat}"
+    signals = (drive, output, drive, output)
+    return Record(
+        name, Path(f"{name}.npz"), time, 100.0, *signals, level=1.0, direction=direction, repeat=repeat
+    )
+
+
+def _told(scatter, alike=True, direction="forward", branch=1.0, seed=5):
+    """What two repeats tell that differ by a record's scatter, by that of dwells, and by noise."""
+    draw = np.random.default_rng(seed)
+    drive = draw.standard_normal(DWELLS * LENGTH)
+    other = drive if alike else draw.standard_normal(drive.size)
+    records = (_record(0, drive, drive), _record(1, other, branch * drive, direction))
+    segments = tuple(
+        Segment(place, LENGTH * dwell, LENGTH * (dwell + 1), LENGTH * dwell)
+        for place in range(2)
+        for dwell in range(DWELLS)
+    )
+    # What the model lacks moves both repeats of a dwell alike, and by much more than anything else.
+    apparent = np.tile(5e-2 * draw.standard_normal(DWELLS), 2) + np.repeat([2e-3, -1e-3], DWELLS)
+    apparent += scatter * draw.standard_normal(apparent.size)
+    noise = 1e-3 * draw.uniform(0.2, 2.0, apparent.size)
+    apparent += noise * draw.standard_normal(apparent.size)
+    information = (STIFFNESS_SCALE_UNIT / noise) ** 2
+    by_segment = np.stack([information, information * apparent / STIFFNESS_SCALE_UNIT], axis=1)
+    lanes = len(segments)
+    nothing = np.zeros((lanes, 0))
+    reduced = Reduced(
+        np.zeros((2, 1, 1)),
+        np.zeros(2),
+        np.zeros(0),
+        np.zeros((2, 1)),
+        np.ones(2),
+        np.zeros((lanes, 0, 2)),
+        np.zeros((0, 2)),
+        np.zeros(0),
+        by_segment,
+    )
+    nuisances = Nuisances(nothing, np.zeros(2), np.zeros(lanes), Spread(1e-2))
+    return segment_scatter(records, segments, Point(START, nuisances, reduced, np.ones(2)))
+
+
+@pytest.mark.parametrize(("scatter", "within"), [(5e-4, 0.2), (1e-3, 0.1), (4e-3, 0.05)])
+def test_differences_of_repeats_tell_their_scatter_whatever_the_model_lacks(scatter, within):
+    found = [_told(scatter, seed=seed) for seed in range(20)]
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(scatter, rel=within)
+
+
+def test_without_scatter_or_without_repeats_there_is_none():
+    assert sum(_told(0.0, seed=seed) > 0.0 for seed in range(100)) <= 4
+    assert _told(4e-3, direction="backward") == 0.0
+    # Another drive is another test, another amplitude another branch.
+    assert _told(4e-3, alike=False) == 0.0
+    assert _told(4e-3, branch=1.2) == 0.0
