@@ -75,6 +75,7 @@ ELSEWHERE = {
 }
 """Effects whose recovery has a file of its own."""
 
+
 def test_every_effect_of_the_catalogue_has_a_case():
     elsewhere = [name for names in ELSEWHERE.values() for name in names]
     assert sorted([*CASES, *elsewhere]) == sorted(CATALOGUE)

@@ -108,6 +108,11 @@ MISTAKES = {
         "[filter]\norder = 4\ncutoff_hz = 120.0\napplied = false\n[model]",
         r"cutoff_hz = 120 must be below half the sampling rate, 100 Hz",
     ),
+    "a filter taken out that never was": (
+        r"\[model\]",
+        "[filter]\norder = 4\ncutoff_hz = 20.0\napplied = false\ncompensate = true\n[model]",
+        r"compensate = true takes out what the bench did, but applied = false",
+    ),
     "a filter without order": (
         r"\[model\]",
         "[filter]\ncutoff_hz = 20.0\n[model]",

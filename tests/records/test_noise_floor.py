@@ -1,5 +1,6 @@
 """The floor of a spectrum against white noise that was put in, over many draws."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from isojax.records import (
     data_health,
     estimate_noise,
 )
+from isojax.records._filter import compensate_butterworth
 from isojax.records._noise_band import NoiseBand
 from isojax.records._record import Kind
 
@@ -111,6 +113,17 @@ def test_power_gain_is_that_of_the_filter(applied: bool) -> None:
     noise = np.random.default_rng(1).normal(size=400_000)
     left = (scipy.signal.sosfilt if applied else scipy.signal.sosfiltfilt)(sections, noise)
     assert band.share == pytest.approx(np.mean(left**2) / np.mean(noise**2), rel=0.01)
+
+
+def test_noise_is_white_again_as_far_as_a_filter_is_taken_out() -> None:
+    sections = scipy.signal.butter(LOW.order, LOW.cutoff_hz, fs=RATE, output="sos")
+    noise = np.random.default_rng(1).normal(size=400_000)
+    filed = scipy.signal.sosfilt(sections, noise)
+    left = compensate_butterworth(filed, RATE, LOW.order, LOW.cutoff_hz)
+    band = NoiseBand(RATE, replace(LOW, compensate=True))
+    assert band.share == pytest.approx(np.mean(left**2) / np.mean(noise**2), rel=0.01)
+    assert band.as_filed.share == pytest.approx(np.mean(filed**2) / np.mean(noise**2), rel=0.01)
+    np.testing.assert_array_equal(band.power_gain(np.linspace(0.0, 0.9 * LOW.cutoff_hz, 9)), 1.0)
 
 
 def blow(width: int, size: int = 3000) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"]]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from isojax.records import (
     Campaign,
@@ -22,6 +23,7 @@ from isojax.records import (
     receptance,
     zero_phase_butterworth,
 )
+from isojax.records._filter import UNSURE, compensate_butterworth
 
 RATE = 1000.0
 
@@ -65,6 +67,21 @@ def test_the_filter_has_the_gain_of_two_butterworths_and_no_phase() -> None:
         warped = np.tan(np.pi * frequency / RATE) / np.tan(np.pi * 20.0 / RATE)
         expected = np.sin(2 * np.pi * frequency * time) / (1.0 + warped**6)
         np.testing.assert_allclose(filtered[3000:-3000], expected[3000:-3000], atol=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4, 8])
+def test_what_a_filter_took_is_given_back(order: int) -> None:
+    time = np.arange(8000) / RATE
+    draw = np.random.default_rng(order)
+    tones = zip(draw.uniform(0.5, 45.0, 12), draw.uniform(0.0, 6.0, 12), strict=True)
+    signal = sum(np.sin(2 * np.pi * frequency * time + phase) for frequency, phase in tones)
+    sections = scipy.signal.butter(order, 50.0, fs=RATE, output="sos")
+    filtered = scipy.signal.sosfilt(sections, signal)
+    unsure = round(UNSURE * order * RATE / 50.0)
+    inside = slice(unsure, -unsure)
+    assert np.std((filtered - signal)[inside]) > 0.1
+    found = compensate_butterworth(filtered, RATE, order, 50.0)
+    np.testing.assert_allclose(found[inside], signal[inside], rtol=0.0, atol=5e-4 * np.max(np.abs(signal)))
 
 
 @pytest.mark.parametrize(("order", "cutoff"), [(0, 20.0), (3, 500.0), (3, 0.0)])

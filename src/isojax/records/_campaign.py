@@ -81,12 +81,14 @@ class Filter:
         order: Order of the filter; run forwards and backwards it acts twice.
         cutoff_hz: Cut-off frequency [Hz].
         applied: True: the bench did it; False: the reader does, with zero phase.
+        compensate: Whether the reader takes out again what the bench did, a digital filter that ran once.
     """
 
     kind: Literal["butterworth"]
     order: int
     cutoff_hz: float
     applied: bool = True
+    compensate: bool = False
 
 
 @dataclass(frozen=True, eq=False)

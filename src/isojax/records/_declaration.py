@@ -117,6 +117,7 @@ _SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "order": _count(at_least=1, required=True),
         "cutoff_hz": _positive(required=True),
         "applied": _flag(default=True),
+        "compensate": _flag(),
     },
     "model": {
         "stiffness": _names(("linear",)),

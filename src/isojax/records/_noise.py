@@ -87,8 +87,7 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     records = campaign.records
     if campaign.output.noise is not None:
         declared = float(campaign.output.noise)
-        if campaign.filter is not None and not campaign.filter.applied:
-            declared *= float(np.sqrt(band.share))
+        declared *= float(np.sqrt(band.share / band.as_filed.share))
         methods: tuple[NoiseMethod, ...] = ("declared",) * len(records)
         each = (declared,) * len(records)
         return NoiseEstimate(declared, "declared", each, methods, band.highest, note, band.share)

@@ -1,11 +1,12 @@
 """The band that the noise of a channel fills: all of it, or what a declared low-pass filter leaves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from ._campaign import Filter
+from ._filter import LEAST_GAIN
 
 _POINTS = 4096
 
@@ -28,11 +29,18 @@ class NoiseBand:
         nyquist = 0.5 * self.rate
         return nyquist if self.filter is None else min(self.filter.cutoff_hz, nyquist)
 
+    @property
+    def as_filed(self) -> "NoiseBand":
+        """The band in the file, before the reader did anything."""
+        done = self.filter is not None and self.filter.applied
+        return NoiseBand(self.rate, replace(self.filter, compensate=False) if self.filter and done else None)
+
     def power_gain(self, frequency: Float[np.ndarray, " frequency"]) -> Float[np.ndarray, " frequency"]:
         """Gives the power gain of the filter: `1 / (1 + (w / wc)^(2 n))`, `w = tan(pi f / rate)`.
 
         Squared for the reader's filter, which runs forwards and backwards and so acts twice. The bench's is
-        taken for a digital one too, run once: a filter before the converter would not shape its noise.
+        taken for a digital one too, run once: a filter before the converter would not shape its noise. Where
+        the reader has taken it out the gain is 1 as far as that goes.
 
         Args:
             frequency: From 0 to half the rate [Hz].
@@ -48,6 +56,8 @@ class NoiseBand:
         ratio = warped / np.tan(np.pi * self.filter.cutoff_hz / self.rate)
         # capped so that no power overflows near half the rate, where the gain is nothing anyway
         once = 1.0 / (1.0 + np.minimum(ratio, 1e6) ** np.minimum(2 * self.filter.order, 50))
+        if self.filter.compensate:
+            return (once / np.maximum(once, LEAST_GAIN**2)) ** 2
         return once if self.filter.applied else once**2
 
     @property

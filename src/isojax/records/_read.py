@@ -13,7 +13,7 @@ from ._band import ringing_frequency
 from ._campaign import Campaign, Filter, FloorChannel, InputChannel, OutputChannel
 from ._columns import read_columns
 from ._declaration import Declaration, read_declaration
-from ._filter import zero_phase_butterworth
+from ._filter import UNSURE, compensate_butterworth, zero_phase_butterworth
 from ._floor import floor_acceleration
 from ._kind import detect_kind
 from ._record import Dwell, Kind, Record
@@ -36,7 +36,8 @@ def read_campaign(path: str | Path) -> Campaign:
     """Gives a measurement campaign, its records in SI units and in the order of the test.
 
     Paths of data files and schedules are relative to the campaign.toml. Units are converted, a reaction mass
-    becomes a force, the filter runs where `applied = false`, dwells come from the schedule or are found, and
+    becomes a force, the filter runs where `applied = false` and is taken out where
+    `compensate = true`, dwells come from the schedule or are found, and
     the kind of each record is detected.
 
     Args:
@@ -137,6 +138,7 @@ def _read_record(
     columns = read_columns(file, list(dict.fromkeys(one for one in wanted if one)))
     total = columns[drive].samples.size
     start, stop = _span(where, file, entry, total)
+    settle = entry["settle"]
     raw_input = _channel(file, drive, columns[drive].samples[start:stop], start) * factors[0]
     raw_output = _channel(file, response, columns[response].samples[start:stop], start) * factors[1]
     floor = None
@@ -158,13 +160,28 @@ def _read_record(
                 "sampling "
                 f"rate, {0.5 * rate:g} Hz"
             )
-        if not reader_filter.applied:
-            shown_input, shown_output = (
-                zero_phase_butterworth(one, rate, reader_filter.order, reader_filter.cutoff_hz)
-                for one in (raw_input, raw_output)
+        if reader_filter.compensate and not reader_filter.applied:
+            raise ValueError(
+                f"{declared.file}: [filter] compensate = true takes out what the bench did, but "
+                "applied = false says that it did nothing"
             )
-            if floor is not None:
-                floor = zero_phase_butterworth(floor, rate, reader_filter.order, reader_filter.cutoff_hz)
+        if reader_filter.compensate or not reader_filter.applied:
+            run = compensate_butterworth if reader_filter.compensate else zero_phase_butterworth
+            shape = rate, reader_filter.order, reader_filter.cutoff_hz
+            shown_input, shown_output = run(raw_input, *shape), run(raw_output, *shape)
+            floor = None if floor is None else run(floor, *shape)
+        if reader_filter.compensate:
+            unsure = round(UNSURE * reader_filter.order * rate / reader_filter.cutoff_hz)
+            start, stop, settle = start + unsure, stop - unsure, max(0, settle - unsure)
+            if stop - start - settle < _FEWEST_SAMPLES:
+                raise ValueError(
+                    f"{where} is too short: of its samples {unsure} at either end are lost where [filter] "
+                    f"compensate = true takes a filter out, and at least {_FEWEST_SAMPLES} must be left"
+                )
+            kept = slice(unsure, -unsure)
+            raw_input, raw_output = raw_input[kept], raw_output[kept]
+            shown_input, shown_output = shown_input[kept], shown_output[kept]
+            floor = None if floor is None else floor[kept]
     dwells, kind = _excitation(where, declared, entry, rate, (start, stop, total), shown_input, shown_output)
     if kind != "free_decay" and not np.any(raw_input):
         raise ValueError(
@@ -187,7 +204,7 @@ def _read_record(
         repeat=entry["repeat"],
         role=entry["role"],
         period=entry["period"],
-        settle=entry["settle"],
+        settle=settle,
         dwells=dwells,
         kind=kind,
         floor=floor if floor is None else floor_acceleration(floor, rate, ground["quantity"]),
