@@ -208,6 +208,9 @@ def table(rows: list[Row]) -> list[Mark]:
             )
         )
     for row in (row for row in rows if row["task"] == "wall_time"):
+        if "error" in row:
+            marks.append(Mark("seconds of a loop by the clock", float("nan"), 1, None, False, (line(row),)))
+            continue
         what = f"{len(row['records'])} records of {np.mean(row['records']):.0f} s at {row['rate']:.0f} Hz"
         for when, most, figures in (
             ("compile included", 60.0, row["first"]),
@@ -265,6 +268,18 @@ def coverage(rows: list[Row]) -> list[Mark]:
         scatter = float(np.sqrt(np.mean([value**2 for value, _ in values])))
         marks.append(Mark(f"{words}; rms {scatter:.2f} se", figure, len(values), interval, passed))
     return marks
+
+
+def markdown(rows: list[Row]) -> list[str]:
+    """Give the table as the README shows it, a line a criterion."""
+    words = {True: "met", False: "**missed**", None: ""}
+    lines = ["| criterion | figure | of | 95 % interval | |", "|---|---|---|---|---|"]
+    for mark in table(rows):
+        spread = "" if mark.interval is None else f"{mark.interval[0]:.2f}-{mark.interval[1]:.2f}"
+        lines.append(
+            f"| {mark.criterion} | {mark.figure:.3g} | {mark.judged} | {spread} | {words[mark.passed]} |"
+        )
+    return lines
 
 
 def print_table(rows: list[Row], verbose: bool) -> bool:

@@ -45,10 +45,10 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
     """
     begin = time.perf_counter()
     row: Row = {"seed": seed, "kind": kind, "task": task}
-    if task == "wall_time":
-        timed = run_wall_time(seed, float(names[0]) if names else 250.0)
-        return row | {"truth": []} | timed | {"total_seconds": time.perf_counter() - begin}
     try:
+        if task == "wall_time":
+            timed = run_wall_time(seed, float(names[0]) if names else 250.0)
+            return row | {"truth": []} | timed | {"total_seconds": time.perf_counter() - begin}
         drawn = sketch(seed, kind, names)
         with tempfile.TemporaryDirectory() as folder:
             hidden, path, size = _simulated(drawn, Path(folder), held_out=task != "coverage")

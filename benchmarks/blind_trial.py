@@ -2,7 +2,8 @@
 
 Run `python benchmarks/blind_trial.py --seeds 0:200 --out trial.jsonl`, then `... --report trial.jsonl`. A run
 can be stopped at any time and goes on where it stopped: a line of the file is a campaign, and what is there
-is skipped. About twenty seconds a campaign on two cores once the code is compiled.
+is skipped. About half a minute a campaign and core once the code is compiled. The rows of the README's
+tables are in `results/`; each says of which commit it is.
 
 The plant is the paper's y direction with every coefficient moved by up to 10 %, on the rig simulator, which
 shares no code with the models. Levels, noise, distortion and drift of the stiffness (0 to 0.2 %) are drawn;
@@ -32,7 +33,7 @@ import jax
 
 from _trial_campaign import CLASSES, kind_of
 from _trial_effects import COMMONEST, EFFECTS
-from _trial_judge import line, print_table
+from _trial_judge import line, markdown, print_table
 from _trial_run import crowded, run_one
 from isojax import compile_quickly
 
@@ -136,6 +137,7 @@ def main() -> None:
     parser.add_argument(
         "--report", type=Path, nargs="+", metavar="FILE", help="print the table of these files"
     )
+    parser.add_argument("--markdown", action="store_true", help="print it as the README shows it")
     parser.add_argument("--verbose", action="store_true", help="list what speaks against each criterion")
     options = parser.parse_args()
     if options.report:
@@ -143,6 +145,9 @@ def main() -> None:
         if missing:
             sys.exit(f"There is no file {', '.join(missing)}: run the trial first.")
         rows = [row for path in options.report for row in read(path)]
+        if options.markdown:
+            print("\n".join(markdown(rows)))
+            return
         sys.exit(0 if print_table(rows, options.verbose) else 1)
     jax.config.update("jax_enable_x64", True)
     compile_quickly()
