@@ -5,6 +5,7 @@ from collections import defaultdict
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 from scipy import stats
 
 from ..records import Record
@@ -17,6 +18,10 @@ SIGNIFICANCE = 0.01
 
 ALIKE = 0.1
 """Relative difference of rms from which two dwells lie on different branches, or were driven otherwise."""
+
+
+SAME_FREQUENCY = 1e-3
+"""Relative difference up to which two dwells have one frequency."""
 
 
 class _Pair(NamedTuple):
@@ -70,14 +75,7 @@ def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Po
         for one, other in itertools.pairwise(group):
             if group.index(one) % 2:
                 continue
-            lanes = np.array(
-                [
-                    both
-                    for both in zip(held[one], held[other], strict=False)
-                    if _is_the_same(records, segments[both[0]], segments[both[1]])
-                ],
-                dtype=int,
-            ).reshape(-1, 2)
+            lanes = np.array(_matched(records, segments, held[one], held[other]), dtype=int).reshape(-1, 2)
             information, score = point.reduced.by_segment[lanes].transpose(2, 0, 1)
             seen = np.all(information > 0.0, axis=1)
             if np.count_nonzero(seen) > 1:
@@ -87,21 +85,46 @@ def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Po
     return pairs
 
 
+def _matched(
+    records: tuple[Record, ...], segments: tuple[Segment, ...], own: list[int], others: list[int]
+) -> list[tuple[int, int]]:
+    """List the segments of one record with those of its repeat that passed the same test, in their order."""
+    pairs, left = [], list(others)
+    for lane in own:
+        match = next((one for one in left if _is_the_same(records, segments[lane], segments[one])), None)
+        if match is not None:
+            pairs.append((lane, match))
+            left = left[left.index(match) + 1 :]
+    return pairs
+
+
 def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment) -> bool:
-    """Say whether two segments passed the same test on the same branch."""
+    """Say whether two segments passed the same test on the same branch.
+
+    Of a dwell frequency and level tell that, wherever in the record it lies; of other windows only a drive
+    that is the same sample by sample.
+    """
     first, second = records[one.record], records[other.record]
-    if (one.start, one.stop, one.counted) != (other.start, other.stop, other.counted):
+    frequencies = _frequency(first, one), _frequency(second, other)
+    if frequencies[0] is None or frequencies[1] is None:
+        if frequencies != (None, None) or (one.start, one.stop) != (other.start, other.stop):
+            return False
+        difference = (
+            _rms(first.input - second.input, one) if first.input.size == second.input.size else np.inf
+        )
+        if not difference < ALIKE * _rms(first.input, one):
+            return False
+    elif abs(frequencies[0] - frequencies[1]) > SAME_FREQUENCY * frequencies[0]:
         return False
-    if _frequency(first, one) != _frequency(second, other):
-        return False
-    span = slice(one.start, one.stop)
-    drives = first.input[span], second.input[span]
-    sizes = [float(np.sqrt(np.mean(record.output[span] ** 2))) for record in (first, second)]
-    drive = float(np.sqrt(np.mean(drives[0] ** 2)))
-    return (
-        abs(sizes[0] - sizes[1]) < ALIKE * max(sizes)
-        and float(np.sqrt(np.mean((drives[0] - drives[1]) ** 2))) < ALIKE * drive
-    )
+    sizes = [
+        (_rms(record.input, segment), _rms(record.output, segment))
+        for record, segment in ((first, one), (second, other))
+    ]
+    return all(abs(a - b) < ALIKE * max(a, b) for a, b in zip(*sizes, strict=True))
+
+
+def _rms(signal: Float[np.ndarray, " time"], segment: Segment) -> float:
+    return float(np.sqrt(np.mean(signal[segment.counted : segment.stop] ** 2)))
 
 
 def _frequency(record: Record, segment: Segment) -> float | None:
