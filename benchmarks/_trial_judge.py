@@ -239,9 +239,38 @@ def _quantile(words: str, shares: np.ndarray, rows: list[Row], percent: float, l
     return Mark(words, figure, shares.size, None, figure >= least if shares.size else None, failing)
 
 
-def coverage(rows: list[Row]) -> list[Mark]:
-    """Judge the 95 % intervals of the true structure's coefficients, each effect's strength by itself."""
-    off: dict[str, list[tuple[float, Row]]] = {}
+class Covered(NamedTuple):
+    """How often the 95 % intervals of one effect's coefficients held the truth.
+
+    Attributes:
+        whose: the effect, or the declared coefficients beside all effects.
+        inside: intervals that hold the truth.
+        judged: intervals in all.
+        undetermined: coefficients that got no interval, because the data do not tell them.
+        scatter: rms error in standard errors.
+    """
+
+    whose: str
+    inside: int
+    judged: int
+    undetermined: int
+    scatter: float
+
+    @property
+    def mark(self) -> Mark:
+        """One line of the table."""
+        figure, interval = self.inside / self.judged, wilson(self.inside, self.judged)
+        words = f"95 % intervals of {self.whose} cover the truth, 90-98 %"
+        if self.undetermined:
+            words += f" ({self.undetermined} undetermined)"
+        # Few repeats cannot tell 98 from 100 %: too wide an interval shows in the interval of the share.
+        passed = interval[0] <= 0.98 and interval[1] >= 0.90 and (figure >= 0.90 or self.judged < 30)
+        return Mark(f"{words}; rms {self.scatter:.2f} se", figure, self.judged, interval, passed)
+
+
+def covered(rows: list[Row]) -> list[Covered]:
+    """Count the 95 % intervals of the true structure's coefficients, each effect's strength by itself."""
+    off: dict[str, list[float]] = {}
     lost: dict[str, int] = {}
     for row in rows:
         if "off" not in row or not row["oracle_converged"]:
@@ -250,24 +279,42 @@ def coverage(rows: list[Row]) -> list[Mark]:
         if not all(one["limits"] >= CLEAR for one in row["truth"]):
             continue
         for name, value in row["off"].items():
-            key = name.partition(".")[0]
-            key = key if key in hidden else "the six declared coefficients"
+            whose = name.partition(".")[0]
+            whose = whose if whose in hidden else "the six declared coefficients"
             if value is None:
-                lost[key] = lost.get(key, 0) + 1
+                lost[whose] = lost.get(whose, 0) + 1
             else:
-                off.setdefault(key, []).append((value, row))
-    marks = []
-    for key, values in sorted(off.items()):
-        inside = sum(abs(value) <= 1.96 for value, _ in values)
-        figure, interval = inside / len(values), wilson(inside, len(values))
-        words = f"95 % intervals of {key} cover the truth, 90-98 %"
-        if key in lost:
-            words += f" ({lost[key]} undetermined)"
-        # Few repeats cannot tell 98 from 100 %: too wide an interval shows in the interval of the share.
-        passed = interval[0] <= 0.98 and interval[1] >= 0.90 and (figure >= 0.90 or len(values) < 30)
-        scatter = float(np.sqrt(np.mean([value**2 for value, _ in values])))
-        marks.append(Mark(f"{words}; rms {scatter:.2f} se", figure, len(values), interval, passed))
-    return marks
+                off.setdefault(whose, []).append(value)
+    return [
+        Covered(
+            whose,
+            sum(abs(value) <= 1.96 for value in values),
+            len(values),
+            lost.get(whose, 0),
+            float(np.sqrt(np.mean(np.square(values)))),
+        )
+        for whose, values in sorted(off.items())
+    ]
+
+
+def coverage(rows: list[Row]) -> list[Mark]:
+    """Judge how often the intervals held the truth."""
+    return [one.mark for one in covered(rows)]
+
+
+def coverage_markdown(rows: list[Row]) -> list[str]:
+    """Give the coverage as the README shows it, a line an effect."""
+    lines = [
+        "| 95 % intervals of | cover the truth (90-98 %) | coefficients | 95 % interval | rms error, se |",
+        "|---|---|---|---|---|",
+    ]
+    for one in covered(rows):
+        low, high = wilson(one.inside, one.judged)
+        figure = one.inside / one.judged
+        lines.append(
+            f"| {one.whose} | {figure:.3f} | {one.judged} | {low:.2f}-{high:.2f} | {one.scatter:.2f} |"
+        )
+    return lines
 
 
 def markdown(rows: list[Row]) -> list[str]:

@@ -33,7 +33,7 @@ import jax
 
 from _trial_campaign import CLASSES, kind_of
 from _trial_effects import COMMONEST, EFFECTS
-from _trial_judge import line, markdown, print_table
+from _trial_judge import coverage_markdown, line, markdown, print_table
 from _trial_run import crowded, run_one
 from isojax import compile_quickly
 
@@ -146,7 +146,10 @@ def main() -> None:
             sys.exit(f"There is no file {', '.join(missing)}: run the trial first.")
         rows = [row for path in options.report for row in read(path)]
         if options.markdown:
-            print("\n".join(markdown(rows)))
+            trial = [row for row in rows if row["task"] != "coverage"]
+            repeats = [row for row in rows if row["task"] == "coverage"]
+            tables = [markdown(trial)] * bool(trial) + [coverage_markdown(repeats)] * bool(repeats)
+            print("\n\n".join("\n".join(lines) for lines in tables))
             return
         sys.exit(0 if print_table(rows, options.verbose) else 1)
     jax.config.update("jax_enable_x64", True)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from _trial_judge import markdown
+from _trial_effects import COMMONEST
+from _trial_judge import coverage_markdown, markdown
 from blind_trial import key, read
 
 ROOT = Path(__file__).parents[2]
@@ -30,13 +31,32 @@ def test_every_campaign_is_there_once_and_none_failed(rows):
     assert not any("dirty" in row["commit"] for row in rows)
 
 
+def test_a_hundred_repeats_of_each_common_effect_are_there(rows):
+    repeats = [row for row in rows if row["task"] == "coverage"]
+    assert sorted((row["seed"], *row["names"]) for row in repeats) == sorted(
+        (100_000 + repeat, name) for repeat in range(100) for name in COMMONEST
+    )
+    assert len({row["commit"] for row in repeats}) == 1
+    assert all(row["oracle_converged"] for row in repeats)
+
+
+def table_below(head):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    _, _, rest = text.partition("\n".join(head) + "\n")
+    told = re.match(r"(?:\|.*\n)+", rest)
+    assert told, f"README lacks the table of {head[0]}"
+    return told.group().splitlines()
+
+
+def test_the_coverage_of_the_readme_is_what_the_rows_give(rows):
+    given = coverage_markdown([row for row in rows if row["task"] == "coverage"])
+    assert table_below(given[:2]) == given[2:]
+    assert len(given) == 2 + len(COMMONEST) + 1
+
+
 def test_the_table_of_the_readme_is_what_the_rows_give(rows):
     given = markdown([row for row in rows if row["task"] in ("loop", "leave_out")])
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    _, _, rest = text.partition(given[0] + "\n" + given[1] + "\n")
-    told = re.match(r"(?:\|.*\n)+", rest)
-    assert told, "README lacks the table of the blind trial"
-    lines = told.group().splitlines()
+    lines = table_below(given[:2])
     assert len(lines) >= 12
     assert [line for line in lines if line not in given] == []
     assert [line for line in given if "**missed**" in line and line not in lines] == []
