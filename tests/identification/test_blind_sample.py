@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from _trial_judge import table
 from _trial_run import crowded, run_one
 
-SAMPLE = range(1000, 1020)
+SAMPLE = dict(zip(range(1000, 1020), ("none", "one") * 8 + ("two", "outside") * 2, strict=True))
 
 
 def _mark(rows, criterion):
@@ -21,8 +21,8 @@ def _mark(rows, criterion):
 def test_a_small_sample_is_judged_right():
     """Twenty campaigns: too few for the marks of the whole trial, enough to see that nothing is broken."""
     rows = []
-    for seed in SAMPLE:
-        rows.append(run_one(seed, ("none", "one")[seed % 2], "loop"))
+    for seed, kind in SAMPLE.items():
+        rows.append(run_one(seed, kind, "loop"))
         if crowded():
             jax.clear_caches()
     assert not [row["error"] for row in rows if "error" in row]
@@ -30,4 +30,8 @@ def test_a_small_sample_is_judged_right():
     assert false.interval[0] <= 0.05, false.failing
     assert right.judged >= 5
     assert right.figure >= 0.8, right.failing
+    two, outside = _mark(rows, "two effects"), _mark(rows, "outside")
+    assert (two.judged, outside.judged) == (2, 2)
+    assert two.figure >= 0.5, two.failing
+    assert outside.figure >= 0.5, outside.failing
     assert _mark(rows, "inadmissible sign").passed
