@@ -1,19 +1,19 @@
 """Hum of the mains on the output: whether it is there, and which dwells hide it under a harmonic."""
 
+import functools
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.stats
+from jaxtyping import Complex
 
-from ._basis import drifting_harmonics, meeting_order
+from ._basis import meeting_order
+from ._dwell_end import dwell_rest, dwell_window
 from ._record import Dwell, Record
 
 MAINS = (50.0, 60.0)
 """Frequencies of public mains [Hz]."""
-
-MOST_HARMONICS = 120
-"""Those of dry friction fall as 1/n: the fortieth may still stand above the noise."""
 
 _BESIDE = np.array([-3.5, -2.5, -1.5, 1.5, 2.5, 3.5])
 """Where the noise next to a line is looked at, in lines of the window."""
@@ -57,12 +57,6 @@ class MainsCollision:
     mains: float
 
 
-def dwell_window(record: Record, dwell: Dwell) -> int | None:
-    """Gives the samples of a dwell's settled end that its noise is taken from; None if it is too short."""
-    window = round(max(dwell.cycles / 4.0, 4.0) * record.rate / dwell.frequency)
-    return None if window > 0.7 * (dwell.stop - dwell.start) else window
-
-
 _KNOWN: WeakKeyDictionary[Record, tuple[HumLine, ...]] = WeakKeyDictionary()
 """Lines that were already sought: noise, harmonics and health all ask."""
 
@@ -92,18 +86,14 @@ def _stands_out(record: Record, line: float) -> HumLine | None:
         window = dwell_window(record, dwell)
         if window is None:
             continue
-        orders = min(MOST_HARMONICS, int(0.45 * record.rate / dwell.frequency), max(1, window // 8))
         resolution = record.rate / window
         sought = np.concatenate([[line], line + _BESIDE * resolution])
         off = np.abs(sought - dwell.frequency * np.round(sought / dwell.frequency))
         clear = (off >= _CLEAR * resolution) & (sought < 0.45 * record.rate)
         if not clear[0] or not np.any(clear[1:]):
             continue
-        design, inverse = drifting_harmonics(window, record.rate, dwell.frequency, orders)
-        signal = record.output[dwell.stop - window : dwell.stop]
-        rest = signal - design @ (inverse @ (design.T @ signal))
-        time = np.arange(window) / record.rate
-        power = np.abs(np.exp(-2j * np.pi * sought[clear, None] * time) @ rest) ** 2
+        rest = dwell_rest(record, dwell, window, 0.45 * record.rate).signal
+        power = np.abs(_tones(window, record.rate, tuple(sought[clear])) @ rest) ** 2
         # Per dwell, so that one that never settled does not drown the others.
         noise = float(np.mean(power[1:]))
         if noise > 0.0:
@@ -117,6 +107,13 @@ def _stands_out(record: Record, line: float) -> HumLine | None:
     if not scipy.stats.chi2.sf(-2.0 * np.sum(np.log(chances)), 2 * chances.size) < _CHANCE:
         return None
     return HumLine(record.name, line, float(np.sqrt(max(np.mean(squares), 0.0))))
+
+
+@functools.lru_cache(maxsize=128)
+def _tones(window: int, rate: float, frequencies: tuple[float, ...]) -> Complex[np.ndarray, "line time"]:
+    """Gives a turning phasor for each frequency; the records of a campaign ask for the same ones."""
+    time = np.arange(window) / rate
+    return np.exp(-2j * np.pi * np.array(frequencies)[:, None] * time)
 
 
 def mains_collisions(records: tuple[Record, ...]) -> tuple[MainsCollision, ...]:

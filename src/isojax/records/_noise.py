@@ -9,10 +9,10 @@ import scipy.stats
 from jaxtyping import Float
 
 from ._band import spectral_floor
-from ._basis import drifting_harmonics
 from ._blow import ring_down
 from ._campaign import Campaign
-from ._mains import MOST_HARMONICS, dwell_window, hum_lines
+from ._dwell_end import dwell_rest, dwell_window
+from ._mains import hum_lines
 from ._noise_band import NoiseBand
 from ._record import Dwell, Record
 from ._repeats import repeat_difference, repeat_groups
@@ -169,15 +169,12 @@ def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float,
     window = dwell_window(record, dwell)
     if window is None:
         return None
-    signal = record.output[dwell.stop - window : dwell.stop]
-    orders = min(MOST_HARMONICS, int(0.9 * band.highest / dwell.frequency), max(1, window // 8))
     lines = tuple(line.frequency for line in hum_lines(record))
-    design, inverse = drifting_harmonics(window, record.rate, dwell.frequency, orders, lines)
+    rest, columns = dwell_rest(record, dwell, window, 0.9 * band.highest, lines)
     # noise of a narrow band has fewer degrees of freedom than samples; the harmonics take theirs from them
-    freedom = window * band.share - design.shape[1]
-    if freedom < design.shape[1]:
+    freedom = window * band.share - columns
+    if freedom < columns:
         return None
-    rest = signal - design @ (inverse @ (design.T @ signal))
     return float(rest @ rest) * band.share / freedom, float(freedom)
 
 
