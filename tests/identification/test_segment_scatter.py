@@ -1,8 +1,10 @@
 """Stiffness that scatters from dwell to dwell: told by repeats, and taken for no effect."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
+import optimistix as optx
 import pytest
 from strange_laws import BASE, RestlessSpring
 
@@ -16,9 +18,12 @@ from isojax.elements import (
     LinearStiffness,
 )
 from isojax.identification import fit, scales
+from isojax.identification._dwell_remainder import share_parts, split_dwells
 from isojax.identification._elimination import Nuisances, Reduced, Spread
 from isojax.identification._information import STIFFNESS_SCALE_UNIT
+from isojax.identification._latent_force import latent_forces
 from isojax.identification._problem import Point
+from isojax.identification._refit import polish
 from isojax.identification._score import absent_effects, score_test
 from isojax.identification._segment_scatter import segment_scatter
 from isojax.identification._segments import Segment
@@ -56,9 +61,35 @@ def test_scatter_from_dwell_to_dwell_is_told_by_repeats_and_taken_for_no_effect(
     assert found.stats.segment_scatter == pytest.approx(1e-3, rel=0.4)
     assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.02)
     assert surest(found) > 0.05
+    # Nor is it described as a force that follows the displacement.
+    assert share_parts(split_dwells(found, latent_forces(found)))["with x"] < 0.05
     # With one stiffness for all dwells of a record the same campaign lacks something beyond any doubt.
-    monkeypatch.setattr("isojax.identification._estimate.segment_scatter", lambda *records: 0.0)
+    monkeypatch.setattr("isojax.identification._estimate.segment_scatter", lambda *arguments: 0.0)
     assert surest(fit(START, campaign)) < 1e-20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 3, 4])
+def test_what_scatters_within_records_counts_no_second_time_between_them(seed, simulated):
+    bench = dataclasses.replace(BENCH, drift=0.0)
+    plant = rig.Plant(BASE).plus(RestlessSpring.of(PLAN, 1.0805e6, 1e-3, seed, bench))
+    assert fit(START, simulated(plant, PLAN, seed, bench)).stats.stiffness_scatter < 2e-4
+
+
+@pytest.mark.slow
+def test_scatter_that_a_wrong_model_showed_is_given_up_with_the_finding(simulated):
+    campaign = simulated(rig.Plant(BASE), PLAN, 2, BENCH)
+    right = fit(START, campaign)
+    assert right.stats.segment_scatter == 0.0
+    old = right.estimate.point.nuisances
+    moved = old._replace(spread=Spread(old.spread.records, 1e-3), segments=old.segments + 1e-3)
+    wrong = right.estimate._replace(point=right.estimate.point._replace(nuisances=moved))
+    again = polish(wrong, scales(campaign), optx.LevenbergMarquardt(1e-3, 1e-3), lambda line: None)
+    assert again.point.nuisances.spread.segments == 0.0
+    np.testing.assert_array_equal(again.point.nuisances.segments, 0.0)
+    np.testing.assert_allclose(
+        again.uncertainty.standard_error, right.estimate.uncertainty.standard_error, 1e-3
+    )
 
 
 def _record(repeat, drive, output, direction="forward", dwells=()):
@@ -69,8 +100,14 @@ def _record(repeat, drive, output, direction="forward", dwells=()):
     return Record(name, Path(f"{name}.npz"), time, 100.0, *signals, **about)
 
 
-def _told(scatter, alike=True, direction="forward", branch=1.0, seed=5, stepped=False):
-    """What two repeats tell that differ by a record's scatter, by that of dwells, and by noise."""
+def _told(
+    scatter, alike=True, direction="forward", branch=1.0, seed=5, stepped=False, assumed=1.0, known=0.0
+):
+    """What two repeats tell that differ by a record's scatter, by that of dwells, and by noise.
+
+    The noise is taken to be `assumed` of what it is, and the share `known` of each deviation is already in
+    the model.
+    """
     draw = np.random.default_rng(seed)
     drive = draw.standard_normal(DWELLS * LENGTH)
     other = drive if alike else draw.standard_normal(drive.size)
@@ -101,8 +138,9 @@ def _told(scatter, alike=True, direction="forward", branch=1.0, seed=5, stepped=
     apparent += scatter * draw.standard_normal(apparent.size)
     noise = 1e-3 * draw.uniform(0.2, 2.0, apparent.size)
     apparent += noise * draw.standard_normal(apparent.size)
-    information = (STIFFNESS_SCALE_UNIT / noise) ** 2
-    by_segment = np.stack([information, information * apparent / STIFFNESS_SCALE_UNIT], axis=1)
+    information = (STIFFNESS_SCALE_UNIT / (assumed * noise)) ** 2
+    left = (1.0 - known) * apparent / STIFFNESS_SCALE_UNIT
+    by_segment = np.stack([information, information * left], axis=1)
     lanes = len(segments)
     nothing = np.zeros((lanes, 0))
     reduced = Reduced(
@@ -116,8 +154,10 @@ def _told(scatter, alike=True, direction="forward", branch=1.0, seed=5, stepped=
         np.zeros(0),
         by_segment,
     )
-    nuisances = Nuisances(nothing, np.zeros(2), np.zeros(lanes), Spread(1e-2))
-    return segment_scatter(records, segments, Point(START, nuisances, reduced, np.ones(2)))
+    own = known * apparent / STIFFNESS_SCALE_UNIT
+    nuisances = Nuisances(nothing, np.zeros(2), own, Spread(1e-2))
+    point = Point(START, nuisances, reduced, np.ones(2))
+    return segment_scatter(records, segments, point, assumed**-2)
 
 
 @pytest.mark.parametrize(("scatter", "within"), [(5e-4, 0.2), (1e-3, 0.1), (4e-3, 0.05)])
@@ -133,6 +173,15 @@ def test_without_scatter_or_without_repeats_there_is_none():
     assert _told(4e-3, alike=False) == 0.0
     assert _told(4e-3, branch=1.2) == 0.0
     assert _told(4e-3, branch=1.2, stepped=True) == 0.0
+
+
+def test_noise_that_is_larger_than_declared_is_no_scatter():
+    assert sum(_told(0.0, seed=seed, assumed=0.7) > 0.0 for seed in range(100)) <= 4
+    assert _told(4e-3, assumed=0.7) == pytest.approx(4e-3, rel=0.15)
+
+
+def test_deviations_that_the_model_already_has_count():
+    assert _told(1e-3, known=0.8) == pytest.approx(_told(1e-3), rel=1e-9)
 
 
 def test_dwells_are_matched_by_their_frequency_wherever_they_begin():

@@ -23,7 +23,7 @@ from isojax.records import (
     receptance,
     zero_phase_butterworth,
 )
-from isojax.records._filter import UNSURE, compensate_butterworth
+from isojax.records._filter import compensate_butterworth, unsure_samples
 
 RATE = 1000.0
 
@@ -77,7 +77,7 @@ def test_what_a_filter_took_is_given_back(order: int) -> None:
     signal = sum(np.sin(2 * np.pi * frequency * time + phase) for frequency, phase in tones)
     sections = scipy.signal.butter(order, 50.0, fs=RATE, output="sos")
     filtered = scipy.signal.sosfilt(sections, signal)
-    unsure = round(UNSURE * order * RATE / 50.0)
+    unsure = unsure_samples(RATE, order, 50.0)
     inside = slice(unsure, -unsure)
     assert np.std((filtered - signal)[inside]) > 0.1
     found = compensate_butterworth(filtered, RATE, order, 50.0)

@@ -30,22 +30,26 @@ def test_headline_says_what_the_verdict_says(found, verdict, start):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "verdict", "said"),
+    ("before", "after", "samples", "verdict", "said"),
     [
-        (1.16, 1.32, "found", "speak against it: they are predicted worse than without it."),
-        (1.16, 1.32, "partly_explained", "speak against it: they are predicted worse than without it."),
-        (1.16, 1.12, "found", "not explained down to their noise: there the law may be another."),
-        (1.16, 1.12, "partly_explained", ""),
-        (1.16, 1.04, "found", ""),
-        (0.98, 1.03, "found", ""),
-        (3.00, math.nan, "found", ""),
+        (1.16, 1.32, 9e3, "found", "speak against it: they are predicted worse than without it."),
+        (1.16, 1.32, 9e3, "partly_explained", "speak against it: they are predicted worse than without it."),
+        (1.16, 1.12, 9e3, "found", "not explained down to their noise: there the law may be another."),
+        (1.16, 1.12, 9e3, "partly_explained", ""),
+        (1.16, 1.04, 9e3, "found", ""),
+        (0.98, 1.03, 9e3, "found", ""),
+        # Of few samples chi2/dof scatters by itself: sqrt(2 / 300) is 0.08.
+        (1.16, 1.12, 300.0, "found", ""),
+        (1.16, 1.30, 100.0, "partly_explained", ""),
+        (1.22, 1.30, 300.0, "found", "not explained down to their noise: there the law may be another."),
+        (3.00, math.nan, 9e3, "found", "speak against it: the model runs away on them."),
     ],
 )
 def test_what_held_out_records_say_against_a_finding_is_told(
-    before, after, verdict, said, found, monkeypatch
+    before, after, samples, verdict, said, found, monkeypatch
 ):
     def errors(held):
-        return {"holdout": Errors(0.01, 0.04, 0.04, before if held is found.before else after)}
+        return {"holdout": Errors(0.01, 0.04, 0.04, before if held is found.before else after, samples)}
 
     monkeypatch.setattr(Fit, "errors", property(errors))
     told = doubt_words(found._replace(verdict=verdict))

@@ -9,7 +9,7 @@ from ..models import Isolator
 from ..records import Record
 from ._beginning import beginning_states, best_nuisances
 from ._elimination import Nuisances, Spread
-from ._information import readings
+from ._information import STIFFNESS_SCALE_UNIT, readings
 from ._problem import Bench, Point, Problem, stiffness_deviation
 from ._segments import Segment
 
@@ -22,12 +22,14 @@ class Errors(NamedTuple):
         nrmse: the same over the rms of the measured output about its record's mean.
         nrmse_segments: the error with every segment restarted, likewise normalised.
         chi2_per_dof: squared whitened error with every segment restarted, a degree of freedom.
+        dof: degrees of freedom: independent samples less what initial states and coefficients took.
     """
 
     rmse: float
     nrmse: float
     nrmse_segments: float
     chi2_per_dof: float
+    dof: float
 
 
 class Run(NamedTuple):
@@ -55,10 +57,13 @@ class Restarts(NamedTuple):
     Attributes:
         runs: each record, its segments joined.
         point: the equations at the best nuisances.
+        deviations: of each record's linear stiffness, that of its segments included, at every sample
+            [relative].
     """
 
     runs: tuple[Run, ...]
     point: Point
+    deviations: tuple[Float[np.ndarray, " time"], ...]
 
     @property
     def stiffness(self) -> Float[np.ndarray, " record"]:
@@ -113,11 +118,18 @@ def restart_records(
     point = best_nuisances(bench, model, spread, known, places)
     simulated = [np.full(record.output.size, np.nan) for record in problem.records]
     counted = [np.zeros(record.output.size) for record in problem.records]
-    for part, values in zip(problem.segments, _simulate_lanes(bench, model, point.nuisances), strict=True):
+    deviations = [
+        np.full(record.output.size, own)
+        for record, own in zip(problem.records, stiffness_deviation(point.nuisances), strict=True)
+    ]
+    lanes = _simulate_lanes(bench, model, point.nuisances)
+    beside = STIFFNESS_SCALE_UNIT * point.nuisances.segments[: len(lanes)]
+    for part, values, more in zip(problem.segments, lanes, beside, strict=True):
         simulated[part.record][part.start : part.stop] = values
         counted[part.record][part.counted : part.stop] = 1.0
+        deviations[part.record][part.start : part.stop] += more
     runs = tuple(Run(*entry) for entry in zip(problem.records, simulated, counted, strict=True))
-    return Restarts(runs, point)
+    return Restarts(runs, point, tuple(deviations))
 
 
 def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
@@ -187,4 +199,4 @@ def summarise(free: tuple[Run, ...], restarts: Restarts, role: str, coefficients
     known = np.isfinite(rmse)
     chi2 = float(point.reduced.by_record[places, -1, -1].sum()) if known else float("nan")
     dof = float(np.sum(point.samples[places] - point.reduced.eliminated[places])) - coefficients
-    return Errors(rmse, nrmse, rms(restarts.runs)[1], chi2 / max(1.0, dof))
+    return Errors(rmse, nrmse, rms(restarts.runs)[1], chi2 / max(1.0, dof), max(1.0, dof))

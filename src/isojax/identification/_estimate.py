@@ -21,13 +21,16 @@ from ._covariance import Uncertainty, uncertainty, unknown
 from ._descent import Rival, descend
 from ._elimination import Nuisances, Spread
 from ._information import STIFFNESS_SCALE_UNIT, has_stiffness_scale
-from ._problem import Bench, Point
+from ._problem import Bench, Point, one_hot
 from ._segment_scatter import segment_scatter
 
 FIRST_STIFFNESS_SPREAD = Spread(1e-2)
 """Prior of the stiffness scales before the records have said how much they scatter: one percent."""
 
 SMALLEST_STIFFNESS_SPREAD = 1e-5
+
+_SAME_SCATTER = 0.1
+"""Relative difference up to which two scatters within records are one."""
 
 
 class Estimate(NamedTuple):
@@ -175,6 +178,19 @@ def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: floa
     return 1e-3
 
 
+def _spread(bench: Bench, point: Point, places: tuple[int, ...], within: float, inflation: float) -> Spread:
+    """Tell the scatter of the stiffness between records, beside that within them."""
+    records = bench.problem.records
+    if len(records) == 1:
+        return Spread(SMALLEST_STIFFNESS_SPREAD, within)
+    loose = FIRST_STIFFNESS_SPREAD._replace(segments=within)
+    if point.nuisances.spread != loose:
+        # What scatters within records moves their means, too, and must not count twice.
+        directions = one_hot(point.model, places, [1.0] * len(places))
+        point = bench.evaluate(point.model, directions, point.nuisances._replace(spread=loose))
+    return Spread(stiffness_scatter(records, point, inflation), within)
+
+
 def _check_delay(model: Isolator, places: tuple[int, ...], hold: Hold) -> None:
     """Refuse to fit a delay of a drive that jumps: the response has no derivative with respect to it."""
     if hold != "zero_order":
@@ -205,6 +221,7 @@ def estimate(
     progress: Callable[[str], None],
     tolerance: float = 1e-2,
     rival: Rival | None = None,
+    anew: bool = False,
 ) -> Estimate:
     """Fit the free coefficients of a model to records.
 
@@ -219,6 +236,8 @@ def estimate(
         progress: told a line a step.
         tolerance: decrease of chi2 per max(chi2/dof, 1) below which the search is over.
         rival: another model, far behind which the search is given up.
+        anew: whether the scatter of the stiffness within records is told again from this model, though it is
+            known of another.
 
     Returns:
         The estimate.
@@ -248,33 +267,30 @@ def estimate(
         progress=progress,
     )
     steps = found.steps
-    single = len(bench.problem.records) == 1
-    if is_successful(found.result) and has_stiffness_scale(model) and not known:
-        freedom = max(1.0, found.point.free_samples)
-        inflation = found.point.chi2 / freedom
-        spread = (
-            SMALLEST_STIFFNESS_SPREAD
-            if single
-            else stiffness_scatter(bench.problem.records, found.point, inflation)
-        )
-        within = segment_scatter(bench.problem.records, bench.problem.segments, found.point)
-        progress(
-            f"linear stiffness scatters by {100 * spread:.2g} % between records"
-            + (f" and by {100 * within:.2g} % within them" if within else "")
-        )
-        again = found.point.nuisances._replace(spread=Spread(spread, within))
-        found = descend(
-            bench,
-            found.point.model,
-            places,
-            sizes,
-            again,
-            solver=solver,
-            max_steps=max_steps,
-            tolerance=tolerance,
-            progress=progress,
-        )
-        steps += found.steps
+    if is_successful(found.result) and has_stiffness_scale(model) and (anew or not known):
+        problem, old = bench.problem, found.point.nuisances
+        inflation = found.point.chi2 / max(1.0, found.point.free_samples)
+        within = segment_scatter(problem.records, problem.segments, found.point, inflation)
+        moved = abs(within - old.spread.segments) > _SAME_SCATTER * max(within, old.spread.segments)
+        if moved or not known:
+            spread = _spread(bench, found.point, places, within, inflation)
+            progress(
+                f"linear stiffness scatters by {100 * spread.records:.2g} % between records"
+                + (f" and by {100 * within:.2g} % within them" if within else "")
+            )
+            own = old.segments if within else np.zeros_like(old.segments)
+            found = descend(
+                bench,
+                found.point.model,
+                places,
+                sizes,
+                old._replace(segments=own, spread=spread),
+                solver=solver,
+                max_steps=max_steps,
+                tolerance=tolerance,
+                progress=progress,
+            )
+            steps += found.steps
     point = found.point
     dof = max(1.0, point.free_samples - len(places))
     error = (

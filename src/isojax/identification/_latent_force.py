@@ -177,7 +177,7 @@ def latent_forces(fit: Fit) -> tuple[LatentForce, ...]:
     error in its own mean.
 
     Args:
-        fit: the fit; the deviation of each record's linear stiffness is taken over from it.
+        fit: the fit; how far the linear stiffness of each record and segment deviates is taken over from it.
 
     Returns:
         One a record, held-out ones included.
@@ -188,13 +188,15 @@ def latent_forces(fit: Fit) -> tuple[LatentForce, ...]:
     # One band for all: what one record lacks of a law and another has would look like another law.
     common = max(measured_motion(fit.campaign, record).band.highest for record in fit.campaign.records)
     found = {
-        id(run.record): _latent_force(fit, run, 1.0 + float(deviation), place, common)
-        for place, (run, deviation) in enumerate(zip(restarts.runs, restarts.stiffness, strict=True))
+        id(run.record): _latent_force(fit, run, 1.0 + deviation, place, common)
+        for place, (run, deviation) in enumerate(zip(restarts.runs, restarts.deviations, strict=True))
     }
     return tuple(found[id(record)] for record in fit.campaign.records)
 
 
-def _latent_force(fit: Fit, run: Run, scale: float, seed: int, common: float) -> LatentForce:
+def _latent_force(
+    fit: Fit, run: Run, scale: Float[np.ndarray, " time"], seed: int, common: float
+) -> LatentForce:
     model, campaign, record = fit.model, fit.campaign, run.record
     hold: Hold = campaign.input.hold
     shift = float(model.shift())

@@ -235,7 +235,7 @@ def _states_of(
 
 
 def polish(found: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]) -> Estimate:
-    """Take a rough refit to the end of its search.
+    """Take a rough refit to the end of its search; what scatter repeats show beside its law is told anew.
 
     Args:
         found: the refit.
@@ -256,8 +256,12 @@ def polish(found: Estimate, scales: Scales, solver: Any, progress: Callable[[str
         solver=solver,
         max_steps=25,
         progress=progress,
+        anew=True,
     )
-    return again if again.result == RESULTS.successful and again.chi2 <= found.chi2 else found
+    # With another scatter another sum is made least.
+    comparable = again.point.nuisances.spread == found.point.nuisances.spread
+    better = again.chi2 <= found.chi2 or not comparable
+    return again if again.result == RESULTS.successful and better else found
 
 
 def is_determined(found: Estimate, score: Score) -> bool:

@@ -31,7 +31,9 @@ class _Pair(NamedTuple):
     variances: np.ndarray
 
 
-def segment_scatter(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point) -> float:
+def segment_scatter(
+    records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point, inflation: float
+) -> float:
     """Give the standard deviation of the linear stiffness from segment to segment within a record.
 
     Two repeats of a record (equal level, direction and role) share every deterministic error of the model,
@@ -43,6 +45,9 @@ def segment_scatter(records: tuple[Record, ...], segments: tuple[Segment, ...], 
         records: the records.
         segments: pieces of them.
         point: equations of these segments.
+        inflation: chi2/dof. Noise that is larger than was thought would pass for scatter, and so would a law
+            that is missing, as far as the repeats differ in amplitude; scatter itself hardly raises it, each
+            segment having many samples to its one stiffness.
 
     Returns:
         Relative standard deviation; 0 where no repeat shows one.
@@ -51,7 +56,7 @@ def segment_scatter(records: tuple[Record, ...], segments: tuple[Segment, ...], 
     """
     squares, freedom, weight = 0.0, 0, 0.0
     for pair in _pairs(records, segments, point):
-        weights = 1.0 / pair.variances
+        weights = 1.0 / (max(1.0, inflation) * pair.variances)
         mean = np.sum(weights * pair.differences) / weights.sum()
         squares += float(np.sum(weights * (pair.differences - mean) ** 2))
         freedom += pair.differences.size - 1
@@ -79,7 +84,7 @@ def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Po
             information, score = point.reduced.by_segment[lanes].transpose(2, 0, 1)
             seen = np.all(information > 0.0, axis=1)
             if np.count_nonzero(seen) > 1:
-                found = score[seen] / information[seen]
+                found = score[seen] / information[seen] + point.nuisances.segments[lanes[seen]]
                 variances = np.sum(1.0 / information[seen], axis=1)
                 pairs.append(_Pair(found[:, 0] - found[:, 1], variances))
     return pairs

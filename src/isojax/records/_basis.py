@@ -47,7 +47,9 @@ def meeting_order(frequency: float, line: float, seconds: float) -> int | None:
 @functools.lru_cache(maxsize=64)
 def drifting_harmonics(
     window: int, rate: float, frequency: float, orders: int, lines: tuple[float, ...] = ()
-) -> tuple[Float[np.ndarray, "time column"], Float[np.ndarray, "column column"]]:
+) -> tuple[
+    Float[np.ndarray, "time column"], Float[np.ndarray, "column column"], Float[np.ndarray, " column"]
+]:
     """Gives harmonics whose fundamental drifts linearly, lines beside them, the inverse of their products.
 
     A line that the window cannot tell from a harmonic lets that one drift too. The records of a campaign
@@ -61,17 +63,22 @@ def drifting_harmonics(
         lines: Of the mains [Hz].
 
     Returns:
-        Columns (time, column) and the inverse of their products.
+        Columns (time, column), the inverse of their products, and the frequency of each column [Hz].
     """
     time = (np.arange(window) - 0.5 * (window - 1)) / rate
     basis = harmonic_basis(time, frequency, orders)
     slope = (time / time[-1])[:, None]
     columns = [basis, slope * basis[:, :3]]
+    multiples = np.repeat(np.arange(orders + 1), 2)[1:]
+    frequencies = [frequency * multiples, frequency * multiples[:3]]
     for line in lines:
         order = meeting_order(frequency, line, window / rate)
         if order is None:
             columns.append(harmonic_basis(time, line, 1)[:, 1:])
         elif order <= orders:
             columns.append(slope * basis[:, 2 * order - 1 : 2 * order + 1])
+        else:
+            continue
+        frequencies.append(np.full(2, line))
     design = np.concatenate(columns, axis=1)
-    return design, np.linalg.inv(design.T @ design)
+    return design, np.linalg.inv(design.T @ design), np.concatenate(frequencies)

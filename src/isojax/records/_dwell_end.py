@@ -18,11 +18,11 @@ class Rest(NamedTuple):
 
     Attributes:
         signal: Samples, in the output's unit.
-        columns: Coefficients that were taken out.
+        taken: Frequencies of the columns that were taken out [Hz].
     """
 
     signal: Float[np.ndarray, " time"]
-    columns: int
+    taken: Float[np.ndarray, " column"]
 
 
 def dwell_window(record: Record, dwell: Dwell) -> int | None:
@@ -35,26 +35,26 @@ _KNOWN: WeakKeyDictionary[Record, dict[tuple, Rest]] = WeakKeyDictionary()
 """The columns of all dwells outgrow a cache of the processor: what is asked again is not worked out again."""
 
 
-def dwell_rest(
-    record: Record, dwell: Dwell, window: int, highest: float, lines: tuple[float, ...] = ()
-) -> Rest:
-    """Gives what the harmonics up to a frequency, at most 120, leave of the end of a dwell.
+def dwell_rest(record: Record, dwell: Dwell, window: int, lines: tuple[float, ...] = ()) -> Rest:
+    """Gives what the harmonics up to 0.45 of the rate, at most 120, leave of the end of a dwell.
+
+    A declared filter ends nothing: its cut-off is where the harmonics begin to fall, and some stand above the
+    noise well beyond it.
 
     Args:
         record: The record.
         dwell: One of its dwells.
         window: Samples of its end.
-        highest: Frequency up to which harmonics are taken out [Hz].
         lines: Of the mains, taken out with them [Hz].
 
     Returns:
         The rest. Not to be written to.
     """
-    orders = min(MOST_HARMONICS, int(highest / dwell.frequency), max(1, window // 8))
+    orders = min(MOST_HARMONICS, int(0.45 * record.rate / dwell.frequency), max(1, window // 8))
     known = _KNOWN.setdefault(record, {})
     key = dwell.start, dwell.stop, dwell.frequency, window, orders, lines
     if key not in known:
-        design, inverse = drifting_harmonics(window, record.rate, dwell.frequency, orders, lines)
+        design, inverse, taken = drifting_harmonics(window, record.rate, dwell.frequency, orders, lines)
         signal = record.output[dwell.stop - window : dwell.stop]
-        known[key] = Rest(signal - design @ (inverse @ (design.T @ signal)), design.shape[1])
+        known[key] = Rest(signal - design @ (inverse @ (design.T @ signal)), taken)
     return known[key]

@@ -43,10 +43,25 @@ def zero_phase_butterworth(
 LEAST_GAIN = 0.5
 """Gain of a filter below which no more of it is taken out: twice the noise is the price, and no more."""
 
+FEWEST_UNSURE = 100
+"""A filter that ends near half the rate is short, but its inverse falls there from twice to nothing."""
 
-UNSURE = 4.0
-"""Samples at either end of a record that depend on what lies beyond it, in units of order times rate over
-cut-off: what is assumed there leaves an error of 5e-4 of the signal at most further inside."""
+
+def unsure_samples(rate: float, order: int, cutoff_hz: float) -> int:
+    """Gives the samples at either end of a record that depend on what lies beyond it.
+
+    What is assumed there leaves an error of 1e-3 of the signal at most further inside, with a cut-off up to
+    0.2 of the rate; with one close to half of it up to 8e-3, near the cut-off.
+
+    Args:
+        rate: Samples per second [Hz].
+        order: Order of the filter.
+        cutoff_hz: Cut-off frequency [Hz].
+
+    Returns:
+        Four times order times rate over cut-off, and at least `FEWEST_UNSURE`.
+    """
+    return max(FEWEST_UNSURE, round(4.0 * order * rate / cutoff_hz))
 
 
 def compensate_butterworth(
@@ -65,7 +80,7 @@ def compensate_butterworth(
 
     Returns:
         The samples before the filter, (time,), as far as its gain was above `LEAST_GAIN`; beyond, without
-        its phase. The first and last `UNSURE` order rate / cutoff_hz of them are not to be relied on.
+        its phase. The first and last `unsure_samples` of them are not to be relied on.
     """
     sections = scipy.signal.butter(order, cutoff_hz, fs=rate, output="sos")
     pad = _settling(order, cutoff_hz, rate, signal.size)

@@ -92,7 +92,7 @@ def _stands_out(record: Record, line: float) -> HumLine | None:
         clear = (off >= _CLEAR * resolution) & (sought < 0.45 * record.rate)
         if not clear[0] or not np.any(clear[1:]):
             continue
-        rest = dwell_rest(record, dwell, window, 0.45 * record.rate).signal
+        rest = dwell_rest(record, dwell, window).signal
         power = np.abs(_tones(window, record.rate, tuple(sought[clear])) @ rest) ** 2
         # Per dwell, so that one that never settled does not drown the others.
         noise = float(np.mean(power[1:]))

@@ -137,10 +137,11 @@ def cycle_scatter(record: Record, band: NoiseBand) -> float:
     """Gives the rms about the harmonics of the last quarter of each dwell, at least four cycles; NaN if none
     is long.
 
-    As many harmonics are taken as the band holds, up to 120, and the fundamental may drift linearly. Lines of
-    the mains that stand out of the record are no noise either: a model can explain them. Dwells that never
-    settle, near a fold or in modulation, do not count: beyond the chance of one in a thousand, by chi-square,
-    from the level that the lower quartile of the dwells shows.
+    As many harmonics are taken as half the rate holds, up to 120, and the fundamental may drift linearly:
+    they stand above the noise beyond a filter's cut-off, too. Lines of the mains that stand out of the record
+    are no noise either: a model can explain them. Dwells that never settle, near a fold or in modulation, do
+    not count: beyond the chance of one in a thousand, by chi-square, from the level that the lower quartile
+    of the dwells shows.
 
     Args:
         record: The record.
@@ -170,10 +171,11 @@ def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float,
     if window is None:
         return None
     lines = tuple(line.frequency for line in hum_lines(record))
-    rest, columns = dwell_rest(record, dwell, window, 0.9 * band.highest, lines)
+    rest, frequencies = dwell_rest(record, dwell, window, lines)
+    taken = float(np.sum(band.power_gain(frequencies)))
     # noise of a narrow band has fewer degrees of freedom than samples; the harmonics take theirs from them
-    freedom = window * band.share - columns
-    if freedom < columns:
+    freedom = window * band.share - taken
+    if freedom < taken:
         return None
     return float(rest @ rest) * band.share / freedom, float(freedom)
 

@@ -13,7 +13,7 @@ from ._band import ringing_frequency
 from ._campaign import Campaign, Filter, FloorChannel, InputChannel, OutputChannel
 from ._columns import read_columns
 from ._declaration import Declaration, read_declaration
-from ._filter import UNSURE, compensate_butterworth, zero_phase_butterworth
+from ._filter import compensate_butterworth, unsure_samples, zero_phase_butterworth
 from ._floor import floor_acceleration
 from ._kind import detect_kind
 from ._record import Dwell, Kind, Record
@@ -171,14 +171,21 @@ def _read_record(
             shown_input, shown_output = run(raw_input, *shape), run(raw_output, *shape)
             floor = None if floor is None else run(floor, *shape)
         if reader_filter.compensate:
-            unsure = round(UNSURE * reader_filter.order * rate / reader_filter.cutoff_hz)
+            unsure = unsure_samples(rate, reader_filter.order, reader_filter.cutoff_hz)
             start, stop, settle = start + unsure, stop - unsure, max(0, settle - unsure)
             if stop - start - settle < _FEWEST_SAMPLES:
                 raise ValueError(
                     f"{where} is too short: of its samples {unsure} at either end are lost where [filter] "
                     f"compensate = true takes a filter out, and at least {_FEWEST_SAMPLES} must be left"
                 )
+            if entry["period"] is not None and entry["period"] > stop - start:
+                raise ValueError(
+                    f"{where} has {stop - start} samples left, because [filter] compensate = true loses "
+                    f"{unsure} at either end; expected at least its period = {entry['period']}"
+                )
             kept = slice(unsure, -unsure)
+            if entry["kind"] != "free_decay":
+                _check_not_lost(where, raw_input, kept)
             raw_input, raw_output = raw_input[kept], raw_output[kept]
             shown_input, shown_output = shown_input[kept], shown_output[kept]
             floor = None if floor is None else floor[kept]
@@ -292,6 +299,18 @@ def _excitation(
     ringing = 2.0 * np.pi * ringing_frequency(response, rate)
     order = {"acceleration": 0, "velocity": 1, "displacement": 2}[sections["output"]["quantity"]]
     return detect_kind(drive, response, rate, mass * ringing**order)
+
+
+def _check_not_lost(where: str, drive: Float[np.ndarray, " time"], kept: slice) -> None:
+    """Refuses a record of which only the ends were driven: a blow, say, that a filter's ends take away."""
+    size = np.abs(drive - np.median(drive))
+    whole, left = float(np.max(size)), float(np.max(size[kept]))
+    if left < 0.5 * whole:
+        raise ValueError(
+            f"{where}: [filter] compensate = true loses {kept.start} samples at either end, in which the "
+            f"drive reaches {whole:.4g} (SI), and {left:.4g} between them; expected a record that begins "
+            "earlier, or compensate = false"
+        )
 
 
 def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:

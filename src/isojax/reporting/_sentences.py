@@ -2,6 +2,8 @@
 
 import math
 
+import scipy.stats
+
 from .._parameters import Parameter, list_parameters
 from .._results import RESULTS, is_successful
 from ..elements import CATALOGUE
@@ -80,8 +82,10 @@ def error_words(before: Fit, after: Fit) -> str:
 
 
 WORSE = 0.01
-"""Rise of the held-out chi2/dof that chance does not explain: the noise is common to both figures, so that
-their difference scatters by 2 sqrt(rise / samples) only, 0.002 for 10000 samples."""
+"""Rise of the held-out chi2/dof that matters, where chance does not explain it."""
+
+_CHANCE = 0.01
+"""Of noise alone to lie as high as held-out records that are called unexplained."""
 
 
 def headline(loop: Loop) -> str:
@@ -108,9 +112,15 @@ def doubt_words(loop: Loop) -> str:
         A sentence, or nothing where they agree.
     """
     before, after = loop.before.errors["holdout"], loop.after.errors["holdout"]
-    if before is None or after is None or not loop.findings or not after.chi2_per_dof > GOOD:
+    if before is None or after is None or not loop.findings or not is_successful(loop.after.result):
         return ""
-    if after.chi2_per_dof > before.chi2_per_dof + WORSE:
+    last, rise = after.chi2_per_dof, after.chi2_per_dof - before.chi2_per_dof
+    if not math.isfinite(last):
+        return "The held-out records speak against it: the model runs away on them."
+    if last <= GOOD or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
+        return ""
+    # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
+    if rise > WORSE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
         return "The held-out records speak against it: they are predicted worse than without it."
     if loop.verdict == "found":
         return "The held-out records are not explained down to their noise: there the law may be another."
