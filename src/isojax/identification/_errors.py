@@ -198,5 +198,6 @@ def summarise(free: tuple[Run, ...], restarts: Restarts, role: str, coefficients
     point = restarts.point
     known = np.isfinite(rmse)
     chi2 = float(point.reduced.by_record[places, -1, -1].sum()) if known else float("nan")
-    dof = float(np.sum(point.samples[places] - point.reduced.eliminated[places])) - coefficients
-    return Errors(rmse, nrmse, rms(restarts.runs)[1], chi2 / max(1.0, dof), max(1.0, dof))
+    left = float(np.sum(point.samples[places] - point.reduced.eliminated[places])) - coefficients
+    dof = max(1.0, left) if known else float("nan")
+    return Errors(rmse, nrmse, rms(restarts.runs)[1], chi2 / dof, dof)
