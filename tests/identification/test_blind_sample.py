@@ -35,3 +35,11 @@ def test_a_small_sample_is_judged_right():
     assert two.figure >= 0.5, two.failing
     assert outside.figure >= 0.5, outside.failing
     assert _mark(rows, "inadmissible sign").passed
+
+
+@pytest.mark.slow
+def test_records_are_restarted_on_the_branch_that_the_fit_is_on():
+    """Beside a fold a dwell goes to the other branch from its measured state alone: chi2/dof 1.09."""
+    row = run_one(2197, "none", "loop")
+    assert row["verdict"] == "none"
+    assert row["before"]["fit"] == pytest.approx(1.0, abs=0.05)

@@ -58,6 +58,12 @@ def test_what_held_out_records_say_against_a_finding_is_told(
     assert doubt_words(found._replace(verdict="none", extensions=())) == ""
 
 
+def test_of_what_is_below_the_noise_no_share_is_told(found):
+    finding = found.findings[0]
+    assert "it leaves no excess." in finding_words(finding._replace(transfer=1014.4))[1]
+    assert "it removes 62.0 % of the excess." in finding_words(finding._replace(transfer=0.62))[1]
+
+
 def test_a_doubt_stands_in_the_headline(found, monkeypatch):
     plain = headline(found)
     monkeypatch.setattr("isojax.reporting._sentences.doubt_words", lambda loop: "But they do not agree.")

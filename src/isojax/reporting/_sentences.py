@@ -180,9 +180,13 @@ def finding_words(finding: Finding) -> tuple[str, ...]:
         f"noise (family-wise p {chance})."
     ]
     if math.isfinite(finding.transfer):
-        lines.append(
-            f"On data that its refit did not see, it removes {typeset_share(finding.transfer)} of the excess."
+        # Above one chi2 is below its degrees of freedom there; of next to no excess no share tells.
+        removed = (
+            "leaves no excess"
+            if finding.transfer > 1.0
+            else f"removes {typeset_share(finding.transfer)} of the excess"
         )
+        lines.append(f"On data that its refit did not see, it {removed}.")
     others = [name for name in finding.indistinguishable if name != finding.effect]
     if others:
         lines.append(f"These data cannot tell it from: {', '.join(effect_words(name) for name in others)}.")
