@@ -20,7 +20,7 @@ from _trial_effects import (
 from _trial_outside import OUTSIDE
 from isojax import elements, rig
 from isojax.identification import fit, read_campaign, scales
-from isojax.identification._score import score_test
+from isojax.identification.diagnosis._score import score_test
 from isojax.models import Isolator
 
 CLASSES = ("none", "one", "two", "outside")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from isojax.elements import CATALOGUE
-from isojax.records._declaration import _RECORD, _SECTIONS, read_declaration
+from isojax.records.reading._declaration import _RECORD, _SECTIONS, read_declaration
 
 PAGE = (Path(__file__).parents[1] / "docs" / "campaign.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^### ([^\n]+)\n.*?^```toml\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)

@@ -132,8 +132,8 @@ def failing_campaign(folder):
 def test_a_fit_that_failed_ends_with_code_one_and_its_report_says_so(
     command, file, tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr("isojax.identification._descent.MOST_REFUSALS", 1)
-    monkeypatch.setattr("isojax.identification._descent.STALLED", 0.0)
+    monkeypatch.setattr("isojax.identification.fitting._descent.MOST_REFUSALS", 1)
+    monkeypatch.setattr("isojax.identification.fitting._descent.STALLED", 0.0)
     campaign = failing_campaign(tmp_path / "campaign")
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "model.json").write_text("of an earlier run", encoding="utf-8")

@@ -133,7 +133,7 @@ def test_nothing_is_written_where_a_picture_fails(z_file, z_map, tmp_path, monke
         raise ValueError("no ink")
 
     monkeypatch.setattr("isojax._cli.stability_map", lambda *_, **__: z_map)
-    monkeypatch.setattr("isojax.reporting._map_files.plot_response_map", fail)
+    monkeypatch.setattr("isojax.reporting.page._map_files.plot_response_map", fail)
     assert main(["map", z_file, *WINDOW, "--out", str(tmp_path / "out"), "--quiet"]) == 2
     assert not (tmp_path / "out").exists()
 

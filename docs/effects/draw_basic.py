@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from panels import label
 from scipy.integrate import solve_ivp
 
-from isojax.reporting._style import AFTER, BEFORE, LEVELS, NEUTRAL, axes_for, entitle
+from isojax.reporting.plots._style import AFTER, BEFORE, LEVELS, NEUTRAL, axes_for, entitle
 
 HERE = Path(__file__).parent
 PHASE = 2.0 * np.pi * np.arange(1024) / 1024

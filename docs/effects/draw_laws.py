@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from isojax import elements
 from isojax.elements import AbstractElement
-from isojax.reporting._style import AFTER, BEFORE, LEVELS, NEUTRAL, axes_for, entitle
+from isojax.reporting.plots._style import AFTER, BEFORE, LEVELS, NEUTRAL, axes_for, entitle
 
 jax.config.update("jax_enable_x64", True)
 

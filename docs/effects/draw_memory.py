@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from panels import label, panels
 
 from isojax import elements
-from isojax.reporting._style import AFTER, BEFORE, LEVELS, MEASURED, NEUTRAL
+from isojax.reporting.plots._style import AFTER, BEFORE, LEVELS, MEASURED, NEUTRAL
 
 jax.config.update("jax_enable_x64", True)
 

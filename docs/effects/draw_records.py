@@ -12,7 +12,7 @@ from panels import label, panels
 from scipy import signal
 
 from isojax import rig
-from isojax.reporting._style import AFTER, BEFORE, LEVELS, MEASURED, NEUTRAL
+from isojax.reporting.plots._style import AFTER, BEFORE, LEVELS, MEASURED, NEUTRAL
 
 HERE = Path(__file__).parent
 MASS, STIFFNESS, DAMPING = 800.0, 1.08e6, 1.0e4

@@ -3,7 +3,7 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from isojax.reporting._style import axes_for, entitle
+from isojax.reporting.plots._style import axes_for, entitle
 
 
 def panels(left: str, right: str) -> tuple[Figure, Axes, Axes]:

@@ -76,9 +76,9 @@ from .reporting import plot_effect as plot_effect
 from .reporting import plot_equivalent as plot_equivalent
 from .reporting import plot_errors as plot_errors
 from .reporting import plot_fold_curve as plot_fold_curve
+from .reporting import plot_force_residual_loops as plot_force_residual_loops
+from .reporting import plot_force_residual_map as plot_force_residual_map
 from .reporting import plot_frequency_response as plot_frequency_response
-from .reporting import plot_latent_loops as plot_latent_loops
-from .reporting import plot_latent_map as plot_latent_map
 from .reporting import plot_phase_portrait as plot_phase_portrait
 from .reporting import plot_ranking as plot_ranking
 from .reporting import plot_receptance as plot_receptance

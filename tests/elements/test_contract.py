@@ -16,10 +16,10 @@ from isojax._results import is_successful
 from isojax.elements import CATALOGUE, AbstractElement, Scales
 from isojax.excitations import Harmonic
 from isojax.models import Integrator, Isolator, load_model, save_model, simulate
-from isojax.stability._describing import response_start
-from isojax.stability._drive import recorded_sine
-from isojax.stability._floquet import multipliers
-from isojax.stability._period_map import period_map
+from isojax.stability.orbit._describing_function import response_start
+from isojax.stability.orbit._drive import recorded_sine
+from isojax.stability.orbit._floquet import multipliers
+from isojax.stability.orbit._period_map import period_map
 
 SCALES = Scales(
     mass=800.0,

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from isojax.identification.fitting._fit import DEFAULT_SOLVER
 
 from isojax import rig
 from isojax._results import RESULTS
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.identification import diagnose, fit, scales
-from isojax.identification._fit import DEFAULT_SOLVER
-from isojax.identification._refit import is_determined, refit_candidate
-from isojax.identification._score import score_test
+from isojax.identification.diagnosis._refit import is_determined, refit_candidate
+from isojax.identification.diagnosis._score import score_test
 from isojax.models import Isolator
 
 PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(1e11), rig.LinearDamping(8e3)))
@@ -87,7 +87,7 @@ def test_play_is_reported_with_the_stop_even_where_the_search_for_the_stop_fails
             return test.fitted._replace(result=RESULTS.outdone)
         return refit_candidate(test, index, *others)
 
-    monkeypatch.setattr("isojax.identification._diagnose.refit_candidate", lost)
+    monkeypatch.setattr("isojax.identification.diagnosis._diagnose.refit_candidate", lost)
     # Enough levels that the gap carries over to each from the others.
     plan = rig.Multisine((300.0, 450.0, 600.0), 2.0, 14.0, period=2.0, periods=4, lines="full")
     campaign = _measured(simulated, rig.Freeplay(1e5, 5e-4), plan=plan)

@@ -4,15 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from isojax.identification.fitting._fit import DEFAULT_SOLVER, silent
 
 from isojax import rig
 from isojax._parameters import list_parameters
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.identification import fit, scales
-from isojax.identification._admissible import find_violation
-from isojax.identification._fit import DEFAULT_SOLVER, silent
-from isojax.identification._refit import is_determined, refit_candidate
-from isojax.identification._score import score_test
+from isojax.identification.diagnosis._admissibility import find_violation
+from isojax.identification.diagnosis._refit import is_determined, refit_candidate
+from isojax.identification.diagnosis._score import score_test
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))

@@ -19,8 +19,8 @@ from isojax.elements import (
     MainsHum,
 )
 from isojax.identification import diagnose, fit, scales
-from isojax.identification._channels import channel_table, drive_harmonic, output_line
-from isojax.identification._score import score_test
+from isojax.identification.diagnosis._score import score_test
+from isojax.identification.jacobian._channels import channel_table, drive_harmonic, output_line
 from isojax.models import Isolator
 from isojax.records import Record
 
@@ -172,7 +172,7 @@ def test_a_stiffness_that_drifts_over_two_records_is_named(campaign_of):
 def test_the_score_of_a_chosen_phase_is_normal_where_there_is_only_noise():
     # Six records' amplitudes of a line of noise, as output_line gives them, against the mean and scatter
     # that the score takes off.
-    from isojax.identification._score import _RAYLEIGH
+    from isojax.identification.diagnosis._score import _RAYLEIGH
 
     rng = np.random.default_rng(5)
     amplitudes = np.array(

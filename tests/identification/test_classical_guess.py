@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isojax.identification._base_model import base_model
-from isojax.identification._classical_guess import classical_guess
-from isojax.identification._scales import scales
+from isojax.identification.guess._classical_guess import classical_guess
+from isojax.identification.guess._declared_model import base_model
+from isojax.identification.guess._scales import scales
 from isojax.records import (
     Campaign,
     Dwell,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from isojax.excitations import Sampled
-from isojax.identification._classical_guess import classical_guess
-from isojax.identification._paper_table import paper_table
+from isojax.identification.guess._classical_guess import classical_guess
+from isojax.identification.guess._paper_table import paper_table
 from isojax.models import simulate
 from isojax.records import dwell_harmonics, read_campaign
 

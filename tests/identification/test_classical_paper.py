@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from isojax.identification._equivalent import average_law, fit_equivalent_law
-from isojax.identification._harmonic_balance import (
+from isojax.identification.guess._equivalent_coefficients import (
     HARMONIC_FACTORS,
     equivalent_coefficients,
     invert_equivalent,
     normalised_law,
 )
+from isojax.identification.guess._equivalent_law import average_law, fit_equivalent_law
 
 # Printed polynomials, forward and backward; averages; laws: the paper, eqs. (10)-(28). Eq. (21) prints
 # -3.418e7, where its average (22) needs -3.418e6.

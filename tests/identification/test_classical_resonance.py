@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import scipy.io
 
-from isojax.identification._circle_fit import fit_circle
-from isojax.identification._decrement import logarithmic_decrement
-from isojax.identification._half_power import find_half_power, find_jumps, find_phase_resonance
+from isojax.identification.guess._circle_fit import fit_circle
+from isojax.identification.guess._half_power import find_half_power, find_jumps, find_phase_resonance
+from isojax.identification.guess._logarithmic_decrement import logarithmic_decrement
 
 MASS, NATURAL = 800.0, 5.5
 RATIOS = [0.01, 0.03, 0.1, 0.17]

@@ -18,7 +18,7 @@ from isojax.elements import (
     SensorGain,
 )
 from isojax.identification import close_loop, diagnose, extend, fit, residual, scales
-from isojax.identification._score import absent_effects, score_test
+from isojax.identification.diagnosis._score import absent_effects, score_test
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))

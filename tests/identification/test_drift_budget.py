@@ -6,9 +6,9 @@ import pytest
 import isojax as ij
 from isojax import rig
 from isojax.identification import drift_budget
-from isojax.identification._drift_budget import noise_and_pretence
-from isojax.identification._elimination import Nuisances, Spread, eliminate
-from isojax.identification._problem import one_hot
+from isojax.identification.fitting._drift_budget import noise_and_scatter_errors
+from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate
+from isojax.identification.fitting._problem import one_hot
 
 SPREAD, RECORDS, SAMPLES, COEFFICIENTS = 3e-3, 5, 60, 3
 OWNER = np.repeat(np.arange(RECORDS), 2)  # two segments a record
@@ -45,7 +45,7 @@ def test_noise_alone_is_ordinary_least_squares(dense, spread):
     columns = dense[0].reshape(-1, COEFFICIENTS)
     expected = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
     np.testing.assert_allclose(
-        noise_and_pretence(reduced_of(dense, spread), OWNER, spread)[0], expected, rtol=1e-9
+        noise_and_scatter_errors(reduced_of(dense, spread), OWNER, spread)[0], expected, rtol=1e-9
     )
 
 
@@ -68,8 +68,8 @@ def test_what_the_scatter_pretends_is_what_ordinary_least_squares_makes_of_it(de
     drawn = drawn + draw.normal(size=(4000, RECORDS, 2)) * spread.segments
     seen = (np.repeat(drawn, SAMPLES // 2, axis=2) / UNIT * scale).reshape(4000, -1)
     fitted = np.linalg.lstsq(columns.reshape(-1, COEFFICIENTS), seen.T, rcond=None)[0]
-    pretended = noise_and_pretence(reduced_of(dense, spread), OWNER, spread)[1]
-    np.testing.assert_allclose(pretended, fitted.std(axis=1), rtol=0.04)
+    if_ignored = noise_and_scatter_errors(reduced_of(dense, spread), OWNER, spread)[1]
+    np.testing.assert_allclose(if_ignored, fitted.std(axis=1), rtol=0.04)
 
 
 @pytest.fixture(scope="module")
@@ -95,12 +95,12 @@ def test_parts_add_up_and_a_loose_stiffness_limits_itself(drifting):
     assert 0.0 < stiffness.noise < 0.5 * stiffness.repeatability
     assert budget.of("nothing") is None
     # A fit that knows of no scatter weighs the records alike, which are alike.
-    assert stiffness.pretended == pytest.approx(expected, rel=0.1)
+    assert stiffness.if_ignored == pytest.approx(expected, rel=0.1)
 
 
 def test_noise_alone_is_what_a_fit_leaves_that_knows_of_no_scatter(drifting):
     steady = drifting.estimate.point.nuisances._replace(spread=Spread(1e-9))
-    bench, places = drifting.estimate.bench, drifting.estimate.places
+    bench, places = drifting.estimate.simulator, drifting.estimate.places
     directions = one_hot(drifting.model, places, [1.0] * len(places))
     point = bench.evaluate(drifting.model, directions, steady._replace(stiffness=0.0 * steady.stiffness))
     errors = np.sqrt(np.diag(np.linalg.inv(point.reduced.matrix[:-1, :-1])))

@@ -27,7 +27,7 @@ from isojax.identification import (
     find_separating_experiment,
     fit,
 )
-from isojax.identification._find_separation import with_separating_experiment
+from isojax.identification.experiment._find_separation import with_separating_experiment
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))

@@ -20,15 +20,15 @@ from isojax.elements import (
 )
 from isojax.excitations import Sampled
 from isojax.identification import fit, scales
-from isojax.identification._batch import coordinate_motion
-from isojax.identification._beginning import beginning_states
-from isojax.identification._estimate import estimate
-from isojax.identification._fit import DEFAULT_SOLVER, bench_for, silent
-from isojax.identification._fit_report import warnings_of
-from isojax.identification._problem import Problem
-from isojax.identification._segments import cut_segments
-from isojax.identification._setup import build_problem
-from isojax.identification._steps import find_integrator, step_error
+from isojax.identification.fitting._build_problem import build_problem
+from isojax.identification.fitting._estimate import estimate
+from isojax.identification.fitting._fit import DEFAULT_SOLVER, silent, simulator_for
+from isojax.identification.fitting._fit_result import warnings_of
+from isojax.identification.fitting._initial_states import find_initial_states
+from isojax.identification.fitting._integration_steps import find_integrator, step_error
+from isojax.identification.fitting._problem import Problem
+from isojax.identification.jacobian._batch import coordinate_motion
+from isojax.identification.jacobian._segments import cut_segments
 from isojax.models import Integrator, Isolator, simulate
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
@@ -84,7 +84,7 @@ def test_covariance_is_the_same_from_three_starts(linear):
     for stiffness, damping in ((9e5, 5e3), (1.25e6, 2e4), (1.08e6, 1e4)):
         start = START.replace(linear_stiffness__coefficient=stiffness, linear_damping__coefficient=damping)
         found = estimate(
-            bench_for(start, linear, 0.01, ONE_STEP),
+            simulator_for(start, linear, 0.01, ONE_STEP),
             start,
             (1, 2),
             scales(linear),
@@ -177,7 +177,7 @@ def test_internal_states_begin_a_free_run_at_rest(linear):
     problem = build_problem(
         linear.records, model, quantity="acceleration", hold="band_limited", noise=0.01, integrator=ONE_STEP
     )
-    state = beginning_states(problem, model)
+    state = find_initial_states(problem, model)
     assert state.shape == (3, 1)
     assert state[2, 0] == 0.0
     assert np.any(state[:2])

@@ -33,11 +33,11 @@ from isojax.elements import (
 )
 from isojax.excitations import Sampled
 from isojax.identification import _batch
-from isojax.identification._batch import Prepared, prepare
-from isojax.identification._columns import column_information
-from isojax.identification._information import STIFFNESS_SCALE_UNIT, Unknowns, information, readings
-from isojax.identification._problem import one_hot
-from isojax.identification._segments import Segment
+from isojax.identification.fitting._problem import one_hot
+from isojax.identification.jacobian._batch import Prepared, prepare
+from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT, Unknowns, information, readings
+from isojax.identification.jacobian._score_columns import score_information
+from isojax.identification.jacobian._segments import Segment
 from isojax.models import Integrator, Isolator, simulate
 from isojax.records import Record
 from isojax.rig._balance import Balance
@@ -335,7 +335,7 @@ def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
     exact = information(moved, prepared)
     first = len(places) + (model.element("linear_stiffness") is not None)
     keep = np.r_[0 : first + own, first + states]
-    found = column_information(moved, len(model.elements), prepared)
+    found = score_information(moved, len(model.elements), prepared)
     for lane in range(2):
         reference = exact[lane][np.ix_(keep, keep)]
         assert _deviation(found[lane], reference) < 3e-4

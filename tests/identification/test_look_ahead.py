@@ -8,11 +8,11 @@ import pytest
 from isojax import rig
 from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
 from isojax.identification import close_loop, diagnose, fit, scales, silent
-from isojax.identification._diagnose import GOOD
-from isojax.identification._fit import DEFAULT_SOLVER
-from isojax.identification._look_ahead import find_superfluous, outdone_by_two
-from isojax.identification._refit import Refit, refit_candidate
-from isojax.identification._score import absent_effects, score_test
+from isojax.identification.diagnosis._diagnose import GOOD
+from isojax.identification.diagnosis._imitations import find_simpler_pair, find_superfluous
+from isojax.identification.diagnosis._refit import Refit, refit_candidate
+from isojax.identification.diagnosis._score import absent_effects, score_test
+from isojax.identification.fitting._fit import DEFAULT_SOLVER
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
@@ -78,7 +78,7 @@ def _outdone(campaign, law, rival):
         )
         for name in (law, rival)
     ]
-    return outdone_by_two(found.estimate, usable, campaign, magnitudes, DEFAULT_SOLVER, silent)
+    return find_simpler_pair(found.estimate, usable, campaign, magnitudes, DEFAULT_SOLVER, silent)
 
 
 @pytest.mark.slow

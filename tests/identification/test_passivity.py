@@ -18,9 +18,9 @@ from isojax.elements import (
     Scales,
     SecondMode,
 )
-from isojax.identification._admissible import find_violation, visited_range
-from isojax.identification._linear_balance import with_strength
-from isojax.identification._passivity import find_activity, work_per_cycle
+from isojax.identification.diagnosis._admissibility import find_violation, visited_range
+from isojax.identification.diagnosis._passivity import find_activity, work_per_cycle
+from isojax.identification.guess._force_balance import with_strength
 
 AMPLITUDE = np.array([2e-4, 1e-3])
 ANGULAR = np.array([20.0, 35.0])

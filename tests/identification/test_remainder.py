@@ -8,10 +8,10 @@ from strange_laws import BASE, Grip, Machine
 
 from isojax import RESULTS, rig
 from isojax.identification import classical_guess, explain_remainder, fit, scales
-from isojax.identification._ceiling import find_ceilings
-from isojax.identification._dwell_remainder import split_dwells
-from isojax.identification._exponents import find_exponents
-from isojax.identification._latent_force import latent_forces
+from isojax.identification.remainder._ceiling import find_ceilings
+from isojax.identification.remainder._dwell_remainder import split_dwells
+from isojax.identification.remainder._exponents import find_exponents
+from isojax.identification.remainder._force_residual import force_residuals
 
 FREQUENCIES = tuple(np.arange(4.0, 6.6, 0.25))
 DWELLS = rig.SteppedSine((40.0, 80.0, 130.0), FREQUENCIES, directions=("forward",), holdout_levels=(100.0,))
@@ -32,7 +32,7 @@ def fitted(simulated):
 def gripped(fitted):
     """What is left by damping |x| v: fit, latent forces, dwells."""
     found = fitted(Grip(5e6))
-    latent = latent_forces(found)
+    latent = force_residuals(found)
     return found, latent, split_dwells(found, latent)
 
 
@@ -78,7 +78,7 @@ def test_a_static_law_leaves_what_a_static_surface_explains(gripped):
 )
 def test_delay_and_memory_leave_what_only_a_memory_explains(fitted, hidden):
     found = fitted(hidden)
-    static, black_box = find_ceilings(latent_forces(found), scales(found.campaign))
+    static, black_box = find_ceilings(force_residuals(found), scales(found.campaign))
     assert static.share < 0.55
     assert black_box.share > static.share + 0.3
     assert black_box.share > 0.7

@@ -18,15 +18,15 @@ from isojax.elements import (
     LinearStiffness,
 )
 from isojax.identification import fit, scales
-from isojax.identification._dwell_remainder import share_parts, split_dwells
-from isojax.identification._elimination import Nuisances, Reduced, Spread
-from isojax.identification._information import STIFFNESS_SCALE_UNIT
-from isojax.identification._latent_force import latent_forces
-from isojax.identification._problem import Point
-from isojax.identification._refit import polish
-from isojax.identification._score import absent_effects, score_test
-from isojax.identification._segment_scatter import segment_scatter
-from isojax.identification._segments import Segment
+from isojax.identification.diagnosis._refit import polish
+from isojax.identification.diagnosis._score import absent_effects, score_test
+from isojax.identification.fitting._elimination import Nuisances, Reduced, Spread
+from isojax.identification.fitting._problem import Point
+from isojax.identification.fitting._segment_scatter import segment_scatter
+from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT
+from isojax.identification.jacobian._segments import Segment
+from isojax.identification.remainder._dwell_remainder import share_parts, split_dwells
+from isojax.identification.remainder._force_residual import force_residuals
 from isojax.models import Isolator
 from isojax.records import Dwell, Record
 
@@ -62,9 +62,9 @@ def test_scatter_from_dwell_to_dwell_is_told_by_repeats_and_taken_for_no_effect(
     assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.02)
     assert surest(found) > 0.05
     # Nor is it described as a force that follows the displacement.
-    assert share_parts(split_dwells(found, latent_forces(found)))["with x"] < 0.05
+    assert share_parts(split_dwells(found, force_residuals(found)))["with x"] < 0.05
     # With one stiffness for all dwells of a record the same campaign lacks something beyond any doubt.
-    monkeypatch.setattr("isojax.identification._estimate.segment_scatter", lambda *arguments: 0.0)
+    monkeypatch.setattr("isojax.identification.fitting._estimate.segment_scatter", lambda *arguments: 0.0)
     assert surest(fit(START, campaign)) < 1e-20
 
 

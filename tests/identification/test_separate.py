@@ -3,7 +3,7 @@
 import pytest
 
 from isojax.elements import CATALOGUE
-from isojax.identification._separate import CLASSES, separating_experiment
+from isojax.identification.diagnosis._separating_words import CLASSES, separating_experiment
 
 
 def test_every_class_names_effects_of_the_catalogue():

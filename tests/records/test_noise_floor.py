@@ -18,9 +18,9 @@ from isojax.records import (
     data_health,
     estimate_noise,
 )
-from isojax.records._filter import compensate_butterworth
-from isojax.records._noise_band import NoiseBand
 from isojax.records._record import Kind
+from isojax.records.spectrum._filter import compensate_butterworth
+from isojax.records.spectrum._noise_band import NoiseBand
 
 RATE, SIGMA, SEEDS = 500.0, 0.013, 24
 LOW = Filter("butterworth", 4, 60.0, applied=True)

@@ -23,7 +23,7 @@ from isojax.records import (
     receptance,
     zero_phase_butterworth,
 )
-from isojax.records._filter import compensate_butterworth, unsure_samples
+from isojax.records.spectrum._filter import compensate_butterworth, unsure_samples
 
 RATE = 1000.0
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isojax.records._columns import read_columns
+from isojax.records.reading._data_file import read_columns
 
 pytest.importorskip("pyuff")
 READ = {

@@ -13,7 +13,7 @@ from isojax import (
     LinearStiffness,
     MaxwellBranch,
 )
-from isojax.reporting._cycles import equivalent_curves, trace_cycles
+from isojax.reporting.plots._force_cycles import equivalent_curves, trace_cycles
 
 AMPLITUDES = np.array([1e-4, 5e-4, 1e-3])
 FREQUENCY = 5.0

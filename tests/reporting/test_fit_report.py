@@ -7,7 +7,7 @@ import numpy as np
 from isojax import RESULTS
 from isojax.identification import uncertainty
 from isojax.records import data_health
-from isojax.reporting._sentences import health_words
+from isojax.reporting.words._sentences import health_words
 
 
 def with_uncertainty(fit, matrix):

@@ -11,7 +11,7 @@ from isojax.health import DwellStability
 from isojax.identification import DriftBudget, Share
 from isojax.records import Dwell, HumLine, MainsCollision
 from isojax.reporting import plot_dwell_stability
-from isojax.reporting._health_words import budget_words, dwell_words, mains_words
+from isojax.reporting.words._health_words import budget_words, dwell_words, mains_words
 
 
 def dwell(frequency, radius, force=math.inf, shift=math.inf, reason="", level=100.0):

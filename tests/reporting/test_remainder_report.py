@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from isojax import (
     plot_ceilings,
-    plot_latent_loops,
-    plot_latent_map,
+    plot_force_residual_loops,
+    plot_force_residual_map,
     plot_remainder_map,
     plot_remainder_parts,
 )
@@ -87,9 +87,9 @@ def test_every_picture_draws_on_the_axes_it_is_given_and_labels_them(unexplained
     drawn = (
         plot_ceilings(remainder, ax=axes[0]),
         plot_remainder_parts(remainder.parts, ax=axes[1]),
-        plot_latent_map(remainder.force_map, ax=axes[2]),
+        plot_force_residual_map(remainder.force_map, ax=axes[2]),
         plot_remainder_map(remainder.dwells, ax=axes[3]),
-        plot_latent_loops(remainder.dwells, ax=axes[4]),
+        plot_force_residual_loops(remainder.dwells, ax=axes[4]),
     )
     assert all(figure is axes[0].figure for figure in drawn)
     for ax in axes:
@@ -98,6 +98,6 @@ def test_every_picture_draws_on_the_axes_it_is_given_and_labels_them(unexplained
 
 
 def test_pictures_without_dwells_are_refused():
-    for plot in (plot_latent_loops, plot_remainder_map):
+    for plot in (plot_force_residual_loops, plot_remainder_map):
         with pytest.raises(ValueError, match="must hold at least one dwell"):
             plot(())

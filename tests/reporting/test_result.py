@@ -94,7 +94,7 @@ def test_failed_fit_is_written_with_nulls_and_said_in_the_report(plain, tmp_path
     )
     runs, restarts = plain.after.free_runs, plain.after.restarts
     held = SimpleNamespace(errors={"fit": unknown, "holdout": None}, free_runs=runs, restarts=restarts)
-    failed = plain.after._replace(result=RESULTS.not_converged, against=held)
+    failed = plain.after._replace(result=RESULTS.not_converged, evaluation=held)
     loop = plain._replace(before=failed, after=failed, verdict="unexplained")
     ClosedLoop(loop).report(tmp_path / "deep" / "out")
     result = json.loads((tmp_path / "deep" / "out" / "result.json").read_text(encoding="utf-8"))

@@ -7,8 +7,8 @@ from isojax.elements import StribeckFriction
 from isojax.identification import DriftBudget, Errors, Fit
 from isojax.records import NoisePeak, data_health
 from isojax.reporting import render_text, verdict_summary
-from isojax.reporting._health_words import budget_words
-from isojax.reporting._sentences import caveats, doubt_words, finding_words, headline, health_words
+from isojax.reporting.words._health_words import budget_words
+from isojax.reporting.words._sentences import caveats, doubt_words, finding_words, headline, health_words
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,9 @@ def test_of_what_is_below_the_noise_no_share_is_told(found):
 
 def test_a_doubt_stands_in_the_headline(found, monkeypatch):
     plain = headline(found)
-    monkeypatch.setattr("isojax.reporting._sentences.doubt_words", lambda loop: "But they do not agree.")
+    monkeypatch.setattr(
+        "isojax.reporting.words._sentences.doubt_words", lambda loop: "But they do not agree."
+    )
     assert headline(found) == f"{plain} But they do not agree."
 
 

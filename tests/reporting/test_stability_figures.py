@@ -140,7 +140,7 @@ def test_branch_is_dashed_between_the_known_folds_and_marks_them(branch):
 
 
 def test_every_kind_of_bifurcation_has_a_mark_of_its_own():
-    from isojax.reporting._stability_style import MARKS
+    from isojax.reporting.plots._stability_style import MARKS
 
     assert {"fold", "period_doubling", "neimark_sacker", "symmetry_breaking"} < set(MARKS)
     assert len({mark.marker for mark in MARKS.values()}) == len(MARKS)

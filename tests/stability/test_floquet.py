@@ -13,7 +13,7 @@ import scipy.special
 import isojax as ij
 from isojax import Harmonic, find_periodic_orbit
 from isojax._parameters import parameter
-from isojax.stability._floquet import modulus, multipliers
+from isojax.stability.orbit._floquet import modulus, multipliers
 
 
 @jax.jit  # which compiles once for all numbers; equinox would for each

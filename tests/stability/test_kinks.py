@@ -10,9 +10,9 @@ import pytest
 from scipy_orbits import Y_DIRECTION, flow, polynomial
 
 from isojax import Harmonic, Integrator, find_periodic_orbit, paper
-from isojax.stability._drive import recorded_sine
-from isojax.stability._period_map import period_map, trajectory
-from isojax.stability._pieces import advance_in_pieces, find_crossings
+from isojax.stability.orbit._drive import recorded_sine
+from isojax.stability.orbit._period_map import period_map, trajectory
+from isojax.stability.orbit._pieces import advance_in_pieces, find_crossings
 
 
 def crossings_of(model, drive, state, steps=512):

@@ -7,14 +7,23 @@ from typing import Any
 from .._results import RESULTS, is_successful
 from ..elements import CATALOGUE
 from ..records import Campaign
-from ._classical_guess import classical_guess
-from ._diagnose import MOST_OF_IT, diagnose, is_clean, is_good
-from ._find_separation import with_separating_experiment
-from ._findings import Extension, Loop, Verdict, VerdictWord, findings_in
-from ._fit import DEFAULT_SOLVER, Fit, complete, fit, silent
-from ._look_ahead import find_superfluous
-from ._refit import bic
-from ._scales import scales as campaign_scales
+from .diagnosis import (
+    MOST_OF_IT,
+    Extension,
+    Loop,
+    Verdict,
+    VerdictWord,
+    bic,
+    diagnose,
+    find_superfluous,
+    findings_in,
+    is_clean,
+    is_good,
+)
+from .experiment import with_separating_experiment
+from .fitting import DEFAULT_SOLVER, Fit, complete, fit, silent
+from .guess import classical_guess
+from .guess import scales as campaign_scales
 
 MOST_AT_ONCE = 2
 """Effects that explain all a campaign lacks. More are rather the parts by which they imitate one law that the

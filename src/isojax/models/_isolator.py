@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
 from .._types import Lanes, Scalar
 from ..elements import AbstractElement, Channels
-from ._shares import Regime, State, gather, share_internal, share_sides, sum_forces
+from ._element_states import Regime, State, gather, share_internal, share_sides, sum_forces
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
 

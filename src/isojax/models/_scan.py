@@ -10,8 +10,8 @@ from jaxtyping import Array, Float
 
 from .._types import Lanes
 from ..elements import Channels
+from ._event_step import Ringing, Table, find_regime, find_ringing, split_step
 from ._isolator import NO_CHANNELS, Isolator, Quantity, State
-from ._split import Ringing, Table, find_regime, find_ringing, split_step
 
 
 def sampled_term(model: Isolator, quantity: Quantity, sample_time: Lanes | float) -> diffrax.ODETerm:

@@ -10,8 +10,7 @@ from ..health import CampaignHealth, campaign_health
 from ..identification import DEFAULT_SOLVER, ClassicalGuess, Finding, Fit, Loop, silent
 from ..identification import close_loop as find_loop
 from ..records import Campaign
-from ._summary import loop_summary, render_text
-from ._write import write_report
+from .page import loop_summary, render_text, write_report
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -1,0 +1,70 @@
+"""Whether a model is physical over the motion that was measured."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ...models import Isolator, Quantity
+from ...records import Record
+from ..jacobian import coordinate_motion
+from ._passivity import find_activity
+
+
+def visited_range(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> tuple[float, float]:
+    """Give the largest displacement [m] and velocity [m/s] that dwells and windows reached.
+
+    Args:
+        model: the isolator, for what its coordinate is.
+        records: the records.
+        quantity: what the sensor measures.
+
+    Returns:
+        Both, as 99.5 % quantiles: integrals of a measured acceleration are rough at the ends of a record.
+    """
+    based = model.excitation == "base_acceleration"
+    states = [coordinate_motion(record, quantity, based) for record in records]
+    return (
+        float(max(np.quantile(np.abs(x), 0.995) for x, _ in states)),
+        float(max(np.quantile(np.abs(v), 0.995) for _, v in states)),
+    )
+
+
+def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
+    """Find what is unphysical in a model over the visited motion, if anything.
+
+    The static tangent stiffness must be positive wherever the model has a spring, and the static damping
+    force must not drive the motion, wherever that passes. A force with memory must take energy over the loops
+    that it was driven around; a static law cannot say so.
+
+    Args:
+        model: the isolator.
+        records: the records.
+        quantity: what the sensor measures.
+
+    Returns:
+        A sentence, or None.
+    """
+    largest_x, largest_v = visited_range(model, records, quantity)
+    rest = tuple(jnp.zeros(()) for _ in range(model.internal_states))
+
+    def static(x: Float[jax.Array, ""], v: Float[jax.Array, ""]) -> Float[jax.Array, ""]:
+        return model.restoring_force((x, v, *rest))
+
+    xs = jnp.linspace(-largest_x, largest_x, 101)
+    vs = jnp.linspace(-largest_v, largest_v, 101)
+    tangent = jax.vmap(jax.jacfwd(static), (0, None))(xs, jnp.zeros(()))
+    if model.element("linear_stiffness") is not None and float(tangent.min()) <= 0.0:
+        where = 1e3 * float(xs[int(jnp.argmin(tangent))])
+        return f"its stiffness is lost at {where:.3g} mm, within the visited motion"
+    # Over the ellipse that a sine of that size runs along, and its inside: all states that were visited.
+    turns, sizes = jnp.linspace(0.0, 2.0 * jnp.pi, 80, endpoint=False), jnp.linspace(0.0, 1.0, 26)[1:]
+    angle, size = (each.ravel() for each in jnp.meshgrid(turns, sizes))
+    places = jnp.concatenate([jnp.zeros(101), largest_x * size * jnp.cos(angle)])
+    speeds = jnp.concatenate([vs, largest_v * size * jnp.sin(angle)])
+    power = jax.vmap(lambda x, v: (static(x, v) - static(x, jnp.zeros(()))) * v)(places, speeds)
+    if float(power.min()) < -1e-9 * float(jnp.abs(power).max()):
+        where = 1e3 * float(speeds[int(jnp.argmin(power))])
+        return f"its damping feeds energy in at {where:.3g} mm/s, within the visited motion"
+    activities = (find_activity(element, largest_x, largest_v) for element in model.elements)
+    return next((sentence for sentence in activities if sentence is not None), None)

@@ -1,0 +1,50 @@
+"""How large an effect that was not found could still be."""
+
+import numpy as np
+
+from ..._parameters import own_parameters
+from ...elements import AbstractElement
+from ..fitting import Estimate
+from ._score import ScoreTest
+
+GOOD = 1.05
+"""chi2/dof up to which a fit is good."""
+
+
+def strength_unit(element: AbstractElement) -> str:
+    """Give the unit of an element's strength.
+
+    Args:
+        element: the element.
+
+    Returns:
+        The unit.
+    """
+    return dict(own_parameters(element))[element.strength].unit
+
+
+def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
+    """Say how large each effect that was not found could still be.
+
+    A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
+    linear step from there says nothing of any strength: nothing is said there.
+
+    Args:
+        test: the score test.
+        fitted: the fit.
+        found: catalogue name of the effect that was found, or None.
+
+    Returns:
+        `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name; empty unless the fit is good.
+    """
+    if fitted.chi2 / fitted.dof > GOOD:
+        return {}
+    inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
+    return {
+        score.element.name: (
+            abs(score.strength) + 1.96 * inflation * score.error,
+            strength_unit(score.element),
+        )
+        for score in test.scores
+        if score.element.name != found
+    }

@@ -1,0 +1,118 @@
+"""What ranks the refits of candidates: evidence, and simplicity where it does not decide."""
+
+from ..._parameters import list_parameters
+from ..fitting import Estimate
+from ._bounds import strength_unit
+from ._findings import Candidate
+from ._refit import SMALLEST_GAIN, Refit, bic, strength_place
+from ._score import Score, ScoreTest
+
+CLOSE_BIC = 10.0
+"""Difference of Schwarz's criterion up to which two effects are not told apart, however few the samples."""
+
+
+def by_evidence(refits: list[Refit]) -> list[Refit]:
+    """List the refits that nothing speaks against, best first.
+
+    Of those that these data do not tell apart the simplest goes first: fewest coefficients, then memories.
+
+    Args:
+        refits: all of them.
+
+    Returns:
+        Those without a violation.
+    """
+    usable = [refit for refit in refits if refit.violation is None]
+    if not usable:
+        return usable
+    inflation = smallest_inflation(usable)
+    usable = sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
+    most = bic(usable[0].estimate, inflation) + least_difference(usable[0].estimate)
+
+    def simplicity(refit: Refit) -> tuple[int, int]:
+        return len(refit.estimate.places), refit.estimate.model.internal_states
+
+    first = min((one for one in usable if bic(one.estimate, inflation) <= most), key=simplicity)
+    return [first, *(one for one in usable if one is not first)]
+
+
+def least_difference(found: Estimate) -> float:
+    """Give the difference of Schwarz's criterion up to which two effects are not told apart.
+
+    Args:
+        found: the better one.
+
+    Returns:
+        The difference.
+    """
+    return max(CLOSE_BIC, SMALLEST_GAIN * found.dof)
+
+
+def smallest_inflation(usable: list[Refit]) -> float:
+    """Give what model errors add to the noise at least.
+
+    Args:
+        usable: refits that nothing speaks against.
+
+    Returns:
+        The smallest chi2/dof among them, at least 1.
+    """
+    return max(1.0, min((refit.estimate.chi2 / refit.estimate.dof for refit in usable), default=1.0))
+
+
+def rank_candidates(
+    test: ScoreTest, refits: list[Refit], usable: list[Refit], inflation: float
+) -> tuple[Candidate, ...]:
+    """List every candidate: refitted ones by evidence, then the others by score.
+
+    Args:
+        test: the score test.
+        refits: the refits.
+        usable: those that nothing speaks against, best first.
+        inflation: see `smallest_inflation`.
+
+    Returns:
+        The candidates.
+    """
+    best = usable[0] if usable else None
+    order = {score.element.name: index for index, score in enumerate(test.scores)}
+    done = {refit.score.element.name: refit for refit in refits}
+    lowest = bic(best.estimate, inflation) if best is not None else float("nan")
+
+    def candidate(score: Score) -> Candidate:
+        refit = done.get(score.element.name)
+        score = score if refit is None else refit.score
+        strength, error = score.strength, score.error
+        chi2, delta, admissible = float("nan"), float("nan"), score.admissible
+        if refit is not None and len(refit.estimate.places) > len(test.fitted.places):
+            found = refit.estimate
+            place = strength_place(found, score)
+            strength = float(list_parameters(found.model)[found.places[place]].value)
+            error = float(found.uncertainty.standard_error[place])
+            chi2 = found.chi2 / found.dof
+            delta = bic(found, inflation) - lowest
+            admissible = admissible and refit.violation is None
+        likeness = (
+            0.0
+            if best is None
+            else float(test.likeness[order[score.element.name], order[best.score.element.name]])
+        )
+        return Candidate(
+            score.element.name,
+            score.element.words,
+            score.z,
+            score.p_value,
+            score.visibility,
+            strength,
+            error,
+            strength_unit(score.element),
+            chi2,
+            delta,
+            likeness,
+            admissible,
+        )
+
+    names = [refit.score.element.name for refit in usable]
+    first = [test.scores[order[name]] for name in names]
+    rest = [score for score in test.scores if score.element.name not in names]
+    return tuple(candidate(score) for score in (*first, *rest))

@@ -1,0 +1,346 @@
+"""Candidates refitted: the model with one absent effect, everything free."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+from ..._parameters import list_parameters, own_parameters, replace_parameters
+from ..._results import RESULTS
+from ...elements import AbstractElement, Scales
+from ...models import Isolator
+from ..fitting import (
+    Estimate,
+    Nuisances,
+    Rival,
+    best_nuisances,
+    estimate,
+    fit_by_multiple_shooting,
+    one_hot,
+    run_freely,
+)
+from ..jacobian import has_stiffness_scale
+from ._score import Score, ScoreTest
+
+SMALLEST_GAIN = 0.0005
+"""Gain in chi2/dof below which no effect is named, and no effect told from another: with half a million
+samples anything is significant, and no bench is as good as that."""
+
+ROUGH = 1.0
+"""Decrease of chi2 below which the refit of a candidate is over: a tenth of the evidence that ranks it."""
+
+
+class Refit(NamedTuple):
+    """A candidate refitted with everything free.
+
+    Attributes:
+        score: its score before.
+        estimate: the refit.
+        violation: what is unphysical about it, or None.
+    """
+
+    score: Score
+    estimate: Estimate
+    violation: str | None
+
+
+def refit_candidate(
+    test: ScoreTest,
+    index: int,
+    scales: Scales,
+    solver: Any,
+    max_steps: int,
+    progress: Callable[[str], None],
+    rival: Rival | None = None,
+) -> Estimate:
+    """Fit the model with one absent effect, everything free, from the linear step that the score gives.
+
+    Args:
+        test: the score test.
+        index: the candidate.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations at most.
+        progress: told a line a step.
+        rival: the best other candidate, far behind which the search is given up.
+
+    Returns:
+        The refit.
+    """
+    fitted, score = test.fitted, test.scores[index]
+    element = score.element
+    best: tuple[float, Isolator, Nuisances] | None = None
+    places = _free_places(fitted, element)
+    for share in (1.0, 0.3, 0.03):
+        model = _extended(fitted, element, share * score.strength, share * test.steps[index])
+        old, new = fitted.point.nuisances, test.nuisances[index]
+        states = old.states + share * (new.states - old.states)
+        states = _states_of(model, fitted.model, states)
+        stiffness = old.stiffness + share * (new.stiffness - old.stiffness)
+        segments = old.segments + share * (new.segments - old.segments)
+        nuisances = Nuisances(states, stiffness, segments, old.spread)
+        # The columns are not needed yet, but with them the search shares the compiled code.
+        directions = one_hot(model, places, [1.0] * len(places))
+        point = fitted.simulator.evaluate(model, directions, nuisances)
+        if point.is_finite and (best is None or point.chi2 < best[0]):
+            best = (point.chi2, model, nuisances)
+        if best is not None and best[0] < fitted.chi2:
+            break
+    if best is None:
+        return fitted._replace(result=RESULTS.not_finite)
+    _, model, nuisances = best
+    found = estimate(
+        fitted.simulator,
+        model,
+        places,
+        scales,
+        nuisances=nuisances,
+        solver=solver,
+        max_steps=max_steps,
+        progress=progress,
+        tolerance=_rough(fitted),
+        rival=rival,
+    )
+    if found.result in (RESULTS.successful, RESULTS.outdone) or not found.excess < fitted.excess:
+        return found
+    # Beside a fold the initial states that followed the steps may lie on the other branch: the measured ones
+    # again.
+    progress("the search stalled: again, from the measured states")
+    again = refit_from(found, found.model, scales, solver, max_steps // 2, progress)
+    return again if again.chi2 <= found.chi2 else found
+
+
+def refit_from(
+    fitted: Estimate,
+    model: Isolator,
+    scales: Scales,
+    solver: Any,
+    max_steps: int,
+    progress: Callable[[str], None],
+    far: bool = False,
+) -> Estimate:
+    """Fit a model that shares coefficients with a fitted one, everything free, from its own numbers.
+
+    Args:
+        fitted: the estimate whose records and free coefficients count.
+        model: the start; elements that the estimate lacks have all their fitted kinds free.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations at most.
+        progress: told a line a step.
+        far: whether the start may be far off: windows of records that are left whole are then fitted first.
+
+    Returns:
+        The refit.
+    """
+    known = {entry.name for entry in list_parameters(fitted.model)}
+    places = tuple(
+        place
+        for place, entry in enumerate(list_parameters(model))
+        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
+    )
+    if far and fitted.simulator.problem.heads:
+        model = fit_by_multiple_shooting(fitted, model, places, scales, solver, _rough(fitted), progress)
+    # The scatter of a stiffness that the fitted model lacks is still to be found.
+    nuisances = None
+    if has_stiffness_scale(fitted.model) == has_stiffness_scale(model):
+        old = fitted.point.nuisances
+        fresh = old.afresh()
+        # Eliminated by one linear step from far, initial states promise a chi2 that no later step reaches.
+        settled = best_nuisances(fitted.simulator, model, old.spread, fresh, places)
+        nuisances = settled.nuisances if settled.is_finite else fresh
+    return estimate(
+        fitted.simulator,
+        model,
+        places,
+        scales,
+        nuisances=nuisances,
+        solver=solver,
+        max_steps=max_steps,
+        progress=progress,
+        tolerance=_rough(fitted),
+    )
+
+
+def _rough(fitted: Estimate) -> float:
+    """Give the decrease of chi2 below which a refit is over: among many samples more tells nothing apart."""
+    return max(ROUGH, 0.1 * SMALLEST_GAIN * fitted.dof)
+
+
+def bic(found: Estimate, inflation: float) -> float:
+    """Give Schwarz's criterion of an estimate.
+
+    Args:
+        found: the estimate.
+        inflation: chi2/dof of the best model known, at least 1: what model errors add to the noise.
+
+    Returns:
+        chi2 / inflation + degrees of freedom of the nuisances + coefficients ln(samples). A phase found in
+        each record counts as a coefficient.
+    """
+    phases = sum(element.phased for element in found.model.elements) * len(found.simulator.problem.records)
+    samples = float(np.log(found.point.samples.sum()))
+    taken = found.misfit - found.chi2
+    return found.chi2 / inflation + taken + (len(found.places) + phases) * samples
+
+
+def _free_places(fitted: Estimate, element: AbstractElement) -> tuple[int, ...]:
+    """Give the free coefficients of the model extended by an effect."""
+    listed = list_parameters(fitted.model.with_elements(element))
+    first_new = len(listed) - len(own_parameters(element))
+    return tuple(
+        place
+        for place, entry in enumerate(listed)
+        if entry.name in fitted.names or (place >= first_new and entry.spec.fitted)
+    )
+
+
+def _extended(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
+    """Give the model with the effect at a strength, the fitted coefficients moved by a step."""
+    own = [name for name, _ in own_parameters(element)]
+    for old in fitted.model.elements:
+        if old.name in element.absorbs:
+            # What both have goes on; strengths of one unit are those of one law.
+            shared = {name for name, _ in own_parameters(old)} & set(own)
+            for name in shared - {element.strength}:
+                element = eqx.tree_at(lambda e, n=name: getattr(e, n), element, getattr(old, name))
+            if (
+                dict(own_parameters(old))[old.strength].unit
+                == dict(own_parameters(element))[element.strength].unit
+            ):
+                strength = max(strength, 0.0) + float(getattr(old, old.strength))
+    model = fitted.model.with_elements(element)
+    listed = list_parameters(model)
+    numbers = [entry.value for entry in listed]
+    for place, change in zip(fitted.places, step, strict=True):
+        moved = float(numbers[place]) + float(change)
+        spec = listed[place].spec
+        if spec.lower < moved < spec.upper:
+            numbers[place] = numbers[place] * 0.0 + moved
+    fields = [name for name, _ in own_parameters(element)]
+    place = len(listed) - len(fields) + fields.index(element.strength)
+    numbers[place] = numbers[place] * 0.0 + strength
+    return replace_parameters(model, numbers)
+
+
+def _states_of(
+    model: Isolator, before: Isolator, states: Float[np.ndarray, "lanes state"]
+) -> Float[np.ndarray, "lanes extended"]:
+    """Give the deviations of the initial states of an extended model: of what stayed; none of the rest."""
+    known, place = {}, 2
+    for element in before.elements:
+        known[id(element)] = states[:, place : place + element.internal_states]
+        place += element.internal_states
+    nothing = {id(e): np.zeros((states.shape[0], e.internal_states)) for e in model.elements}
+    return np.concatenate([states[:, :2], *({**nothing, **known}[id(e)] for e in model.elements)], axis=1)
+
+
+def polish(found: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]) -> Estimate:
+    """Take a rough refit to the end of its search; what scatter repeats show beside its law is told anew.
+
+    Args:
+        found: the refit.
+        scales: magnitudes of the records.
+        solver: an optimistix least-squares solver.
+        progress: told a line a step.
+
+    Returns:
+        The estimate, no worse than the refit.
+    """
+    progress("the finding, fitted to the end")
+    again = estimate(
+        found.simulator,
+        found.model,
+        found.places,
+        scales,
+        nuisances=found.point.nuisances,
+        solver=solver,
+        max_steps=25,
+        progress=progress,
+        anew=True,
+    )
+    # With another scatter another sum is made least.
+    comparable = again.point.nuisances.spread == found.point.nuisances.spread
+    better = again.chi2 <= found.chi2 or not comparable
+    return again if again.result == RESULTS.successful and better else found
+
+
+def is_determined(found: Estimate, score: Score) -> bool:
+    """Say whether a refitted strength is at least two standard errors from zero.
+
+    Args:
+        found: the refit.
+        score: the score of its effect.
+
+    Returns:
+        True if it is.
+    """
+    place = strength_place(found, score)
+    error = float(found.uncertainty.standard_error[place])
+    strength = float(list_parameters(found.model)[found.places[place]].value)
+    return abs(strength) > 2.0 * error
+
+
+def strength_place(found: Estimate, score: Score) -> int:
+    """Give the place of a candidate's strength among the free coefficients of its refit.
+
+    Args:
+        found: the refit.
+        score: the score of its effect.
+
+    Returns:
+        Its column.
+    """
+    listed = [entry.name for entry in list_parameters(found.model)]
+    fields = [name for name, _ in own_parameters(score.element)]
+    return found.places.index(len(listed) - len(fields) + fields.index(score.element.strength))
+
+
+def follows_freely(fitted: Estimate, found: Estimate) -> bool:
+    """Say whether a refit still follows whole records when nothing is fed back.
+
+    Asked only where records are left whole: a memory that never fades can there fit a record from a hidden
+    state of its own choice, and lose it from rest.
+
+    Args:
+        fitted: the estimate without the effect.
+        found: the refit with it.
+
+    Returns:
+        True if the free-run error is no larger, or records are cut into segments anyway.
+    """
+    if not found.simulator.problem.heads:
+        return True
+    squares = [
+        sum(float(np.sum(run.residual**2)) for run in run_freely(entry.simulator.problem, entry.model))
+        for entry in (fitted, found)
+    ]
+    return bool(squares[1] <= squares[0])
+
+
+def rivals(
+    scores: tuple[Score, ...],
+    refits: list[Refit],
+    twins: tuple[AbstractElement, ...],
+    names: tuple[str, ...],
+) -> tuple[AbstractElement, ...]:
+    """Give effects as they imitate another: refitted where they were, else with the shape of their score.
+
+    Args:
+        scores: the scores of all absent effects.
+        refits: those that were refitted.
+        twins: effects that are the other by another name.
+        names: catalogue names of the effects.
+
+    Returns:
+        One element a name.
+    """
+    shapes = {score.element.name: score.element for score in scores}
+    for refit in refits:
+        element = refit.estimate.model.element(refit.score.element.name)
+        if element is not None:
+            shapes[element.name] = element
+    shapes.update({twin.name: twin for twin in twins})
+    return tuple(shapes[name] for name in names)

@@ -1,0 +1,173 @@
+"""A planned experiment carried out on a model: the records that it would give."""
+
+import dataclasses
+from pathlib import Path
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ...excitations import Hold
+from ...models import RK4, Isolator, Quantity, State, add_ringing, read_record, scan_records
+from ...records import Dwell, Record
+from ..jacobian import carries, channel_table, drive_table
+from ._candidate_experiments import DWELLS, Experiment
+
+
+class TrialRun(NamedTuple):
+    """An experiment on a model.
+
+    Attributes:
+        records: what the bench would file, free of noise.
+        starts: state at the beginning of each stretch, records in turn.
+        displacement: of each record [m].
+    """
+
+    records: tuple[Record, ...]
+    starts: Float[np.ndarray, "state stretch"]
+    displacement: Float[np.ndarray, "record time"]
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether the motion stayed finite."""
+        return bool(np.all(np.isfinite(self.starts)) and np.all(np.isfinite(self.displacement)))
+
+
+@eqx.filter_jit
+def _run(
+    model: Isolator,
+    drive: Float[Array, "time stage lanes"],
+    drive_rate: Float[Array, "time stage lanes"],
+    channels: dict[str, Float[Array, "time stage lanes"]],
+    start: State,
+    quantity: Quantity,
+    sample_time: float,
+) -> tuple[State, Array]:
+    """Give states and readings at the samples."""
+    _, path, ringing = scan_records(
+        model, RK4(), quantity, sample_time, start, drive, drive_rate, lambda state, u, du: state, channels
+    )
+    beside = {name: table[:, 0] for name, table in channels.items()}
+    reading = read_record(model, path, drive[:, 0], drive_rate[:, 0], quantity, beside)
+    return path, add_ringing(reading, ringing)
+
+
+def blank_records(experiment: Experiment) -> tuple[Record, ...]:
+    """Give the records of an experiment before it was made: no output yet.
+
+    Args:
+        experiment: the test.
+
+    Returns:
+        One record a row of its drive.
+    """
+    rows, total = experiment.drive.shape
+    length = total // DWELLS
+    records = []
+    for row, drive in enumerate(experiment.drive):
+        dwells = ()
+        if experiment.stepped:
+            lines = np.abs(np.fft.rfft(drive.reshape(DWELLS, length), axis=1))
+            dwells = tuple(
+                Dwell(place * length, (place + 1) * length, cycles * experiment.rate / length, float(cycles))
+                for place, cycles in enumerate(np.argmax(lines, axis=1).tolist())
+            )
+        nothing = np.zeros(total)
+        records.append(
+            Record(
+                f"{experiment.name}_{row}",
+                Path(f"{experiment.name}_{row}"),
+                np.arange(total) / experiment.rate,
+                experiment.rate,
+                drive,
+                nothing,
+                drive,
+                nothing,
+                level=float(np.std(drive)),
+                period=None if experiment.stepped else total,
+                dwells=dwells,
+                kind="stepped_sine" if experiment.stepped else "periodic",
+                clock=(row / rows, (row + 1) / rows),
+            )
+        )
+    return tuple(records)
+
+
+def missing_channels(model: Isolator, records: tuple[Record, ...]) -> tuple[str, ...]:
+    """Name the signals that a model follows and that a planned record does not have.
+
+    Args:
+        model: the isolator.
+        records: the records.
+
+    Returns:
+        Their names.
+    """
+    return tuple(name for name in model.channels if not all(carries(record, name) for record in records))
+
+
+def trial_run(
+    model: Isolator,
+    experiment: Experiment,
+    blank: tuple[Record, ...],
+    *,
+    quantity: Quantity,
+    hold: Hold,
+    substeps: int,
+    rest: float,
+) -> TrialRun:
+    """Carry out an experiment on a model.
+
+    Each stretch sets out from rest a stretch earlier, so that it begins as the end of the one before it; the
+    first of a record follows its last.
+
+    Args:
+        model: the isolator, as the experiment has it.
+        experiment: the test.
+        blank: its records, still without output.
+        quantity: what the campaign's sensor measures; the one of the experiment may measure another.
+        hold: what the drive does between samples.
+        substeps: integration steps a sample.
+        rest: rest position [m].
+
+    Returns:
+        The records; not finite where the motion runs away.
+    """
+    rows, total = experiment.drive.shape
+    length, shift = total // DWELLS, float(model.shift())
+    window = (np.arange(2 * length)[:, None] + (np.arange(DWELLS) - 1) * length) % total
+
+    def side_by_side(tables: list[Float[np.ndarray, "time stage"]]) -> Array:
+        lanes = [np.moveaxis(table[window], 2, 1) for table in tables]
+        return jnp.asarray(np.concatenate(lanes, axis=2))
+
+    tables = [drive_table(record, hold, substeps, shift) for record in blank]
+    channels = {
+        name: side_by_side([channel_table(name, record, hold, substeps, shift) for record in blank])
+        for name in model.channels
+    }
+    lanes = rows * DWELLS
+    start = (jnp.full(lanes, rest), *(jnp.zeros(lanes),) * (1 + model.internal_states))
+    path, reading = _run(
+        model,
+        side_by_side([table for table, _ in tables]),
+        side_by_side([slopes for _, slopes in tables]),
+        channels,
+        start,
+        quantity,
+        1.0 / experiment.rate,
+    )
+
+    def in_turn(values: Array) -> Float[np.ndarray, "record time"]:
+        return np.asarray(values)[length:].T.reshape(rows, total)
+
+    displacement = in_turn(path[0])
+    outputs = displacement if experiment.quantity != quantity else in_turn(reading)
+    records = tuple(
+        dataclasses.replace(record, output=output, raw_output=output)
+        for record, output in zip(blank, outputs, strict=True)
+    )
+    starts = np.stack([np.asarray(state)[length] for state in path])
+    return TrialRun(records, starts, displacement)

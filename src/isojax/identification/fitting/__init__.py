@@ -1,0 +1,35 @@
+"""isojax.identification.fit."""
+
+from ._covariance import Uncertainty as Uncertainty
+from ._covariance import uncertainty as uncertainty
+from ._descent import Rival as Rival
+from ._drift_budget import DriftBudget as DriftBudget
+from ._drift_budget import Share as Share
+from ._drift_budget import drift_budget as drift_budget
+from ._elimination import Nuisances as Nuisances
+from ._elimination import Spread as Spread
+from ._elimination import step_nuisances as step_nuisances
+from ._errors import Errors as Errors
+from ._errors import Run as Run
+from ._errors import run_freely as run_freely
+from ._estimate import Estimate as Estimate
+from ._estimate import estimate as estimate
+from ._evaluation import Evaluation as Evaluation
+from ._fit import DEFAULT_SOLVER as DEFAULT_SOLVER
+from ._fit import MOST_STEPS as MOST_STEPS
+from ._fit import complete as complete
+from ._fit import fit as fit
+from ._fit import silent as silent
+from ._fit_result import Fit as Fit
+from ._fit_result import Statistics as Statistics
+from ._initial_states import best_nuisances as best_nuisances
+from ._multiple_shooting import fit_by_multiple_shooting as fit_by_multiple_shooting
+from ._output_units import OUTPUT_UNITS as OUTPUT_UNITS
+from ._output_units import plain_unit as plain_unit
+from ._problem import Point as Point
+from ._problem import Problem as Problem
+from ._problem import Simulator as Simulator
+from ._problem import element_names as element_names
+from ._problem import one_hot as one_hot
+from ._residual import Residual as Residual
+from ._residual import residual as residual

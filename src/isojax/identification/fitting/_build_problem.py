@@ -1,0 +1,54 @@
+"""Records made into a problem: cut into segments, each with a start of its own."""
+
+from ...excitations import Hold
+from ...models import Integrator, Isolator, Quantity
+from ...records import Record
+from ..jacobian import cut_segments, slowest_decay
+from ._initial_states import head_segments
+from ._problem import Problem
+
+SAME_RATE = 1e-3
+"""Relative difference of sampling rates that the stiffness scales of the records can still take up."""
+
+
+def build_problem(
+    records: tuple[Record, ...],
+    model: Isolator,
+    *,
+    quantity: Quantity,
+    hold: Hold,
+    noise: float,
+    integrator: Integrator,
+    share: float = 1.0,
+) -> Problem:
+    """Cut records into segments for a model.
+
+    Where the motion does not decay (a mass without a spring) records are left whole, and only their
+    beginnings may set their initial states, as in a free run: such a motion remembers its start for ever, and
+    a start that the whole record may choose would imitate a missing force.
+
+    Args:
+        records: the records.
+        model: the isolator, for its memory.
+        quantity: what the sensor measures.
+        hold: what the drive does between samples.
+        noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
+        integrator: solver and steps.
+        share: share of the samples of which the noise is independent.
+
+    Returns:
+        The problem.
+
+    Raises:
+        ValueError: if the records differ in sampling rate.
+    """
+    for record in records:
+        if abs(record.rate / records[0].rate - 1.0) > SAME_RATE:
+            raise ValueError(
+                f"Argument `records` must share one sampling rate, but {records[0].name} has "
+                f"{records[0].rate:g} Hz and {record.name} {record.rate:g} Hz."
+            )
+    segments = cut_segments(records, model)
+    whole = slowest_decay(model) == 0.0 and not any(record.dwells for record in records)
+    heads = head_segments(records) if whole else ()
+    return Problem(records, segments, quantity, hold, noise, integrator, heads, share=share)

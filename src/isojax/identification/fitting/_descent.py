@@ -1,0 +1,291 @@
+"""The search itself: optimistix on systems of coefficient size."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float, Int
+
+from ..._parameters import ParameterSpec, list_parameters, replace_parameters, to_free, to_physical
+from ..._results import RESULTS
+from ...models import Isolator
+from ._elimination import Nuisances, step_nuisances
+from ._problem import Point, Simulator, one_hot
+
+FIRST_DAMPING = 1e-5
+"""Marquardt's damping at the first step, over the diagonal of the normal equations: starts are good."""
+
+MOST_REFUSALS = 10
+"""Refused steps in a row after which the search stops. The later ones count for several, so that the last has
+4^15 times the damping of the first: no descent is left untried."""
+
+DOUBTFUL = 5
+"""Refused steps in a row after which the nuisances of the best point are asked to keep what they promised."""
+
+IDLE = 3
+"""Accepted steps that together must gain what a step must."""
+
+
+class Rival(NamedTuple):
+    """The best other model, far behind which a search is given up.
+
+    Attributes:
+        chi2: what it reaches.
+        far: how much more chi2 is far behind; who is nearer may take its time.
+        patience: evaluations in which a search must catch up.
+        share: how much of what it is behind it must then make good to be worth going on.
+    """
+
+    chi2: float
+    far: float
+    patience: int = 5
+    share: float = 0.05
+
+
+SHRINKS = 3
+"""Refusals that a trial which ran away counts for: it lies far outside, not just a little too far."""
+
+STALLED = 1e-2
+"""Predicted share of chi2 still to gain below which a search that gains no more counts as converged."""
+
+RUNAWAY = 1e75
+"""Residual that stands for a simulation that ran away: finite, so that the solver steps back and not out."""
+
+
+class Descent(NamedTuple):
+    """How a search ended.
+
+    Attributes:
+        point: the best point, its columns in physical units of the free coefficients.
+        result: how it ended.
+        steps: evaluations of the simulation and its derivatives.
+    """
+
+    point: Point
+    result: RESULTS
+    steps: int
+
+
+class _Local(NamedTuple):
+    """Residual and Jacobian at one point, compressed to coefficient size."""
+
+    start: Float[Array, " column"]
+    residual: Float[Array, " row"]
+    jacobian: Float[Array, "row column"]
+
+
+def _residual(free: Float[Array, " column"], local: _Local) -> tuple[Float[Array, " row"], None]:
+    """Residual as optimistix sees it: exact in value and derivative at the point where it is asked."""
+    return local.residual + local.jacobian @ (free - local.start), None
+
+
+def _compress(matrix: Float[np.ndarray, "column column"]) -> tuple[np.ndarray, np.ndarray]:
+    """Give the residual and Jacobian of least size with the same normal equations (Cholesky factor)."""
+    count = matrix.shape[0] - 1
+    # A negative sum of squares is what is left of huge numbers that cancel, see `Point.is_finite`.
+    if not np.all(np.isfinite(matrix)) or matrix[-1, -1] < 0.0:
+        return np.full(count + 1, RUNAWAY), np.zeros((count + 1, count))
+    # Beside a simulation that almost ran away a column may cancel to nothing: its scale must stay a number.
+    size = np.sqrt(np.maximum(np.diag(matrix), 1e-300 + 1e-60 * np.max(np.diag(matrix))))
+    scaled = matrix / size[:, None] / size[None, :]
+    ridge = 1e-14
+    while True:
+        try:
+            factor = np.linalg.cholesky(scaled + ridge * np.eye(count + 1))
+            break
+        except np.linalg.LinAlgError:
+            ridge *= 10.0
+    factor = factor * size[:, None]
+    return factor[-1].copy(), -np.vstack([factor[:count, :count].T, np.zeros((1, count))])
+
+
+@eqx.filter_jit
+def _to_physical(
+    free: Float[Array, " column"], scales: Float[Array, " column"], specs: tuple[ParameterSpec, ...]
+) -> tuple[Float[Array, " column"], Float[Array, " column"]]:
+    """Give the physical coefficients of unbounded variables, and their slopes."""
+
+    def each(free: Float[Array, " column"]) -> Float[Array, " column"]:
+        pairs = zip(free, specs, scales, strict=True)
+        return jnp.stack([to_physical(value, spec, scale) for value, spec, scale in pairs])
+
+    return jax.jvp(each, (free,), (jnp.ones_like(free),))
+
+
+@eqx.filter_jit
+def _init(solver: Any, free: Array, local: _Local) -> Any:
+    struct = jax.eval_shape(lambda: local.residual)
+    return solver.init(_residual, free, local, {}, struct, None, frozenset())
+
+
+@eqx.filter_jit
+def _step(solver: Any, free: Array, local: _Local, state: Any) -> tuple[Array, Any]:
+    free, state, _ = solver.step(_residual, free, local, {}, state, frozenset())
+    return free, state
+
+
+def descend(
+    simulator: Simulator,
+    model: Isolator,
+    places: tuple[int, ...],
+    scales: tuple[float, ...],
+    nuisances: Nuisances,
+    *,
+    solver: optx.AbstractLeastSquaresSolver,
+    max_steps: int,
+    tolerance: float,
+    rival: Rival | None = None,
+    progress: Callable[[str], None],
+) -> Descent:
+    """Fit coefficients to the records, nuisances eliminated on the way.
+
+    Each step simulates every segment once with its exact forward derivatives. optimistix sees the compressed
+    residual at the point it asks for; the nuisances of a trial point are those that its step implies.
+
+    Args:
+        simulator: the records.
+        model: start.
+        places: free coefficients, by their place in `list_parameters`.
+        scales: magnitude of each.
+        nuisances: start of the nuisances.
+        solver: an optimistix least-squares solver.
+        max_steps: evaluations after which the search gives up.
+        tolerance: decrease of chi2 per max(chi2/dof, 1) below which a step is no longer one.
+        rival: another model, far behind which the search is given up.
+        progress: told a line a step.
+
+    Returns:
+        The best point and how the search ended.
+
+    Source: Golub & Pereyra 1973 (variable projection); Marquardt 1963.
+    """
+    listed = list_parameters(model)
+    values = [entry.value for entry in listed]
+    specs = tuple(listed[place].spec for place in places)
+
+    def physical(free: Array) -> tuple[Isolator, list[float]]:
+        found, slopes = _to_physical(free, jnp.asarray(scales), specs)
+        numbers = list(values)
+        for place, number in zip(places, np.asarray(found), strict=True):
+            numbers[place] = number
+        return replace_parameters(model, numbers), [float(slope) for slope in np.asarray(slopes)]
+
+    free = jnp.stack([to_free(values[place], specs[c], scales[c]) for c, place in enumerate(places)])
+    # Marquardt's scaling: the solver's variables are those in which the first normal equations have an equal
+    # diagonal.
+    unit = np.ones(len(places))
+    trial, trial_nuisances, best_free, scaled = free, nuisances, free, free
+    best: Point | None = None
+    state: Any = None
+    result: Any = RESULTS.not_converged
+    evaluations, refused, decrement = 0, 0, float("inf")
+    reached: list[float] = []
+    levels: list[float] = []
+    while evaluations < max_steps:
+        current, slopes = physical(trial)
+        point = simulator.evaluate(current, one_hot(current, places, slopes), trial_nuisances)
+        evaluations += 1
+        residual, jacobian = _compress(point.reduced.matrix)
+        if state is None:
+            if not point.is_finite:
+                return Descent(point, RESULTS.not_finite, evaluations)
+            unit = np.sqrt(1.0 / FIRST_DAMPING / np.maximum(np.sum(jacobian**2, axis=0), 1e-300))
+        local = _Local(trial / unit, jnp.asarray(residual), jnp.asarray(jacobian * unit))
+        if state is None:
+            scaled = trial / unit
+            state = _init(solver, scaled, local)
+        accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
+        # Only a refusal may count for several: an accepted point is one step on.
+        refusals = 1 if accepted else max(1 if point.is_finite else SHRINKS, 1 + refused // 4)
+        for _ in range(refusals):
+            scaled, state = _step(solver, scaled, local, state)
+        chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
+        progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
+        if accepted:
+            gained = float("inf") if best is None or refused else best.chi2 - point.chi2
+            best, best_free, refused = point, trial, 0
+            # What a full linear step would still gain, and what the last one did gain: either may say that it
+            # is over.
+            decrement = float(np.sum(residual[:-1] ** 2))
+            if min(decrement, gained) < tolerance * max(1.0, chi2):
+                result = RESULTS.successful
+                break
+        else:
+            refused += 1
+        assert best is not None
+        reached.append(best.chi2)
+        levels += [best.chi2] if accepted else []
+        # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
+        # Where records are split the error itself has kinks, and a slope on either side of its least.
+        idle = _gain(levels, IDLE) < tolerance * max(1.0, chi2)
+        is_least = decrement < STALLED * best.chi2 or model.splits
+        if rival is not None:
+            behind = best.chi2 - rival.chi2
+            if behind > rival.far and _gain(reached, rival.patience) < rival.share * behind:
+                result = RESULTS.outdone
+                break
+        if refused == MOST_REFUSALS or (idle and is_least):
+            result = RESULTS.successful if is_least else RESULTS.not_converged
+            break
+        if bool(state.terminate):
+            result = RESULTS.successful
+            break
+        owner = simulator.prepared(best.model, len(best.model.elements)).record
+        if refused == DOUBTFUL and evaluations < max_steps - 1:
+            settled = _settled(simulator, best, places, physical(best_free)[1], owner)
+            evaluations += 1
+            if settled.is_finite and settled.chi2 - best.chi2 > tolerance * max(1.0, chi2):
+                progress("the best point promised too much: again from where its nuisances come to lie")
+                trial, trial_nuisances, best, state, refused = best_free, settled.nuisances, None, None, 0
+                # What was promised is no measure of what is gained from here on.
+                reached, levels = [], []
+                continue
+        trial = state.y_eval * unit
+        trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
+    assert best is not None
+    return Descent(_in_physical_units(best, physical(best_free)[1]), result, evaluations)
+
+
+def _settled(
+    simulator: Simulator,
+    best: Point,
+    places: tuple[int, ...],
+    slopes: list[float],
+    owner: Int[np.ndarray, " lanes"],
+) -> Point:
+    """Give a point again with the nuisances that it implies.
+
+    Its chi2 is that at the end of one linear step of the initial states. From far, that step promises what no
+    later point reaches, however short the step of the coefficients.
+    """
+    still = np.zeros(len(places))
+    moved = step_nuisances(best.reduced, owner, best.nuisances, still)
+    return simulator.evaluate(best.model, one_hot(best.model, places, slopes), moved)
+
+
+def _gain(reached: list[float], evaluations: int) -> float:
+    """Give what the last evaluations took off chi2; more than anything before there were so many."""
+    return reached[-evaluations - 1] - reached[-1] if len(reached) > evaluations else float("inf")
+
+
+def _in_physical_units(point: Point, slopes: list[float]) -> Point:
+    """Rescale the columns of a point from unbounded variables to physical coefficients."""
+    # At the very end of an interval nothing moves with the variable: no column, and no error bar.
+    still = np.asarray(slopes) == 0.0
+    factor = np.append(np.where(still, 0.0, 1.0 / np.where(still, 1.0, slopes)), 1.0)
+    # Close to the end of an interval the factor may be out of range: then there is no error bar either.
+    with np.errstate(over="ignore", invalid="ignore"):
+        by_record = point.reduced.by_record * np.outer(factor, factor)
+        stiffness_map = point.reduced.stiffness_map * factor
+        # The stiffness scale stands between the coefficients and the residual.
+        wide = np.insert(factor, -1, [1.0] * (point.reduced.segments_map.shape[1] - factor.size))
+        segments_map = point.reduced.segments_map * wide
+    return point._replace(
+        reduced=point.reduced._replace(
+            by_record=by_record, stiffness_map=stiffness_map, segments_map=segments_map
+        )
+    )

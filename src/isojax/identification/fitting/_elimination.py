@@ -1,0 +1,252 @@
+"""Nuisances taken out of the normal equations, segment by segment and record by record.
+
+Every coefficient of interest sees only what is left of the data once the initial states of the segments and
+the stiffness scales of the records have explained what they can: variable projection, done on the small
+matrices of `information`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ..jacobian import STIFFNESS_SCALE_UNIT
+
+
+class Spread(NamedTuple):
+    """Standard deviations of the linear stiffness, which are the priors of its deviations.
+
+    Attributes:
+        records: from record to record [relative stiffness].
+        segments: from segment to segment within a record [relative stiffness]; 0 where it has none.
+    """
+
+    records: float
+    segments: float = 0.0
+
+
+class Nuisances(NamedTuple):
+    """Where the nuisances stand, and their priors.
+
+    Attributes:
+        states: deviation of each segment's initial states from the measured ones, in the states' own scales
+            (which are also the standard deviations of their priors).
+        stiffness: deviation of each record's linear stiffness [units of `STIFFNESS_SCALE_UNIT`].
+        segments: further deviation of each segment's [the same units].
+        spread: standard deviations of the priors of both.
+    """
+
+    states: Float[np.ndarray, "lanes state"]
+    stiffness: Float[np.ndarray, " record"]
+    segments: Float[np.ndarray, " lanes"]
+    spread: Spread
+
+    def afresh(self) -> "Nuisances":
+        """Give what is known of the records alone: other segments or states are to be found anew."""
+        return self._replace(states=np.zeros((0, 0)), segments=np.zeros(0))
+
+    def factor(self, owner: Int[np.ndarray, " lanes"]) -> Float[np.ndarray, " lanes"]:
+        """Give the factor on the linear stiffness of each lane.
+
+        Args:
+            owner: record of each lane.
+
+        Returns:
+            Factors, 1 where nothing deviates.
+        """
+        return 1.0 + STIFFNESS_SCALE_UNIT * (self.stiffness[owner] + self.segments)
+
+
+class Reduced(NamedTuple):
+    """Normal equations of the coefficients alone, and the way back to the nuisances.
+
+    Attributes:
+        by_record: [[J'J, J'r], [r'J, r'r]] after the nuisances; coefficients first, residual last; whitened.
+        eliminated: degrees of freedom that the nuisances of each record took from the data.
+        raw: squared size of each coefficient column before anything was eliminated; whitened.
+        stiffness_map: step of the stiffness scales = map[:, -1] - map[:, :-1] @ step of the coefficients.
+        stiffness_variance: of each record's stiffness scale, given the coefficients [relative stiffness
+            squared].
+        states_map: step of the states = map[..., -1] - map[..., :-1] @ [step of coefficients, of the
+            stiffness scale].
+        segments_map: the same of the segments' own stiffness; no rows where it does not scatter.
+        segments_variance: of each, given all else [relative stiffness squared].
+        by_segment: information of each segment on its own stiffness scale after its states, and the score
+            [units of `STIFFNESS_SCALE_UNIT`]; before any prior.
+    """
+
+    by_record: Float[np.ndarray, "record column column"]
+    eliminated: Float[np.ndarray, " record"]
+    raw: Float[np.ndarray, " column"]
+    stiffness_map: Float[np.ndarray, "record column"]
+    stiffness_variance: Float[np.ndarray, " record"]
+    states_map: Float[np.ndarray, "lanes state column2"]
+    segments_map: Float[np.ndarray, "segment column3"]
+    segments_variance: Float[np.ndarray, " segment"]
+    by_segment: Float[np.ndarray, "lanes 2"]
+
+    @property
+    def matrix(self) -> Float[np.ndarray, "column column"]:
+        """Normal equations of all records together."""
+        return self.by_record.sum(axis=0)
+
+    def without(self, columns: Int[np.ndarray, " lost"]) -> "Reduced":
+        """Give the equations with nothing in some columns, as if they moved no reading.
+
+        Args:
+            columns: coefficients, or the residual behind them.
+
+        Returns:
+            The equations.
+        """
+        by_record, raw = self.by_record.copy(), self.raw.copy()
+        states, stiffness = self.states_map.copy(), self.stiffness_map.copy()
+        segments = self.segments_map.copy()
+        residual = raw.size
+        by_record[:, columns], by_record[:, :, columns] = 0.0, 0.0
+        stiffness[:, columns] = 0.0
+        # In the other maps the stiffness scale may stand between the coefficients and the residual.
+        states[..., np.where(columns == residual, -1, columns)] = 0.0
+        segments[:, np.where(columns == residual, -1, columns)] = 0.0
+        raw[columns[columns < residual]] = 0.0
+        return self._replace(
+            by_record=by_record, raw=raw, stiffness_map=stiffness, states_map=states, segments_map=segments
+        )
+
+
+def eliminate(
+    matrices: Float[np.ndarray, "lanes column column"],
+    noise: float,
+    owner: Int[np.ndarray, " lanes"],
+    used: int,
+    records: int,
+    columns: int,
+    has_scale: bool,
+    nuisances: Nuisances,
+    heads: Float[np.ndarray, "lanes column column"] | None = None,
+) -> Reduced:
+    """Eliminate the initial states of each segment, then its own stiffness and that of its record.
+
+    Where `heads` is given, the initial states follow from the beginnings of the records alone, as those of a
+    free run do; the rest of a record then has no say in its own start.
+
+    Args:
+        matrices: from `information`.
+        noise: rms of the noise [SI unit of the output].
+        owner: record of each lane.
+        used: lanes that hold a segment; the rest is padding.
+        records: count of records.
+        columns: count of coefficient columns.
+        has_scale: whether the stiffness scale has a column.
+        nuisances: where they stand, and their priors.
+        heads: the same matrices over the beginning of each lane only.
+
+    Returns:
+        The reduced equations.
+    """
+    matrices = matrices[:used] / noise**2
+    states = matrices.shape[1] - columns - int(has_scale) - 1
+    shared = columns + int(has_scale)
+    keep = np.r_[0:shared, shared + states]
+    drop = np.arange(shared, shared + states)
+
+    # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
+    offset = nuisances.states[:used]
+    source = matrices if heads is None else heads[:used] / noise**2
+    inner = source[:, drop[:, None], drop] + np.eye(states)
+    cross = source[:, drop[:, None], keep].copy()
+    cross[:, :, -1] -= offset
+    try:
+        states_map = np.linalg.solve(inner, cross)
+        taken = states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
+    except np.linalg.LinAlgError:
+        # Only a simulation that ran away makes a state's column as large as to drown its own prior.
+        states_map, taken = np.full_like(cross, np.nan), np.full(used, np.nan)
+    left = matrices[:, keep[:, None], keep].copy()
+    if heads is None:
+        left[:, -1, -1] += np.sum(offset**2, axis=1)
+        left -= np.swapaxes(cross, 1, 2) @ states_map
+    else:
+        mixed = np.swapaxes(matrices[:, drop[:, None], keep], 1, 2) @ states_map
+        curved = np.swapaxes(states_map, 1, 2) @ matrices[:, drop[:, None], drop] @ states_map
+        left += curved - mixed - np.swapaxes(mixed, 1, 2)
+    eliminated = np.zeros(records)
+    np.add.at(eliminated, owner[:used], taken)
+
+    by_segment = left[:, columns, [columns, -1]] if has_scale else np.zeros((used, 2))
+    segments_map, segments_variance = np.zeros((0, shared + 1)), np.zeros(0)
+    if has_scale and nuisances.spread.segments > 0.0:
+        spread = nuisances.spread.segments / STIFFNESS_SCALE_UNIT
+        own = nuisances.segments[:used]
+        pivot = left[:, columns, columns] + 1.0 / spread**2
+        row = left[:, columns, :].copy()
+        row[:, -1] -= own / spread**2
+        segments_map, segments_variance = row / pivot[:, None], STIFFNESS_SCALE_UNIT**2 / pivot
+        left[:, -1, -1] += (own / spread) ** 2
+        with np.errstate(over="ignore", invalid="ignore"):
+            left -= segments_map[:, :, None] * row[:, None, :]
+        np.add.at(eliminated, owner[:used], 1.0 - 1.0 / (pivot * spread**2))
+
+    per_record = np.zeros((records, shared + 1, shared + 1))
+    np.add.at(per_record, owner[:used], left)
+    stiffness_map = np.zeros((records, columns + 1))
+    variance = np.zeros(records)
+    reduced = per_record.copy()
+    if has_scale:
+        spread = nuisances.spread.records / STIFFNESS_SCALE_UNIT
+        pivot = per_record[:, columns, columns] + 1.0 / spread**2
+        row = np.delete(per_record[:, columns, :], columns, axis=1)
+        row[:, -1] -= nuisances.stiffness / spread**2
+        stiffness_map, variance = row / pivot[:, None], STIFFNESS_SCALE_UNIT**2 / pivot
+        reduced = np.delete(np.delete(per_record, columns, axis=1), columns, axis=2)
+        reduced[:, -1, -1] += (nuisances.stiffness / spread) ** 2
+        # Of a simulation that ran away, finite or not, nothing is asked but that it did.
+        with np.errstate(over="ignore", invalid="ignore"):
+            reduced = reduced - stiffness_map[:, :, None] * row[:, None, :]
+        eliminated += 1.0 - 1.0 / (pivot * spread**2)
+    raw = np.diagonal(matrices, axis1=1, axis2=2).sum(axis=0)[:columns]
+    return Reduced(
+        reduced,
+        eliminated,
+        raw,
+        stiffness_map,
+        variance,
+        states_map,
+        segments_map,
+        segments_variance,
+        by_segment,
+    )
+
+
+def step_nuisances(
+    reduced: Reduced,
+    owner: Int[np.ndarray, " lanes"],
+    nuisances: Nuisances,
+    step: Float[np.ndarray, " column"],
+) -> Nuisances:
+    """Give the nuisances that go with a step of the coefficients.
+
+    Args:
+        reduced: the equations at the present point.
+        owner: record of each lane.
+        nuisances: where they stand.
+        step: step of the coefficients, in the units of their columns.
+
+    Returns:
+        The nuisances after the step.
+    """
+    stiffness_step = reduced.stiffness_map[:, -1] - reduced.stiffness_map[:, :-1] @ step
+    used = reduced.states_map.shape[0]
+    factor_step = stiffness_step[owner[:used]]
+    segments = nuisances.segments.copy()
+    if reduced.segments_map.shape[0]:
+        own = reduced.segments_map
+        segments_step = own[:, -1] - own[:, : step.size] @ step - own[:, step.size] * factor_step
+        segments[:used] += segments_step
+        factor_step = factor_step + segments_step
+    coefficients = reduced.states_map[:, :, : step.size] @ step
+    if reduced.states_map.shape[2] == step.size + 2:
+        coefficients = coefficients + reduced.states_map[:, :, step.size] * factor_step[:, None]
+    states = nuisances.states.copy()
+    states[:used] += reduced.states_map[:, :, -1] - coefficients
+    return Nuisances(states, nuisances.stiffness + stiffness_step, segments, nuisances.spread)

@@ -1,0 +1,113 @@
+"""An estimate held against every record of its campaign: worked out once, when it is first asked for."""
+
+from functools import cached_property
+
+import numpy as np
+
+from ..._results import is_successful
+from ...records import Campaign
+from ._build_problem import build_problem
+from ._elimination import Nuisances
+from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise, without_values
+from ._estimate import Estimate
+from ._problem import Point, Problem, Simulator
+
+SAME_BRANCH = 1e-3
+"""Difference in chi2/dof, over the fitted records, up to which restarts and the fit are one."""
+
+
+def _chi2_of_fitted(point: Point, everything: Problem, fitted: Problem) -> float:
+    """Give chi2 of the fitted records among all."""
+    kept = {id(record) for record in fitted.records}
+    places = [place for place, record in enumerate(everything.records) if id(record) in kept]
+    return float(point.reduced.by_record[places, -1, -1].sum())
+
+
+def _carried_over(found: Estimate, simulator: Simulator) -> Nuisances:
+    """Give the nuisances of a fit for a bench that has other records beside the fitted ones."""
+    model, carried, old = found.model, len(found.model.elements), found.point.nuisances
+    fitted, everything = found.simulator.problem, simulator.problem
+    begin = simulator.settle(None, model, carried, old.spread)
+    own, scales = found.simulator.starts(model, found.simulator.prepared(model, carried))
+    starts, units = simulator.starts(model, simulator.prepared(model, carried))
+    reached = own + scales * old.states.T
+    lanes = {
+        (id(everything.records[part.record]), part.start, part.stop): lane
+        for lane, part in enumerate(everything.segments)
+    }
+    states, segments = begin.states.copy(), begin.segments.copy()
+    for lane, part in enumerate(fitted.segments):
+        place = lanes.get((id(fitted.records[part.record]), part.start, part.stop))
+        if place is not None:
+            states[place] = (reached[:, lane] - starts[:, place]) / units[:, place]
+            segments[place] = old.segments[lane]
+    places = {id(record): place for place, record in enumerate(everything.records)}
+    stiffness = begin.stiffness.copy()
+    for record, deviation in zip(fitted.records, old.stiffness, strict=True):
+        stiffness[places[id(record)]] = deviation
+    return begin._replace(states=states, stiffness=stiffness, segments=segments)
+
+
+class Evaluation:
+    """A model against records, fitted and held out.
+
+    A search of coefficients does not need it, and it costs a good part of one; hence it waits.
+    """
+
+    def __init__(self, found: Estimate, campaign: Campaign):
+        """Keep what is to be compared; nothing is simulated yet."""
+        self._found = found
+        self._campaign = campaign
+
+    @cached_property
+    def _runs(self) -> tuple[tuple[Run, ...], Restarts]:
+        """Free runs and restarts of every record; NaN where the search failed."""
+        found, fitted = self._found, self._found.simulator.problem
+        everything = build_problem(
+            self._campaign.records,
+            found.model,
+            quantity=fitted.quantity,
+            hold=fitted.hold,
+            noise=fitted.noise,
+            share=fitted.share,
+            integrator=fitted.integrator,
+        )
+        nuisances = found.point.nuisances
+        with np.errstate(over="ignore", invalid="ignore"):
+            free_runs = run_freely(everything, found.model)
+            if everything.records == fitted.records and everything.segments == fitted.segments:
+                restarts = restart_records(
+                    found.simulator, found.model, nuisances.spread, nuisances, found.places
+                )
+            else:
+                simulator = Simulator(everything)
+                restarts = restart_records(simulator, found.model, nuisances.spread)
+                lost = _chi2_of_fitted(restarts.point, everything, fitted) - found.point.chi2
+                if is_successful(found.result) and not lost < SAME_BRANCH * found.dof:
+                    # Beside a fold the measured states may lead to another branch than the fit is on.
+                    known = _carried_over(found, simulator)
+                    again = restart_records(simulator, found.model, nuisances.spread, known)
+                    if _chi2_of_fitted(again.point, everything, fitted) < lost + found.point.chi2:
+                        restarts = again
+        if not is_successful(found.result):
+            free_runs = tuple(without_values(run) for run in free_runs)
+            restarts = restarts._replace(runs=tuple(without_values(run) for run in restarts.runs))
+        return free_runs, restarts
+
+    @property
+    def free_runs(self) -> tuple[Run, ...]:
+        """Every record simulated from its start to its end with nothing fed back."""
+        return self._runs[0]
+
+    @property
+    def restarts(self) -> Restarts:
+        """Every record with each segment restarted from its own best initial state."""
+        return self._runs[1]
+
+    @cached_property
+    def errors(self) -> dict[str, Errors | None]:
+        """Errors by role, "fit" and "holdout" (None without such records)."""
+        return {
+            "fit": summarise(self.free_runs, self.restarts, "fit", len(self._found.places)),
+            "holdout": summarise(self.free_runs, self.restarts, "holdout", 0),
+        }

@@ -1,0 +1,292 @@
+"""What a fit gives, and its report as text in the layout that users of lmfit know."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from ..._parameters import Parameter, list_parameters
+from ..._results import RESULTS, is_successful
+from ...models import Isolator
+from ...records import Campaign, NoiseEstimate, brief_blows
+from ._errors import Errors, Restarts, Run
+from ._estimate import Estimate
+from ._evaluation import Evaluation
+from ._output_units import OUTPUT_UNITS, plain_unit
+
+_ROLES = {"fit": "fitted", "holdout": "held out"}
+_STRONG = 0.9
+"""Correlations of this magnitude and more are listed."""
+
+_UNMOVED = 1e-12
+"""A coefficient that changed by less than this share of itself never moved."""
+
+
+class Statistics(NamedTuple):
+    """Counts and criteria of a fit.
+
+    Attributes:
+        samples: samples that count, filtered noise counted by its independent samples.
+        coefficients: free coefficients.
+        chi2: squared whitened residual after the nuisances.
+        dof: samples less nuisances less coefficients.
+        aic: Akaike's criterion, chi2 + 2 coefficients.
+        bic: Schwarz's criterion, chi2 + coefficients ln(samples).
+        steps: simulations with derivatives that the search took.
+        stiffness_scatter: standard deviation of the linear stiffness between records [relative].
+        segment_scatter: the same between the segments of a record; 0 where no repeat shows one.
+        integration_error: rms change of the readings when the integration steps are halved, over the noise;
+            NaN where the steps were given.
+    """
+
+    samples: int
+    coefficients: int
+    chi2: float
+    dof: float
+    aic: float
+    bic: float
+    steps: int
+    stiffness_scatter: float
+    segment_scatter: float
+    integration_error: float
+
+
+class Fit(NamedTuple):
+    """A fitted model, its error bars and its errors.
+
+    Attributes:
+        model: the fitted isolator.
+        start: the isolator that the search started from.
+        campaign: the measurements.
+        free: names of the fitted coefficients.
+        covariance: of the fitted coefficients [product of their units], scaled by max(1, chi2/dof).
+        stats: counts and criteria.
+        noise: the noise that errors are held against.
+        result: how the search ended.
+        estimate: the equations at the solution.
+        evaluation: the model held against every record, fitted and held out, when first asked for.
+    """
+
+    model: Isolator
+    start: Isolator
+    campaign: Campaign
+    free: tuple[str, ...]
+    covariance: Float[np.ndarray, "parameter parameter"]
+    stats: Statistics
+    noise: NoiseEstimate
+    result: RESULTS
+    estimate: Estimate
+    evaluation: Evaluation
+
+    @property
+    def errors(self) -> dict[str, Errors | None]:
+        """Errors by role, "fit" and "holdout" (None without such records)."""
+        return self.evaluation.errors
+
+    @property
+    def free_runs(self) -> tuple[Run, ...]:
+        """Every record simulated from its start to its end with nothing fed back."""
+        return self.evaluation.free_runs
+
+    @property
+    def restarts(self) -> Restarts:
+        """Every record with each segment restarted from its own best initial state."""
+        return self.evaluation.restarts
+
+    @property
+    def nrmse(self) -> float:
+        """Free-run error on the fitted records over the rms of their measured output about the mean."""
+        errors = self.errors["fit"]
+        return float("nan") if errors is None else errors.nrmse
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard error of each fitted coefficient [its unit]; NaN where the data do not determine it."""
+        return dict(zip(self.free, (float(e) for e in self.estimate.uncertainty.standard_error), strict=True))
+
+    def __str__(self) -> str:
+        """Give the fit report."""
+        return fit_report(self)
+
+
+def fit_report(fit: Fit) -> str:
+    """Give the report of a fit.
+
+    Coefficients with standard error, relative error and start value; those at a bound, never moved, or not
+    determined by the data by name; strong correlations; errors in physical units and over the noise. Of a
+    search that failed there are no numbers but NaN, and why it failed.
+
+    Args:
+        fit: the fit.
+
+    Returns:
+        Lines of plain text, SI units.
+    """
+    sections = [
+        ("Model", _model(fit)),
+        ("Fit statistics", _statistics(fit)),
+        ("Errors", _errors(fit)),
+        ("Coefficients", _coefficients(fit)),
+        (f"Correlations of {_STRONG:g} and more", _correlations(fit)),
+        ("Warnings", warnings_of(fit)),
+    ]
+    blocks = [
+        "\n".join([f"[[{title}]]", *(f"    {line}" for line in lines)]) for title, lines in sections if lines
+    ]
+    return "\n".join(blocks)
+
+
+def _model(fit: Fit) -> list[str]:
+    campaign = fit.campaign
+    driven = "its base" if fit.model.excitation == "base_acceleration" else "a force"
+    fitted, held_out = len(campaign.fit_records), len(campaign.holdout_records)
+    return [
+        f"{campaign.title}: {fitted} records fitted, {held_out} held out",
+        f"{float(fit.model.mass):g} kg driven by {driven}, output {campaign.output.quantity}",
+        f"elements: {', '.join(element.name for element in fit.model.elements) or 'none'}",
+    ]
+
+
+def _statistics(fit: Fit) -> list[str]:
+    stats, unit = fit.stats, OUTPUT_UNITS[fit.campaign.output.quantity]
+    if not is_successful(fit.result):
+        nothing = dict.fromkeys(("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter"), math.nan)
+        stats = stats._replace(**nothing)
+    integrator = fit.estimate.simulator.problem.integrator
+    scatter = f"{100 * stats.stiffness_scatter:.2g} % between records"
+    if stats.segment_scatter > 0.0:
+        scatter += f", {100 * stats.segment_scatter:.2g} % within them"
+    rows = [
+        ("samples", f"{stats.samples}"),
+        ("coefficients", f"{stats.coefficients}"),
+        ("simulations", f"{stats.steps}"),
+        ("chi-square", f"{stats.chi2:.6g}"),
+        ("degrees of freedom", f"{stats.dof:.6g}"),
+        ("reduced chi-square", f"{stats.chi2 / stats.dof:.5g}"),
+        ("AIC", f"{stats.aic:.8g}"),
+        ("BIC", f"{stats.bic:.8g}"),
+        ("noise", f"{fit.noise.sigma:.4g} {unit} rms, from {fit.noise.method.replace('_', ' ')}"),
+        ("stiffness scatter", scatter),
+        (
+            "integration",
+            f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample",
+        ),
+    ]
+    if math.isfinite(stats.integration_error):
+        rows.append(("integration error", f"{stats.integration_error:.2g} of the noise when halved"))
+    rows.append(("result", "successful" if is_successful(fit.result) else RESULTS[fit.result]))
+    return [f"{label:<20} = {value}" for label, value in rows]
+
+
+def _errors(fit: Fit) -> list[str]:
+    unit = OUTPUT_UNITS[fit.campaign.output.quantity]
+    lines = [f"{'records':<10}{'free run RMSE':>20}{'NRMSE':>10}{'restarted NRMSE':>18}{'chi2/dof':>11}"]
+    return lines + [
+        _error_line(_ROLES[role], errors, unit) for role, errors in fit.errors.items() if errors is not None
+    ]
+
+
+def _error_line(role: str, errors: Errors, unit: str) -> str:
+    rmse = f"{errors.rmse:.4g} {unit}"
+    free, restarted = f"{100 * errors.nrmse:.3g} %", f"{100 * errors.nrmse_segments:.3g} %"
+    return f"{role:<10}{rmse:>20}{free:>10}{restarted:>18}{errors.chi2_per_dof:>11.4g}"
+
+
+def _coefficients(fit: Fit) -> list[str]:
+    start = {entry.name: float(entry.value) for entry in list_parameters(fit.start)}
+    errors = fit.standard_errors
+    listed = list_parameters(fit.model)
+    width = max(len(entry.name) for entry in listed) + 1
+    return [
+        f"{entry.name + ':':<{width}} {_value(entry, errors.get(entry.name), start.get(entry.name), fit)}"
+        for entry in listed
+    ]
+
+
+def _value(entry: Parameter, error: float | None, start: float | None, fit: Fit) -> str:
+    value, unit = float(entry.value), plain_unit(entry.spec.unit, fit.campaign)
+    if error is None:
+        return f"{value:<12.6g} {unit} (fixed)"
+    begun = "(added)" if start is None else f"(init = {start:.6g})"
+    if not is_successful(fit.result):
+        return f"{'not found':<12} {unit} {begun}"
+    if not math.isfinite(error):
+        return f"{value:<12.6g} +/- unknown {unit} {begun}"
+    share = f" ({100 * error / abs(value):.2g} %)" if value != 0.0 else ""
+    return f"{value:<12.6g} +/- {error:.3g} {unit}{share} {begun}"
+
+
+def _correlations(fit: Fit) -> list[str]:
+    if not is_successful(fit.result):
+        return []
+    correlation = fit.estimate.uncertainty.correlation
+    pairs = [
+        (float(correlation[i, j]), fit.free[i], fit.free[j])
+        for i in range(len(fit.free))
+        for j in range(i + 1, len(fit.free))
+        if np.abs(correlation[i, j]) >= _STRONG
+    ]
+    return [
+        f"C({one}, {other}) = {value:+.4f}" for value, one, other in sorted(pairs, key=lambda p: -abs(p[0]))
+    ]
+
+
+def warnings_of(fit: Fit) -> list[str]:
+    """Give what a reader must know before using the coefficients of a fit.
+
+    Args:
+        fit: the fit.
+
+    Returns:
+        One sentence each; none if there is nothing to warn of.
+    """
+    lines = [] if is_successful(fit.result) else [f"The search failed. {RESULTS[fit.result]}"]
+    lines += [
+        f"The blow of {blow.record} lasts {blow.samples} samples: its shape between them, and so the "
+        "momentum that it gave, is a guess. Sample faster or use a softer tip."
+        for blow in brief_blows(fit.campaign)
+    ]
+    if not is_successful(fit.result):
+        return lines
+    lines += _not_determined(fit)
+    start = {entry.name: float(entry.value) for entry in list_parameters(fit.start)}
+    errors = fit.standard_errors
+    for entry in list_parameters(fit.model):
+        if entry.name not in errors:
+            continue
+        bound = _touched_bound(entry, errors[entry.name])
+        if bound is not None:
+            lines.append(
+                f"{entry.name} is at its bound of {bound:g} {plain_unit(entry.spec.unit, fit.campaign)}; "
+                "its error bar means little."
+            )
+        begun = start.get(entry.name, math.nan)
+        if abs(float(entry.value) - begun) <= _UNMOVED * abs(begun):
+            lines.append(f"{entry.name} never moved from its start value {begun:g}.")
+    return lines
+
+
+def _not_determined(fit: Fit) -> list[str]:
+    known = fit.estimate.uncertainty
+    grouped = {place for group in known.partners for place in group}
+    lines = [
+        f"{fit.free[group[0]]} is not determined: the data hold no trace of it. Fix it."
+        if len(group) == 1
+        else f"{', '.join(fit.free[place] for place in group)} are not determined apart: the data fix only a "
+        "combination of them. Fix one, or add records that part them."
+        for group in known.partners
+    ]
+    return lines + [
+        f"{name} is not determined: the data hold no trace of it. Fix it."
+        for place, name in enumerate(fit.free)
+        if not known.determined[place] and place not in grouped
+    ]
+
+
+def _touched_bound(entry: Parameter, error: float) -> float | None:
+    """Give the bound that a value stands on: within its standard error, or exactly."""
+    value = float(entry.value)
+    near = error if math.isfinite(error) else 0.0
+    bounds = (bound for bound in (entry.spec.lower, entry.spec.upper) if math.isfinite(bound))
+    return next((bound for bound in bounds if abs(value - bound) <= near), None)

@@ -1,0 +1,177 @@
+"""Nuisances at given coefficients, and the state in which a record begins."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from ...models import Isolator
+from ...records import Record, ringing_frequency
+from ..jacobian import Segment
+from ._elimination import Nuisances, Spread, step_nuisances
+from ._problem import Point, Problem, Simulator, one_hot
+
+ROUNDS = 3
+"""Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
+
+RELEASED_ROUNDS = 12
+"""The same where a record begins with a release: its first states are poorly known, its motion is large."""
+
+WORSE = 1.1
+"""Factor on the error of a record up to which a step stands: chi2 is that at the end of the next one."""
+
+HALVINGS = 5
+"""How often the step of a record is halved before it is given up."""
+
+HELD = Spread(1e-9)
+"""Spread of the linear stiffness between records that leaves it where it is."""
+
+SETTLED = 1e-2
+"""Change of chi2, per max(chi2/dof, 1), below which the nuisances stand."""
+
+FIRST_SWINGS = 1.0
+"""Periods after a release over which its state is sought first."""
+
+SMALL_STEP = 1e-4
+"""Step of a state, over its range, that no longer counts."""
+
+
+def best_nuisances(
+    simulator: Simulator,
+    model: Isolator,
+    spread: Spread,
+    known: Nuisances | None = None,
+    places: tuple[int, ...] = (),
+) -> Point:
+    """Find the nuisances at given coefficients.
+
+    Args:
+        simulator: the records.
+        model: the isolator.
+        spread: prior standard deviations of the linear stiffness.
+        known: where to begin; at the measured states if omitted.
+        places: coefficients that have columns at the point; they stay as they are. A search for the same ones
+            shares the compiled code.
+
+    Returns:
+        The point.
+    """
+    released = any(record.kind == "free_decay" for record in simulator.problem.records)
+    begin = simulator.settle(known, model, len(model.elements), spread)
+    if released and known is None:
+        begin = _first_swings(simulator, model, begin)
+    return _settle_from(simulator, model, begin, released, places)
+
+
+def _first_swings(simulator: Simulator, model: Isolator, begin: Nuisances) -> Nuisances:
+    """Find the states from which the first swings of each segment follow: over them no phase can run off."""
+    problem, carried = simulator.problem, len(model.elements)
+
+    def first(segment: Segment) -> Segment:
+        record = problem.records[segment.record]
+        length = round(FIRST_SWINGS * record.rate / ringing_frequency(record.output, record.rate))
+        return segment._replace(stop=min(segment.stop, max(segment.start, segment.counted) + max(length, 8)))
+
+    short = Simulator(
+        problem._replace(segments=tuple(map(first, problem.segments)), heads=()), simulator.at_rest
+    )
+    found = _settle_from(short, model, short.settle(None, model, carried, HELD), True)
+    if not found.is_finite:
+        return begin
+    own, scales = short.starts(model, short.prepared(model, carried))
+    starts, units = simulator.starts(model, simulator.prepared(model, carried))
+    states = own + scales * found.nuisances.states.T
+    # Either bench may carry lanes beyond the segments, which hold nothing.
+    used = slice(len(problem.segments))
+    moved = begin.states.copy()
+    moved[used] = ((states[:, used] - starts[:, used]) / units[:, used]).T
+    return begin._replace(states=moved)
+
+
+def _settle_from(
+    simulator: Simulator, model: Isolator, begin: Nuisances, released: bool, places: tuple[int, ...] = ()
+) -> Point:
+    """Take Gauss-Newton steps of the nuisances until they stand."""
+    directions = one_hot(model, places, [1.0] * len(places))
+    still = np.zeros(len(places))
+    carried = len(model.elements)
+    point = simulator.evaluate(model, directions, begin)
+    owner = simulator.prepared(model, carried).record
+    for _ in range(RELEASED_ROUNDS if released else ROUNDS):
+        if not point.is_finite:
+            break
+        moved = step_nuisances(point.reduced, owner, point.nuisances, still)
+        before, point = point, simulator.evaluate(model, directions, moved)
+        if released:
+            point = _shortened(simulator, directions, before, point, owner)
+        # chi2 is that at the end of the step, as if the response were linear; of a release also the step must
+        # be small, since its motion is not.
+        is_small = not released or np.max(np.abs(moved.states - before.nuisances.states)) < SMALL_STEP
+        if is_small and abs(before.chi2 - point.chi2) < SETTLED * max(
+            1.0, point.chi2 / max(1.0, point.free_samples)
+        ):
+            break
+    return point
+
+
+def _shortened(
+    simulator: Simulator,
+    directions: Float[np.ndarray, "parameter column"],
+    before: Point,
+    after: Point,
+    owner: Int[np.ndarray, " lanes"],
+) -> Point:
+    """Halve the step of each record whose error it raised; where that does not help, stay."""
+    known, share = before.reduced.by_record[:, -1, -1], np.ones(before.samples.size)
+    old, new, found = before.nuisances, after.nuisances, after
+    for halving in range(HALVINGS + 1):
+        worse = ~(found.reduced.by_record[:, -1, -1] <= WORSE * known + 1.0)
+        if not np.any(worse):
+            break
+        share = np.where(worse, 0.5 * share if halving < HALVINGS else 0.0, share)
+        moved = share[owner]
+        between = old._replace(
+            states=_between(old.states, new.states, moved[:, None]),
+            stiffness=_between(old.stiffness, new.stiffness, share),
+            segments=_between(old.segments, new.segments, moved),
+        )
+        found = simulator.evaluate(before.model, directions, between)
+    return found
+
+
+def _between(old: np.ndarray, new: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Give what lies a share of the way from old to new; what does not move may lead to no number."""
+    return old + np.where(share > 0.0, share * (new - old), 0.0)
+
+
+def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
+    """Give the beginning of each record: the samples that the campaign gives for it, else the first second.
+
+    Args:
+        records: the records.
+
+    Returns:
+        One segment a record.
+    """
+
+    def head(place: int, record: Record) -> Segment:
+        length = record.settle if record.settle >= 8 else round(record.rate)
+        return Segment(place, 0, min(length, record.output.size), 0)
+
+    return tuple(head(place, record) for place, record in enumerate(records))
+
+
+def find_initial_states(problem: Problem, model: Isolator) -> Float[np.ndarray, "state record"]:
+    """Find the state in which each record begins: the one from which the model follows its beginning best.
+
+    Internal states begin at rest.
+
+    Args:
+        problem: the records.
+        model: the isolator.
+
+    Returns:
+        States, one column a record.
+    """
+    simulator = Simulator(problem._replace(segments=head_segments(problem.records), heads=()), at_rest=True)
+    point = best_nuisances(simulator, model, HELD)
+    starts, scales = simulator.starts(model, simulator.prepared(model, len(model.elements)))
+    return (starts + scales * point.nuisances.states.T)[:, : len(problem.records)]

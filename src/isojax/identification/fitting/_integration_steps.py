@@ -1,0 +1,59 @@
+"""The coarsest integration steps that the noise allows, by step doubling."""
+
+import numpy as np
+
+from ...models import Integrator, Isolator
+from ..jacobian import readings
+from ._problem import Problem, Simulator
+
+SHARE_OF_NOISE = 0.05
+"""Integration error allowed, over the noise: adds 0.0025 to chi2/dof at most."""
+
+FINEST = 32
+
+
+def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
+    """Give the rms change of the readings when the steps are halved, over the noise.
+
+    Args:
+        problem: the records; a few of their segments are simulated.
+        model: the isolator.
+        substeps: integration steps a sample before halving.
+
+    Returns:
+        Error over noise; infinite where a simulation ran away.
+    """
+    loudest = max(range(len(problem.records)), key=lambda place: float(np.std(problem.records[place].output)))
+    own = [segment for segment in problem.segments if segment.record == loudest]
+    few = tuple(own[:: max(1, len(own) // 8)][:8])
+    outcomes = []
+    for steps in (substeps, 2 * substeps):
+        # The model's own demand must not hide the difference, so that the steps are set for both runs alike.
+        integrator = Integrator(problem.integrator.solver, max(1, steps))
+        simulator = Simulator(problem._replace(segments=few, integrator=integrator))
+        prepared = simulator.prepared(model, len(model.elements))
+        starts, _ = simulator.starts(model, prepared)
+        outcomes.append(readings(model, np.ones(prepared.record.size), starts, prepared))
+    weight = np.concatenate([np.asarray(batch.weight) for batch in prepared.batches], axis=1)
+    difference = (outcomes[0] - outcomes[1]) * weight
+    if not np.all(np.isfinite(difference)):
+        return float("inf")
+    return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise)
+
+
+def find_integrator(problem: Problem, model: Isolator) -> Problem:
+    """Find the coarsest steps whose error is a small share of the noise.
+
+    Args:
+        problem: the records.
+        model: the isolator; a start will do.
+
+    Returns:
+        The problem with its integrator (the finest that was tried where none suffices) and its step error.
+    """
+    substeps = Integrator().record_steps(model)
+    error = step_error(problem, model, substeps)
+    while substeps < FINEST and error > SHARE_OF_NOISE:
+        substeps *= 2
+        error = step_error(problem, model, substeps)
+    return problem._replace(integrator=Integrator(problem.integrator.solver, substeps), step_error=error)

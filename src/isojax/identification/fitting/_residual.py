@@ -1,0 +1,73 @@
+"""What is left: the residual, its floor, and whether it is white."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy import signal, stats
+
+from ._fit_result import Fit
+
+MOST_LAGS = 25
+
+
+class Residual(NamedTuple):
+    """What a fitted model leaves of its records.
+
+    Attributes:
+        values: measured less simulated of each fitting record, segments restarted [SI unit of the output].
+        noise_floor: rms of the noise [SI unit of the output].
+        whiteness: share of lags within +-25 (0 left out) whose autocorrelation stays in the 99 % band, a
+            record each.
+        lags: the lags [samples].
+        autocorrelation: of each record's residual at the lags.
+        cross_correlation: of each record's residual with the drive at the lags.
+        band: half width of the 99 % band of each record.
+    """
+
+    values: tuple[Float[np.ndarray, " time"], ...]
+    noise_floor: float
+    whiteness: Float[np.ndarray, " record"]
+    lags: Float[np.ndarray, " lag"]
+    autocorrelation: Float[np.ndarray, "record lag"]
+    cross_correlation: Float[np.ndarray, "record lag"]
+    band: Float[np.ndarray, " record"]
+
+
+def _correlate(
+    first: Float[np.ndarray, " time"], second: Float[np.ndarray, " time"]
+) -> Float[np.ndarray, " lag"]:
+    """Give the normalised correlation at lags -25 to 25."""
+    a, b = first - first.mean(), second - second.mean()
+    full = signal.correlate(a, b, mode="full", method="fft")
+    middle = b.size - 1
+    size = np.sqrt(np.sum(a**2) * np.sum(b**2))
+    window = full[middle - MOST_LAGS : middle + MOST_LAGS + 1]
+    return window / size if size > 0.0 else np.zeros_like(window)
+
+
+def residual(fit: Fit) -> Residual:
+    """Give what a fit leaves of its records, every segment restarted from its own best state.
+
+    Args:
+        fit: the fit.
+
+    Returns:
+        The residual of each fitting record, with the correlations by which it is told from white noise.
+
+    Source: Ljung 1999, System Identification, sec. 16.6 (residual tests with a 99 % band).
+    """
+    runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
+    lags = np.arange(-MOST_LAGS, MOST_LAGS + 1, dtype=float)
+    values, own, cross, band, white = [], [], [], [], []
+    for run in runs:
+        left = run.residual[run.counted > 0.0]
+        drive = run.record.input[run.counted > 0.0]
+        values.append(run.residual)
+        own.append(_correlate(left, left))
+        cross.append(_correlate(left, drive))
+        band.append(float(stats.norm.ppf(0.995)) / np.sqrt(left.size))
+        white.append(np.mean(np.abs(np.delete(own[-1], MOST_LAGS)) <= band[-1]))
+    return Residual(
+        tuple(values), fit.noise.sigma, np.array(white), lags, np.array(own), np.array(cross), np.array(band)
+    )

@@ -1,0 +1,21 @@
+"""isojax.identification.guess."""
+
+from ._balance_start import find_balance_start as find_balance_start
+from ._circle_fit import CircleFit as CircleFit
+from ._circle_fit import fit_circle as fit_circle
+from ._classical_guess import ClassicalGuess as ClassicalGuess
+from ._classical_guess import classical_guess as classical_guess
+from ._declared_model import base_model as base_model
+from ._equivalent_coefficients import equivalent_coefficients as equivalent_coefficients
+from ._equivalent_coefficients import invert_equivalent as invert_equivalent
+from ._equivalent_coefficients import normalised_law as normalised_law
+from ._half_power import HalfPower as HalfPower
+from ._half_power import find_half_power as find_half_power
+from ._linear_response import linear_response as linear_response
+from ._motion import Motion as Motion
+from ._motion import is_absolute as is_absolute
+from ._motion import measured_motion as measured_motion
+from ._paper_table import PaperTable as PaperTable
+from ._paper_table import paper_table as paper_table
+from ._read_campaign import read_campaign as read_campaign
+from ._scales import scales as scales

@@ -1,0 +1,99 @@
+"""The model that a campaign declares, before any number is known."""
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...elements import CATALOGUE, AbstractElement
+from ...models import Isolator
+from ...records import Campaign
+from ._scales import scales
+
+
+def _element_class(file: Path, field: str, found: str, suffix: str) -> type[AbstractElement]:
+    """Give the catalogue class of a declared name, short (`cubic`) or in full (`cubic_stiffness`)."""
+    for name in (found + suffix, found):
+        if name in CATALOGUE:
+            return CATALOGUE[name]
+    short = [name.removesuffix(suffix) for name in CATALOGUE if suffix and name.endswith(suffix)]
+    near = difflib.get_close_matches(found, [*short, *CATALOGUE], n=1, cutoff=0.0)[0]
+    raise ValueError(
+        f"Field `{field}` of {file} must name effects of the catalogue, but has {found!r}; nearest: {near!r}."
+    )
+
+
+def catalogue_names(
+    file: Path, stiffness: Sequence[str], damping: Sequence[str], elements: Sequence[str]
+) -> tuple[str, ...]:
+    """List the catalogue names that the [model] of a campaign.toml means.
+
+    Args:
+        file: the campaign.toml.
+        stiffness: springs, short (`cubic`) or in full (`cubic_stiffness`).
+        damping: dampers, likewise.
+        elements: further effects.
+
+    Returns:
+        Their names, as written and in this order.
+
+    Raises:
+        ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
+    """
+    return tuple(
+        _element_class(file, field, found, suffix).name
+        for field, names, suffix in (
+            ("model.stiffness", stiffness, "_stiffness"),
+            ("model.damping", damping, "_damping"),
+            ("model.elements", elements, ""),
+        )
+        for found in names
+    )
+
+
+def declared_names(campaign: Campaign, *, extra: bool = True) -> tuple[str, ...]:
+    """List the catalogue names that a campaign declares.
+
+    Args:
+        campaign: the campaign.
+        extra: whether the further elements of the campaign count, beside springs, dampers and the
+            instruments.
+
+    Returns:
+        Springs, dampers, further elements, then what the instruments leave free; each name once.
+
+    Raises:
+        ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
+    """
+    declared = list(
+        catalogue_names(
+            campaign.file, campaign.stiffness, campaign.damping, campaign.elements if extra else ()
+        )
+    )
+    freed = {
+        "input_gain": campaign.input.gain_free,
+        "input_offset": campaign.input.offset_free,
+        "sensor_offset": campaign.output.offset_free,
+    }
+    declared.extend(name for name, free in freed.items() if free)
+    return tuple(dict.fromkeys(declared))
+
+
+def base_model(campaign: Campaign) -> Isolator:
+    """Give the declared structure with every effect absent.
+
+    Args:
+        campaign: what was declared: mass [kg], names of springs and dampers, free offsets and gain.
+
+    Returns:
+        The isolator: declared mass, every element at zero strength, the excitation that the input quantity
+        implies.
+
+    Raises:
+        ValueError: if a declared name is not in the catalogue.
+    """
+    magnitudes = scales(campaign)
+    return Isolator(
+        campaign.mass,  # pyright: ignore[reportArgumentType]
+        tuple(CATALOGUE[name].guess(magnitudes) for name in declared_names(campaign)),
+        "base_acceleration" if campaign.input.quantity == "base_acceleration" else "force",
+    )

@@ -1,0 +1,121 @@
+"""Whether a set of coefficients is a spring and a damper over the motion that was measured."""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ...elements import AbstractElement
+from ...models import Isolator
+from ._force_balance import BalanceFit, with_strength
+
+
+def _static(model: Isolator) -> Isolator:
+    """Give the model without effects that have a memory."""
+    memoryless = tuple(element for element in model.elements if element.internal_states == 0)
+    return Isolator(model.mass, memoryless, model.excitation)
+
+
+def unphysical_side(model: Isolator, displacement: float, velocity: float, points: int = 41) -> str | None:
+    """Say which side of a model is no spring, or no damper, over the visited range.
+
+    A spring must push back more the farther it is taken, dk/dx > 0; a damper must take energy, (f(x, v) -
+    f(x, 0)) v >= 0. A model without a spring, or without a damper, has nothing to fail there.
+
+    Args:
+        model: the model.
+        displacement: largest displacement visited [m].
+        velocity: largest velocity visited [m/s].
+        points: how many points of each range are looked at.
+
+    Returns:
+        "stiffness", "damping", or None where both are sane.
+    """
+    static = _static(model)
+
+    def force(x: Float[Array, " point"], v: Float[Array, " point"]) -> Float[Array, " point"]:
+        return static.restoring_force((x, v))
+
+    x = jnp.linspace(-displacement, displacement, points)
+    still = jnp.zeros_like(x)
+    _, slope = jax.jvp(lambda place: force(place, still), (x,), (jnp.ones_like(x),))
+    if np.any(np.asarray(slope) != 0) and not np.all(np.asarray(slope) > 0):
+        return "stiffness"
+    for place in (-displacement, 0.0, displacement):
+        v = jnp.linspace(-velocity, velocity, points)
+        here = jnp.full_like(v, place)
+        if not np.all(np.asarray((force(here, v) - force(here, still)) * v) >= 0):
+            return "damping"
+    return None
+
+
+def _degree(unit: AbstractElement, side: str, displacement: float, velocity: float) -> float:
+    """Give the power of the motion with which a force grows on one side; zero where it has no part there."""
+
+    def share(size: float) -> float:
+        still = float(unit.force(jnp.asarray(size * displacement), jnp.asarray(0.0), ()))
+        if side == "stiffness":
+            return still
+        return float(unit.force(jnp.asarray(size * displacement), jnp.asarray(size * velocity), ())) - still
+
+    small, large = share(0.5), share(1.0)
+    return float(np.log2(large / small)) if small * large > 0 else 0.0
+
+
+def steepest(model: Isolator, side: str, displacement: float, velocity: float) -> str | None:
+    """Name the effect on one side whose force grows fastest with the motion.
+
+    Args:
+        model: the model.
+        side: "stiffness" or "damping".
+        displacement: largest displacement visited [m].
+        velocity: largest velocity visited [m/s].
+
+    Returns:
+        Catalogue name of the present effect of highest degree above one, or None where only linear ones are
+        left.
+    """
+    present = [
+        element for element in _static(model).elements if float(getattr(element, element.strength)) != 0
+    ]
+    degrees = {
+        element.name: _degree(with_strength(element, 1.0), side, displacement, velocity)
+        for element in present
+    }
+    name = max(degrees, key=lambda name: degrees[name], default=None)
+    return name if name is not None and degrees[name] > 1.01 else None
+
+
+def fit_physically(
+    fit: Callable[[tuple[str, ...]], BalanceFit], names: tuple[str, ...], displacement: float, velocity: float
+) -> tuple[BalanceFit, tuple[str, ...]]:
+    """Fit, and fit again without the steepest effect of the failing side, until spring and damper are sane.
+
+    Args:
+        fit: regression on given catalogue names.
+        names: catalogue names to begin with.
+        displacement: largest displacement visited [m].
+        velocity: largest velocity visited [m/s].
+
+    Returns:
+        The fit, and a sentence for each effect that was left out.
+    """
+    notes: list[str] = []
+    found = fit(names)
+    while (side := unphysical_side(found.model, displacement, velocity)) is not None:
+        dropped = steepest(found.model, side, displacement, velocity)
+        reason = (
+            "a tangent stiffness that is not positive"
+            if side == "stiffness"
+            else "damping that feeds energy in"
+        )
+        span = f"within {displacement:.3g} m" if side == "stiffness" else f"within {velocity:.3g} m/s"
+        if dropped is None:
+            notes.append(f"The start has {reason} {span}, and no higher term is left to leave out.")
+            break
+        notes.append(f"The regression gave {reason} {span}: {dropped} starts at zero instead.")
+        names = tuple(name for name in names if name != dropped)
+        found = fit(names)
+    return found, tuple(notes)

@@ -1,0 +1,38 @@
+"""A campaign that can be identified: every name in its [model] is in the catalogue."""
+
+from pathlib import Path
+
+from ...elements import CATALOGUE
+from ...records import Campaign, read_declaration
+from ...records import read_campaign as read_records
+from ._declared_model import catalogue_names
+
+
+def read_campaign(path: str | Path) -> Campaign:
+    """Give a measurement campaign, its records in SI units and in the order of the test.
+
+    The whole declaration is checked, the names of [model] against the catalogue included, before the first
+    data file is opened.
+
+    Args:
+        path: the campaign.toml or its folder.
+
+    Returns:
+        The campaign.
+
+    Raises:
+        ValueError: at the first thing that is wrong with the .toml or a data file: which file, which field or
+            row, what was found and what was expected.
+
+    Source: the form of campaign.toml is described in docs/campaign.md.
+    """
+    declared = read_declaration(path)
+    model = declared.sections["model"]
+    names = catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"])
+    for name in names:
+        if "floor" in CATALOGUE[name].channels and declared.sections["floor"] is None:
+            raise ValueError(
+                f"{declared.file}: [model] names `{name}`, which follows the measured motion of the "
+                "floor, but section [floor], which says where that was measured, is missing"
+            )
+    return read_records(path)

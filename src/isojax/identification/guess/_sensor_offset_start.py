@@ -1,0 +1,64 @@
+"""Start of the sensor's zero error."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ...models import Isolator
+from ...records import Campaign
+from ._force_balance import with_strength
+
+
+def output_mean(campaign: Campaign) -> float:
+    """Give the mean reading over the records to fit [SI unit of the output].
+
+    Args:
+        campaign: the campaign.
+
+    Returns:
+        The mean, each record counting by its length.
+    """
+    return float(np.mean(np.concatenate([record.output for record in campaign.fit_records])))
+
+
+def with_sensor_zero(campaign: Campaign, model: Isolator) -> Isolator:
+    """Give the model with a start for the sensor's offset, where that is declared free.
+
+    An acceleration or a velocity has no mean of its own, so that of the reading is the offset. A displacement
+    may have
+    one: what the mean force does to the spring is taken off, unless the offset of the force is free as well
+        and has
+    taken it up. Without a spring any place is as good as another and the offset starts at zero.
+
+    Args:
+        campaign: the campaign.
+        model: the model with its coefficients found.
+
+    Returns:
+        The model; as it was where the sensor's offset is not free.
+    """
+    if not campaign.output.offset_free:
+        return model
+    offset = output_mean(campaign)
+    if campaign.output.quantity == "displacement":
+        still = jnp.asarray(0.0)
+        _, slope = jax.jvp(
+            lambda x: model.restoring_force((x, still, *(still,) * model.internal_states)),
+            (still,),
+            (jnp.asarray(1.0),),
+        )
+        spring = float(slope)
+        if not spring > 0:
+            return model
+        if not campaign.input.offset_free:
+            sign = -float(model.mass) if model.excitation == "base_acceleration" else 1.0
+            force = sign * np.mean(np.concatenate([record.input for record in campaign.fit_records]))
+            offset -= float(force) / spring
+    return Isolator(
+        model.mass,
+        tuple(
+            with_strength(element, offset) if element.name == "sensor_offset" else element
+            for element in model.elements
+        ),
+        model.excitation,
+    )

@@ -1,0 +1,103 @@
+"""Coefficients to start from, by what kind of records there are."""
+
+import dataclasses
+
+import numpy as np
+
+from ...models import Isolator
+from ...records import Campaign, Record
+from ._decay_cycles import start_from_decays
+from ._dwell_balance import dwell_motion, fit_all_dwells
+from ._force_balance import BalanceFit
+from ._linear_response import LinearResponse, linear_response
+from ._logarithmic_decrement import Decrement, about_rest, logarithmic_decrement
+from ._measured_receptance import MeasuredResponse
+from ._motion import measured_motion
+from ._physical_fit import fit_physically
+from ._restoring_force import fit_restoring_force
+from ._scales import excited_centre
+from ._sensor_offset_start import output_mean
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TimeStart:
+    """What records without dwells say.
+
+    Attributes:
+        fit: coefficients from the force balance.
+        linear: best linear receptance of each driven record.
+        decrements: logarithmic decrement of each free decay, by record name.
+        notes: what the reader must know, a sentence each.
+    """
+
+    fit: BalanceFit
+    linear: tuple[LinearResponse, ...]
+    decrements: dict[str, Decrement]
+    notes: tuple[str, ...]
+
+
+def start_from_dwells(
+    base: Isolator, names: tuple[str, ...], responses: tuple[MeasuredResponse, ...], mass_free: bool
+) -> tuple[BalanceFit, tuple[str, ...]]:
+    """Start from the harmonic balance of every dwell.
+
+    Args:
+        base: the declared structure.
+        names: catalogue names of the elements to fit.
+        responses: measured harmonics of the records.
+        mass_free: whether the mass is unknown too.
+
+    Returns:
+        The fit and its notes.
+    """
+    motion = dwell_motion(base, responses)
+    highest, fastest = (float(np.max(np.abs(s))) for s in (motion.displacement, motion.velocity))
+    return fit_physically(
+        lambda chosen: fit_all_dwells(base, chosen, responses, mass_free=mass_free), names, highest, fastest
+    )
+
+
+def start_from_time(
+    campaign: Campaign, base: Isolator, names: tuple[str, ...], records: tuple[Record, ...], mass_free: bool
+) -> TimeStart:
+    """Start from records without dwells: from the force balance in time, or the swings of free decays alone.
+
+    Args:
+        campaign: says what the channels measure.
+        base: the declared structure.
+        names: catalogue names of the elements to fit.
+        records: broadband, periodic, swept or freely decaying records.
+        mass_free: whether the mass is unknown too.
+
+    Returns:
+        The fit, linear receptances, decrements, notes.
+    """
+    origin = output_mean(campaign) if campaign.output.offset_free else 0.0
+    motions = tuple(measured_motion(campaign, record, origin) for record in records)
+    pairs = list(zip(records, motions, strict=True))
+    centres = tuple(excited_centre(record, motion) / (2 * np.pi) for record, motion in pairs)
+    offset_free = campaign.input.offset_free or campaign.output.offset_free
+    highest = max(float(np.max(np.abs(motion.displacement[motion.trusted]))) for motion in motions)
+    fastest = max(float(np.max(np.abs(motion.velocity[motion.trusted]))) for motion in motions)
+    released = all(record.rings_down for record in records)
+    by_swings = start_from_decays(campaign, base, names, records) if released else None
+    fit, notes = by_swings or fit_physically(
+        lambda chosen: fit_restoring_force(
+            base, chosen, motions, centres, campaign.rate, campaign.output.quantity, offset_free, mass_free
+        ),
+        names,
+        highest,
+        fastest,
+    )
+    factor = -float(base.mass) if base.excitation == "base_acceleration" else 1.0
+    linear = tuple(
+        linear_response(record.name, motion, factor * motion.drive, record.rate, record.period)
+        for record, motion in pairs
+        if record.kind != "free_decay" and np.any(motion.drive)
+    )
+    decrements = {
+        record.name: logarithmic_decrement(about_rest(record.output), record.rate)
+        for record in records
+        if record.rings_down
+    }
+    return TimeStart(fit, linear, decrements, notes)

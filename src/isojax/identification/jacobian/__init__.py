@@ -1,0 +1,24 @@
+"""isojax.identification.jacobian."""
+
+from ._batch import Prepared as Prepared
+from ._batch import coordinate_motion as coordinate_motion
+from ._batch import drive_table as drive_table
+from ._batch import prepare as prepare
+from ._batch import workers as workers
+from ._channels import carries as carries
+from ._channels import channel_table as channel_table
+from ._channels import effects_without_signal as effects_without_signal
+from ._families import follow_motion as follow_motion
+from ._information import STIFFNESS_SCALE_UNIT as STIFFNESS_SCALE_UNIT
+from ._information import Unknowns as Unknowns
+from ._information import has_stiffness_scale as has_stiffness_scale
+from ._information import information as information
+from ._information import readings as readings
+from ._information import scaled_model as scaled_model
+from ._internal_states import internal_starts as internal_starts
+from ._score_columns import score_information as score_information
+from ._segments import Segment as Segment
+from ._segments import cut_evenly as cut_evenly
+from ._segments import cut_segments as cut_segments
+from ._segments import segments_between as segments_between
+from ._segments import slowest_decay as slowest_decay

@@ -1,0 +1,271 @@
+"""Many columns at once: how readings answer small forces, from one simulation and one linear solve.
+
+The derivatives of `information` cost a full step of the model a column. For dozens of absent effects the
+motion is simulated once; what each effect would add is worked out along it, all samples at once; and one
+linear, time-varying solve, which knows nothing of the effects, carries all columns. Compiled code depends on
+the model, on the kind of an effect, or on neither, and never on which effects ride along with which model.
+"""
+
+import itertools
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..._parameters import list_parameters, own_parameters
+from ...models import Isolator, State
+from ._batch import Batch, Prepared, workers
+from ._effect_inputs import input_columns
+from ._families import ElementFamily, find_families, in_turn, stack_states
+from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, share_lanes
+from ._propagation import propagate, respond
+from ._slopes import Change, Slopes, follow_path, impulse_at_samples, slopes_along
+from ._transitions import Transitions, transitions_along
+
+_ENTRIES = 2e7
+"""Numbers that one table of columns along the motion may hold."""
+
+_ROOM = 120
+"""Columns for which a table has room at least: few columns then share the compiled code of many."""
+
+_TOGETHER = 24
+"""Columns that one linear solve carries: the last one is filled up, so that all have one shape."""
+
+
+class _Layout(NamedTuple):
+    """Which columns there are.
+
+    Attributes:
+        model: the carried elements alone.
+        families: the absent effects, kind by kind.
+        probes: the absent effects.
+        moving: parameters of the model with a column.
+        units: size of one unit of each column but those of the states.
+        places: column of each of `moving`, of each probe (-1 without one).
+    """
+
+    model: Isolator
+    families: tuple[ElementFamily, ...]
+    probes: tuple[Any, ...]
+    moving: tuple[int, ...]
+    units: tuple[float, ...]
+    places: tuple[tuple[int, ...], tuple[int, ...]]
+
+
+def _layout(unknowns: Unknowns, carried: int) -> _Layout:
+    whole = unknowns.model
+    model = Isolator(whole.mass, whole.elements[:carried], whole.excitation)
+    probes = whole.elements[carried:]
+    places = [int(np.flatnonzero(column)[0]) for column in unknowns.directions.T]
+    units = [float(unknowns.directions[place, index]) for index, place in enumerate(places)]
+    known = len(list_parameters(model))
+    owner = np.repeat(np.arange(len(probes)), [len(own_parameters(probe)) for probe in probes])
+    of_probe = [-1] * len(probes)
+    for column, place in enumerate(places):
+        if place >= known:
+            of_probe[owner[place - known]] = column
+    own = [column for column, place in enumerate(places) if place < known]
+    moving = tuple(places[column] for column in own)
+    return _Layout(model, find_families(probes), probes, moving, tuple(units), (tuple(own), tuple(of_probe)))
+
+
+def score_information(
+    unknowns: Unknowns, carried: int, prepared: Prepared
+) -> Float[np.ndarray, "lanes column column"]:
+    """Give the information matrix of each segment, absent effects among the columns.
+
+    The columns are those of `information`; each direction must move one parameter alone. Elements beyond the
+    carried ones are at zero strength: their memories follow the motion and do not act back, so that only
+    their strengths have columns and only the carried states have initial values to eliminate.
+
+    Args:
+        unknowns: where the simulation stands and its directions.
+        carried: count of elements that move the state.
+        prepared: the segments.
+
+    Returns:
+        A^T A of each lane, lanes first.
+    """
+    parts = len(prepared.batches)
+    layout = _layout(unknowns, carried)
+    size = 2 + layout.model.internal_states
+    columns = len(layout.units) + int(has_stiffness_scale(unknowns.model)) + size + 1
+
+    def one(part: int) -> np.ndarray:
+        batch = prepared.batches[part].following(unknowns.model)
+        scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
+        states = share_lanes(unknowns.states, part, parts)
+        scales = share_lanes(unknowns.state_scales[:size], part, parts)
+        lanes = scale.shape[0]
+        # A table of all columns along all lanes may not fit the memory: a few lanes at a time.
+        blocks = -(-lanes // max(1, int(_ENTRIES / (batch.drive.shape[0] * max(columns, _ROOM)))))
+        width = -(-lanes // blocks)
+        done = []
+        for first in range(0, lanes, width):
+            # All of them are not picked one by one, which would copy them and take a tenth of it all.
+            chosen = slice(None) if blocks == 1 else np.minimum(np.arange(first, first + width), lanes - 1)
+            some = jax.tree_util.tree_map(
+                lambda values, chosen=chosen: values[..., chosen], (batch, scale, states, scales)
+            )
+            done.append(_block(layout, prepared, columns, part, *some)[: lanes - first])
+        return np.concatenate(done)
+
+    with ThreadPoolExecutor(workers()) as pool:
+        return np.concatenate(list(pool.map(one, range(parts))))
+
+
+def _block(
+    layout: _Layout,
+    prepared: Prepared,
+    columns: int,
+    part: int,
+    batch: Batch,
+    scale: Array,
+    states: State,
+    scales: State,
+) -> Float[np.ndarray, "lanes column column"]:
+    """Work out the columns of a few lanes, and multiply them out."""
+    model, size = layout.model, 2 + layout.model.internal_states
+    own = batch.following(model)
+    path, ringing = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
+    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, prepared.quantity)
+    lanes, time, step = scale.shape[0], batch.measured.shape[0], prepared.sample_time
+    table = np.empty((lanes, columns, time))
+    weight = np.asarray(batch.weight)
+    error = (np.asarray(batch.measured) - np.asarray(slopes.reading)) * weight
+    table[:, -1] = error.T
+
+    exact = None
+    if model.splits:
+        tables = own.drive, own.drive_rate, own.channels
+        exact = transitions_along(model, layout.moving, scale, path, tables, prepared.quantity, step)
+    group = _Group(slopes.states, exact, batch.weight, step)
+    for source in _sources(layout, prepared, batch, slopes, exact, states[size:], columns, part):
+        group.add(*source)
+        if group.is_full:
+            group.solve(table)
+    for index in range(size):
+        group.start(columns - 1 - size + index, index, np.asarray(scales[index]))
+        if group.is_full:
+            group.solve(table)
+    group.solve(table)
+    # A probe whose memory ran away is told by its infinite products.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return table @ np.swapaxes(table, 1, 2)
+
+
+def _sources(
+    layout: _Layout,
+    prepared: Prepared,
+    batch: Batch,
+    slopes: Slopes,
+    exact: Transitions | None,
+    memories: State,
+    columns: int,
+    part: int,
+) -> Iterator[tuple[int, np.ndarray | float, np.ndarray, np.ndarray | float]]:
+    """Give each coefficient's column, change of the rates (row time lanes), of the reading (time lanes).
+
+    Last comes what it adds over each sample (row time lanes), in place of the change of the rates, where
+    the model's laws jump.
+    """
+    size = 2 + layout.model.internal_states
+
+    def ready(unit: float, change: Change) -> tuple[np.ndarray, np.ndarray]:
+        forcing = unit * np.stack([np.asarray(row) for row in change.rates])
+        return forcing, unit * np.asarray(change.reading)
+
+    def own(unit: float, change: Change, place: int) -> tuple:
+        forcing, direct = ready(unit, change)
+        if exact is None:
+            return forcing, direct, 0.0
+        added = exact.scale if place < 0 else exact.parameters[:, place]
+        return 0.0, direct, unit * np.asarray(added)
+
+    for place, (column, change) in enumerate(zip(layout.places[0], slopes.parameters, strict=True)):
+        yield column, *own(layout.units[column], change, place)
+    scaled = columns - 1 - size
+    if scaled > len(layout.units):
+        change = slopes.states[0] if slopes.scale is None else slopes.scale
+        # A model without a spring has no stiffness to scale, whatever a probe would bring.
+        unit = 0.0 if slopes.scale is None else STIFFNESS_SCALE_UNIT
+        yield scaled - 1, *own(unit, change, -1)
+    step = prepared.sample_time
+    starts = stack_states(layout.families, layout.probes, memories)
+    inputs = {name: ready(1.0, change) for name, change in slopes.inputs.items()}
+    ends = np.cumsum([0, *(family.elements.internal_states for family in layout.families)])
+    shares = dict(zip((family.places for family in layout.families), itertools.pairwise(ends), strict=True))
+    for family in in_turn(layout.families, part):
+        begin, end = shares[family.places]
+        own_channels = {name: batch.channels[name] for name in family.elements.channels}
+        pushing = {name: impulse_at_samples(values) for name, values in own_channels.items()}
+        added = input_columns(family, slopes.motion._replace(channels=pushing), starts[begin:end], step)
+        read = added
+        if own_channels:
+            # A reading is that of the sample itself, at whose beginning every hold agrees with the record.
+            reading = {name: values[:, 0] for name, values in own_channels.items()}
+            seen = slopes.motion._replace(channels=reading)
+            read = input_columns(family, seen, starts[begin:end], step)
+        does = [(np.asarray(added[name]), np.asarray(read[name]), inputs[name]) for name in added]
+        for member, probe in enumerate(family.places):
+            column = layout.places[1][probe]
+            if column >= 0:
+                unit = layout.units[column]
+                # A memory that ran away is told by its products, which are not finite.
+                with np.errstate(over="ignore", invalid="ignore"):
+                    forcing = sum(unit * values[member] * rates for values, _, (rates, _) in does)
+                    direct = sum(unit * values[member] * reading for _, values, (_, reading) in does)
+                yield column, np.asarray(forcing), np.asarray(direct), 0.0
+
+
+class _Group:
+    """Columns that wait for one linear solve."""
+
+    def __init__(self, by_state: tuple[Change, ...], exact: Transitions | None, weight: Array, step: float):
+        self.weight = weight
+        self.propagation = propagate(by_state, step) if exact is None else exact.propagation
+        self.readings = tuple(entry.reading for entry in by_state)
+        size, (time, lanes) = len(by_state), weight.shape
+        self.forcing = np.zeros((size - 1, time, _TOGETHER, lanes))
+        self.kicks = None if exact is None else np.zeros((size + 2, time, _TOGETHER, lanes))
+        self.direct = np.zeros((time, _TOGETHER, lanes))
+        self.starts = np.zeros((size, _TOGETHER, lanes))
+        self.columns: list[int] = []
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no more columns fit."""
+        return len(self.columns) == _TOGETHER
+
+    def add(
+        self,
+        column: int,
+        forcing: np.ndarray | float,
+        direct: np.ndarray | float,
+        kick: np.ndarray | float = 0.0,
+    ) -> None:
+        """Put a column that is pushed along the motion."""
+        place = len(self.columns)
+        self.forcing[:, :, place], self.direct[:, place], self.starts[:, place] = forcing, direct, 0.0
+        if self.kicks is not None:
+            self.kicks[:, :, place] = kick
+        self.columns.append(column)
+
+    def start(self, column: int, state: int, size: np.ndarray) -> None:
+        """Put a column that starts elsewhere."""
+        self.add(column, 0.0, 0.0)
+        self.starts[state, len(self.columns) - 1] = size
+
+    def solve(self, table: np.ndarray) -> None:
+        """Solve, and put what the readings do into the table."""
+        if self.columns:
+            forcing, direct, starts = map(jnp.asarray, (self.forcing, self.direct, self.starts))
+            kicks = None if self.kicks is None else jnp.asarray(self.kicks)
+            rows = respond(self.propagation, self.readings, forcing, kicks, direct, starts, self.weight)
+            # Turned here, and not in compiled code, which takes four times as long.
+            table[:, self.columns] = np.asarray(rows).transpose(2, 1, 0)[:, : len(self.columns)]
+        self.columns = []

@@ -1,0 +1,145 @@
+"""What one integration step makes of small changes, exactly, where records are split at events.
+
+A law that jumps has no slope along the path: a small change of the velocity before a reversal is another
+after it. The derivative of the split step itself knows by how much.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..._parameters import list_parameters
+from ...models import Isolator, Quantity, State, Table, find_ringing, split_step
+from ._information import scaled_model
+from ._propagation import Matrix, Propagation, product
+from ._slopes import steps_of
+
+
+class Transitions(NamedTuple):
+    """What each sample adds to the state at its end, then to the readings at its beginning and its end.
+
+    Attributes:
+        propagation: for a unit of each state at its beginning, and for rates that push.
+        parameters: for a unit of each parameter that moves.
+        scale: for a unit of the stiffness scale.
+    """
+
+    propagation: Propagation
+    parameters: Float[Array, "row parameter time lanes"]
+    scale: Float[Array, "row time lanes"]
+
+
+@eqx.filter_jit
+def transitions_along(
+    model: Isolator,
+    moving: tuple[int, ...],
+    scale: Float[Array, " lanes"],
+    path: State,
+    tables: tuple[Array, Array, dict[str, Array]],
+    quantity: Quantity,
+    sample_time: float,
+) -> Transitions:
+    """Differentiate each split step along a path.
+
+    Args:
+        model: the isolator.
+        moving: its parameters that move.
+        scale: factor on the linear stiffness, a lane each.
+        path: states at the beginnings of the steps.
+        tables: drive, its rate and channels at the stages of each sample.
+        quantity: what the sensor measures.
+        sample_time: time between samples [s].
+
+    Returns:
+        The derivatives.
+    """
+    values = tuple(entry.value for entry in list_parameters(model))
+    size, like = len(path), path[0]
+    scale = jnp.broadcast_to(scale, like.shape)
+    time = tables[0].shape[0]
+    steps = like.shape[0] // time
+    step_of_sample = jnp.tile(jnp.arange(steps), time)[:, None]
+    step_time = sample_time / steps
+    tables = jax.tree_util.tree_map(steps_of, tables)
+    drive, rate = (tuple(table[:, stage] for stage in range(3)) for table in tables[:2])
+    channels = tuple({name: table[:, stage] for name, table in tables[2].items()} for stage in range(3))
+
+    def step(moved: tuple[Array, ...], scale: Array, state: State, push: Array) -> Array:
+        numbers = list(values)
+        for place, number in zip(moving, moved, strict=True):
+            numbers[place] = number
+        current = scaled_model(model, numbers, scale)
+        late = current.shift() - jax.lax.stop_gradient(current.shift())
+        u = tuple(value - late * slope for value, slope in zip(drive, rate, strict=True))
+        pushes = tuple(
+            (jnp.zeros_like(like), *(push[stage, row] + 0.0 * like for row in range(size - 1)))
+            for stage in range(3)
+        )
+        at = Table(u, rate, channels, pushes)
+        ahead, jump = split_step(current, quantity, step_time, state, at)
+        return jnp.stack([*ahead, *find_ringing(jump, step_of_sample, steps)])
+
+    known = tuple(values[place] for place in moving)
+    nothing = (
+        tuple(jnp.zeros(()) for _ in moving),
+        jnp.zeros_like(scale),
+        tuple(jnp.zeros_like(state) for state in path),
+        jnp.zeros((3, size - 1)),
+    )
+    seeds = []
+    for place in range(size):
+        seeds.append((*nothing[:2], tuple(s + (i == place) for i, s in enumerate(nothing[2])), nothing[3]))
+    for stage in range(3):
+        seeds += [(*nothing[:3], nothing[3].at[stage, row].set(1.0)) for row in range(size - 1)]
+    for place in range(len(moving)):
+        seeds.append((tuple(s + (i == place) for i, s in enumerate(nothing[0])), *nothing[1:]))
+    seeds.append((nothing[0], jnp.ones_like(scale), *nothing[2:]))
+
+    def along(seed: tuple) -> Array:
+        return jax.jvp(step, (known, scale, path, nothing[3]), seed)[1]
+
+    # One derivative after the other: side by side they would hold as many copies of the path.
+    found = jnp.moveaxis(jax.lax.map(along, jax.tree_util.tree_map(lambda *s: jnp.stack(s), *seeds)), 0, 1)
+    found = found.reshape(size + 2, len(seeds), -1, steps, like.shape[1])
+    return _over_samples([found[:, :, :, step] for step in range(steps)], size)
+
+
+def _over_samples(each: list[Array], size: int) -> Transitions:
+    """Join the steps of a sample; what pushes follows a parabola through its beginning, middle and end.
+
+    Rows of states go on from step to step, those of readings add up.
+    """
+    steps, pushes_end = len(each), size + 3 * (size - 1)
+    rows = range(size + 2)
+    nothing = jnp.zeros_like(each[0][0, 0])
+    forward = [[nothing + float(row == column) for column in range(size)] for row in rows]
+    pushed = [[[nothing for _ in range(size)] for _ in rows] for _ in range(3)]
+    rest = jnp.zeros_like(each[0][:, pushes_end:])
+
+    def joined(onward: Matrix, so_far: Matrix) -> Matrix:
+        moved = product(onward, so_far[:size])
+        read = [
+            [old + new for old, new in zip(*both, strict=True)]
+            for both in zip(so_far[size:], moved[size:], strict=True)
+        ]
+        return [*moved[:size], *read]
+
+    for step, found in enumerate(each):
+        onward = [[found[row, column] for column in range(size)] for row in rows]
+        forward = joined(onward, forward)
+        pushed = [joined(onward, one) for one in pushed]
+        carried = jnp.stack([sum(onward[row][k][None] * rest[k] for k in range(size)) for row in rows])
+        rest = carried.at[size:].add(rest[size:]) + found[:, pushes_end:]
+        for stage in range(3):
+            at = (step + 0.5 * stage) / steps
+            # Lagrange's parabolas through 0, 1/2 and 1.
+            shares = (2.0 * at - 1.0) * (at - 1.0), 4.0 * at * (1.0 - at), at * (2.0 * at - 1.0)
+            for place, share in enumerate(shares):
+                for row in rows:
+                    for column in range(1, size):
+                        own = found[row, size + stage * (size - 1) + column - 1]
+                        pushed[place][row][column] = pushed[place][row][column] + share * own
+    return Transitions(Propagation(forward, *pushed), rest[:, :-1], rest[:, -1])

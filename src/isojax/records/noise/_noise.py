@@ -1,0 +1,265 @@
+"""The noise of the output channel: the rms per sample that the residual of a perfect model would have."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.stats
+from jaxtyping import Float
+
+from .._blow import ring_down
+from .._campaign import Campaign
+from .._record import Dwell, Record
+from ..spectrum import NoiseBand, dwell_rest, dwell_window, hum_lines, spectral_floor
+from ._repeats import repeat_difference, repeat_groups
+
+NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency"]
+_QUANTILE = 0.25
+_UNSETTLED = 1e-3
+"""Chance of a settled dwell to scatter as much as one that does not count."""
+
+_FLOORS = ((0.35, 0.5), (0.5, 0.65), (0.65, 0.8), (0.8, 0.95))
+"""Parts of the band whose floors are compared."""
+
+_AGREE = 3.0
+"""Standard errors within which two floors are one."""
+
+
+@dataclass(frozen=True)
+class NoiseEstimate:
+    """rms noise of the output channel [its SI unit].
+
+    Attributes:
+        sigma: Pooled over the records; of the samples as the campaign holds them, filtered where it filters.
+        method: How it was found; where records differ, the method of most of them.
+        per_record: One value per record, in the campaign's order.
+        methods: The method of each record.
+        bandwidth_hz: Frequency up to which the noise reaches [Hz]: half the rate, or the [filter]'s cut-off.
+        note: What to keep in mind, or "".
+        share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
+            independent.
+    """
+
+    sigma: float
+    method: NoiseMethod
+    per_record: tuple[float, ...]
+    methods: tuple[NoiseMethod, ...]
+    bandwidth_hz: float
+    note: str = ""
+    share: float = 1.0
+
+    @property
+    def white(self) -> float:
+        """White noise of the density that this noise has inside its band, its rms: sigma / sqrt(share).
+
+        It is this, not the smaller rms of what a filter left, that a coefficient is uncertain by: the motion
+        lies inside the band, where a filter has taken nothing off the noise.
+        """
+        return self.sigma / float(np.sqrt(self.share))
+
+
+def estimate_noise(campaign: Campaign) -> NoiseEstimate:
+    """Gives the output noise of a campaign.
+
+    Per record, the first that applies: the declared one (of the column as the file holds it); the scatter
+    about the harmonics of settled dwells; the scatter between periods; the difference of repeats at equal
+    level and direction, where it is not explained by the records themselves; the floor of the spectrum above
+    the excited band. The last alone counts where the building's floor was measured: the scatter that it makes
+    is for a model to explain. Forces and stiffness that change from repeat to repeat move harmonics, not the
+    scatter about them, so stepped sines never need the repeats.
+
+    Args:
+        campaign: The campaign.
+
+    Returns:
+        The estimate.
+    """
+    band, note = NoiseBand(campaign.rate, campaign.filter), ""
+    if campaign.filter is not None:
+        note = (
+            f"the noise is band limited by the {campaign.filter.kind} filter at {band.highest:g} Hz: "
+            f"its samples are correlated, and {100.0 * band.share:.2g} % of them count as independent"
+        )
+    records = campaign.records
+    if campaign.output.noise is not None:
+        declared = float(campaign.output.noise)
+        declared *= float(np.sqrt(band.share / band.as_filed.share))
+        methods: tuple[NoiseMethod, ...] = ("declared",) * len(records)
+        each = (declared,) * len(records)
+        return NoiseEstimate(declared, "declared", each, methods, band.highest, note, band.share)
+    found = _estimate_each(records, band)
+    seen: list[NoiseMethod] = [
+        method for value, method in found if np.isfinite(value) and method != "high_frequency"
+    ]
+    common: NoiseMethod = max(dict.fromkeys(seen), key=seen.count) if seen else "high_frequency"
+    sigma = _pool([value for value, method in found if method == common and np.isfinite(value)])
+    # it is one channel: a floor is a makeshift where other records show the noise itself
+    kept = [np.isfinite(value) and method in (*seen, common) for value, method in found]
+    return NoiseEstimate(
+        sigma=sigma,
+        method=common,
+        per_record=tuple(value if keep else sigma for (value, _), keep in zip(found, kept, strict=True)),
+        methods=tuple(method if keep else common for (_, method), keep in zip(found, kept, strict=True)),
+        bandwidth_hz=band.highest,
+        note=note,
+        share=band.share,
+    )
+
+
+def _estimate_each(records: tuple[Record, ...], band: NoiseBand) -> list[tuple[float, NoiseMethod]]:
+    partners = repeat_groups(records)
+    found = []
+    for record in records:
+        group = [one for one in partners.get(record.name, ()) if one.kind != "stepped_sine"]
+        tries: list[tuple[NoiseMethod, Callable[[], float]]] = [
+            ("cycle_scatter", lambda record=record: cycle_scatter(record, band)),
+            ("periods", lambda record=record: period_scatter(record)),
+            ("repeats", lambda record=record, group=group: _repeat_scatter(record, group, band)),
+        ]
+        if record.floor is not None:
+            # what a measured floor does from cycle to cycle scatters, but a model can explain it: no noise
+            tries = []
+        for method, estimate in tries:
+            value = estimate()
+            if np.isfinite(value):
+                found.append((value, method))
+                break
+        else:
+            found.append((high_frequency_floor(record, band), "high_frequency"))
+    return found
+
+
+def cycle_scatter(record: Record, band: NoiseBand) -> float:
+    """Gives the rms about the harmonics of the last quarter of each dwell, at least four cycles; NaN if none
+    is long.
+
+    As many harmonics are taken as half the rate holds, up to 120, and the fundamental may drift linearly:
+    they stand above the noise beyond a filter's cut-off, too. Lines of the mains that stand out of the record
+    are no noise either: a model can explain them. Dwells that never settle, near a fold or in modulation, do
+    not count: beyond the chance of one in a thousand, by chi-square, from the level that the lower quartile
+    of the dwells shows.
+
+    Args:
+        record: The record.
+        band: The band that the noise fills.
+
+    Returns:
+        rms per sample in the output's unit.
+    """
+    found = [dwell_scatter(record, dwell, band) for dwell in record.dwells]
+    scatters = np.array([one for one in found if one is not None]).reshape(-1, 2)
+    if not scatters.size:
+        return float("nan")
+    squares, freedom = scatters.T
+    quantile = _QUANTILE if squares.size >= 4 else 0.5
+    level = np.quantile(squares * freedom / scipy.stats.chi2.ppf(quantile, freedom), quantile)
+    for _ in range(3):
+        settled = squares * freedom <= level * scipy.stats.chi2.isf(_UNSETTLED, freedom)
+        level = np.average(squares[settled], weights=freedom[settled]) if np.any(settled) else level
+    return float(np.sqrt(level))
+
+
+def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float, float] | None:
+    """Gives mean square about the harmonics of a dwell's end and its degrees of freedom; None if it is too
+    short.
+    """
+    window = dwell_window(record, dwell)
+    if window is None:
+        return None
+    lines = tuple(line.frequency for line in hum_lines(record))
+    rest, frequencies = dwell_rest(record, dwell, window, lines)
+    taken = float(np.sum(band.power_gain(frequencies)))
+    # noise of a narrow band has fewer degrees of freedom than samples; the harmonics take theirs from them
+    freedom = window * band.share - taken
+    if freedom < taken:
+        return None
+    return float(rest @ rest) * band.share / freedom, float(freedom)
+
+
+def period_scatter(record: Record) -> float:
+    """Gives the rms of what does not repeat from period to period after the settle samples; NaN without two
+    periods.
+
+    Only whole periods count, taken from the end. With three and more the first ones are left out as long as
+    they scatter clearly more than the rest (a transient).
+    """
+    if record.period is None:
+        return float("nan")
+    count = (record.output.size - record.settle) // record.period
+    if count < 2:
+        return float("nan")
+    periods = record.output[record.output.size - count * record.period :].reshape(count, record.period)
+    squares = [_between(periods[first:]) for first in range(max(1, count - 1))]
+    chosen = squares[-1]
+    for square in reversed(squares):
+        chosen = square if square < 1.2 * chosen else chosen
+    return float(np.sqrt(chosen))
+
+
+def high_frequency_floor(record: Record, band: NoiseBand) -> float:
+    """Gives the rms of noise that has the density of the spectrum's quietest upper part.
+
+    The quietest of four parts alone would be low by the luck of the draw. Those that agree with it are
+    therefore taken together; where the response fills the lower ones, the quietest stands alone, and no
+    choice between equals has been made. Of a record that rings down only what follows the release or the
+    blow counts: its own spectrum has no upper end.
+
+    Args:
+        record: The record.
+        band: The band that the noise fills.
+
+    Returns:
+        rms per sample in the output's unit.
+    """
+    output = ring_down(record)
+    spans = [(low * band.highest, high * band.highest) for low, high in _FLOORS]
+    found = [(*spectral_floor(output, band, span), span) for span in spans]
+    known = sorted(one for one in found if np.isfinite(one[0]))
+    if not known:  # a short record has too few lines for narrow parts
+        density, _ = spectral_floor(output, band, (0.4 * band.highest, 0.95 * band.highest))
+    else:
+        density, error, quietest = known[0]
+        alike = [quietest]
+        for level, own, span in known[1:]:
+            if level <= density * (1.0 + _AGREE * np.hypot(own, error)):
+                alike.append(span)
+                density, error = spectral_floor(output, band, *alike)
+    return _rms(density, band)
+
+
+def _rms(density: float, band: NoiseBand) -> float:
+    """Gives the rms per sample of noise whose white density [per Hz] is known."""
+    return float(np.sqrt(density * band.share * 0.5 * band.rate))
+
+
+def _between(periods: Float[np.ndarray, "period time"]) -> float:
+    rest = periods - np.mean(periods, axis=0)
+    return float(np.mean(rest**2)) * periods.shape[0] / (periods.shape[0] - 1)
+
+
+def _repeat_scatter(record: Record, group: list[Record], band: NoiseBand) -> float:
+    """Gives the rms noise of a record from the unexplained difference to its repeats; NaN without any.
+
+    The median over the band counts: lines that a drift still moves are the minority.
+    """
+    squares = []
+    for other in group:
+        difference = repeat_difference(record, other)
+        if difference is not None:
+            density, _ = spectral_floor(difference, band, (0.0, 0.95 * band.highest))
+            squares.append(0.5 * _rms(density, band) ** 2)
+    known = [one for one in squares if np.isfinite(one)]
+    return float(np.sqrt(np.mean(known))) if known else float("nan")
+
+
+def _pool(values: list[float]) -> float:
+    """Gives the rms of the records' values; above five records, of the inner half: one bad record does not
+    count.
+    """
+    if not values:
+        return float("nan")
+    ordered = np.sort(values)
+    if ordered.size >= 6:
+        ordered = ordered[ordered.size // 4 : ordered.size - ordered.size // 4]
+    return float(np.sqrt(np.mean(ordered**2)))

@@ -1,0 +1,59 @@
+"""Records that repeat each other, at equal level and direction; what of their difference is unexplained."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.signal
+from jaxtyping import Float
+
+from .._record import Record
+
+_SHIFTS = 6
+
+
+def repeat_groups(records: Sequence[Record]) -> dict[str, tuple[Record, ...]]:
+    """Gives for each record, by name, the others at its level and direction: its repeats."""
+    return {
+        one.name: tuple(
+            other
+            for other in records
+            if other is not one
+            and one.level is not None
+            and (other.level, other.direction, other.kind) == (one.level, one.direction, one.kind)
+        )
+        for one in records
+    }
+
+
+def repeat_difference(one: Record, other: Record) -> Float[np.ndarray, " time"] | None:
+    """Gives output(one) - output(other), aligned by the inputs, less what the inputs and a drift explain.
+
+    Taken out by least squares are the forcing difference and the input itself, each through a short filter,
+    and a change of gain. The output goes in without one: a filter of it could pick out its own noise.
+
+    Args:
+        one: A record.
+        other: A repeat of it.
+
+    Returns:
+        The rest (time,), or None where the inputs are not alike (correlation below 0.9).
+    """
+    size = min(one.input.size, other.input.size)
+    a, b = one.input[:size] - np.mean(one.input[:size]), other.input[:size] - np.mean(other.input[:size])
+    scale = float(np.sqrt((a @ a) * (b @ b)))
+    if scale == 0.0:
+        return None
+    lags = scipy.signal.correlate(a, b, mode="full", method="fft")
+    lag = int(np.argmax(lags)) - (size - 1)
+    if lags[lag + size - 1] < 0.9 * scale:
+        return None
+    first, second = slice(max(lag, 0), size + min(lag, 0)), slice(max(-lag, 0), size + min(-lag, 0))
+    drive, response = one.input[first] - other.input[second], one.output[first] - other.output[second]
+    columns = [np.ones_like(response), other.output[second]]
+    for signal in (drive, other.input[second]):
+        spread = float(np.std(signal))
+        if spread > 0.0:
+            columns += [np.roll(signal / spread, shift) for shift in range(-_SHIFTS, _SHIFTS + 1)]
+    design = np.stack(columns, axis=1)[_SHIFTS:-_SHIFTS]
+    inner = response[_SHIFTS:-_SHIFTS]
+    return inner - design @ np.linalg.lstsq(design, inner, rcond=1e-10)[0]

@@ -1,0 +1,299 @@
+"""campaign.toml as declared: each section and field with its type, checked before a data file is opened."""
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from .._record import Kind
+from .._wording import listing, nearest
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field: what it must be, in words and as a check, and its default."""
+
+    words: str
+    accepts: Callable[[Any], bool]
+    required: bool = False
+    default: Any = None
+    choices: tuple[str, ...] = ()
+    convert: Callable[[Any], Any] = lambda value: value
+
+
+def _is_number(value: Any) -> bool:
+    whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
+    return whole or (isinstance(value, float) and math.isfinite(value))
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and bool(value.strip())
+
+
+def _is_names(value: Any) -> bool:
+    return isinstance(value, list) and all(_is_text(one) for one in value) and len(set(value)) == len(value)
+
+
+def _text(required: bool = False) -> Field:
+    return Field("a text that is not empty", _is_text, required)
+
+
+def _is_file(value: Any) -> bool:
+    return _is_text(value) and Path(value).name not in ("", "..")
+
+
+def _file(required: bool = False) -> Field:
+    return Field('the name of a file, such as "run1.csv"', _is_file, required)
+
+
+def _choice(*choices: str, required: bool = False, default: str | None = None) -> Field:
+    words = "one of " + ", ".join(f'"{choice}"' for choice in choices)
+    return Field(words, lambda value: value in choices, required, default, choices)
+
+
+def _number(default: float | None = None) -> Field:
+    return Field("a finite number", _is_number, default=default, convert=float)
+
+
+def _factor() -> Field:
+    accepts = lambda value: _is_number(value) and value != 0  # noqa: E731
+    return Field("a finite number other than 0", accepts, default=1.0, convert=float)
+
+
+def _positive(required: bool = False) -> Field:
+    accepts = lambda value: _is_number(value) and value > 0  # noqa: E731
+    return Field("a finite number above 0", accepts, required, convert=float)
+
+
+def _count(default: int | None = None, at_least: int = 0, required: bool = False) -> Field:
+    accepts = lambda value: _is_count(value) and value >= at_least  # noqa: E731
+    return Field(f"a whole number, at least {at_least}", accepts, required, default)
+
+
+def _flag(default: bool = False) -> Field:
+    return Field("true or false", lambda value: isinstance(value, bool), default=default)
+
+
+def _names(default: tuple[str, ...]) -> Field:
+    return Field('a list of different names such as ["linear", "cubic"]', _is_names, default=default)
+
+
+_SECTIONS: Mapping[str, Mapping[str, Field]] = {
+    "campaign": {"title": _text(), "mass": _positive(required=True), "mass_free": _flag()},
+    "input": {
+        "quantity": _choice(
+            "force", "base_acceleration", "reaction_mass_acceleration", "command", required=True
+        ),
+        "column": _text(required=True),
+        "unit": _text(required=True),
+        "gain": _factor(),
+        "gain_free": _flag(),
+        "offset_free": _flag(),
+        "hold": _choice("band_limited", "linear", "zero_order", default="band_limited"),
+        "moving_mass": _positive(),
+    },
+    "output": {
+        "quantity": _choice("acceleration", "velocity", "displacement", required=True),
+        "column": _text(required=True),
+        "unit": _text(required=True),
+        "offset_free": _flag(),
+        "noise": _positive(),
+    },
+    "floor": {
+        "quantity": _choice("acceleration", "velocity", "displacement", required=True),
+        "column": _text(required=True),
+        "unit": _text(required=True),
+        "gain": _factor(),
+    },
+    "sampling": {"rate": _positive(), "time": _text()},
+    "filter": {
+        "kind": _choice("butterworth", default="butterworth"),
+        "order": _count(at_least=1, required=True),
+        "cutoff_hz": _positive(required=True),
+        "applied": _flag(default=True),
+        "compensate": _flag(),
+    },
+    "model": {
+        "stiffness": _names(("linear",)),
+        "damping": _names(("linear",)),
+        "elements": _names(()),
+    },
+}
+_RECORD: Mapping[str, Field] = {
+    "file": _file(required=True),
+    "role": _choice("fit", "holdout", required=True),
+    "level": _number(),
+    "direction": _choice("forward", "backward", "none", default="none"),
+    "repeat": _count(),
+    "start": _count(default=0),
+    "stop": _count(at_least=1),
+    "period": _count(at_least=2),
+    "settle": _count(default=0),
+    "schedule": _file(),
+    "kind": _choice(*get_args(Kind)),
+}
+_REQUIRED_SECTIONS = ("campaign", "input", "output")
+_ABSENT_SECTIONS = ("floor", "filter")
+"""Sections that are None where the file has none; of the others every field is then at its default."""
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """The checked contents of campaign.toml; every field present, absent ones at their default.
+
+    Attributes:
+        file: The campaign.toml.
+        sections: Section name to field name to value; "filter" and "floor" are None where the
+            file has none.
+        records: One mapping per [[record]], in order.
+    """
+
+    file: Path
+    sections: Mapping[str, Any]
+    records: tuple[Mapping[str, Any], ...]
+
+
+def read_declaration(path: str | Path) -> Declaration:
+    """Gives the checked contents of a campaign.toml.
+
+    Args:
+        path: The .toml or the folder that holds a campaign.toml.
+
+    Returns:
+        The declaration.
+
+    Raises:
+        ValueError: If the file is missing, is not TOML, or holds a section, field or value that does not
+            belong.
+    """
+    file = Path(path)
+    if file.is_dir():
+        file = file / "campaign.toml"
+    if not file.is_file():
+        raise ValueError(
+            f"{file} does not exist; expected a campaign .toml, or a folder with a campaign.toml"
+        )
+    table = _parse(file)
+    _check_names(file, "the file", table, (*_SECTIONS, "record"), "section")
+    sections: dict[str, Any] = {}
+    for name, fields in _SECTIONS.items():
+        if name not in table and name in _REQUIRED_SECTIONS:
+            raise ValueError(
+                f"{file}: section [{name}] is missing; it must hold {listing(_required(fields))}"
+            )
+        absent = name not in table
+        sections[name] = (
+            None
+            if absent and name in _ABSENT_SECTIONS
+            else _checked(file, f"[{name}]", table.get(name, {}), fields)
+        )
+    entries = table.get("record", [])
+    if not isinstance(entries, list):
+        raise ValueError(f"{file}: [record] must be a list of tables; write [[record]] above each record")
+    if not entries:
+        raise ValueError(f'{file}: no [[record]] is listed; at least one with role = "fit" is needed')
+    records = tuple(
+        _checked(file, f"[[record]] number {i + 1}", one, _RECORD) for i, one in enumerate(entries)
+    )
+    _check_together(file, sections, records)
+    return Declaration(file, sections, records)
+
+
+def _parse(file: Path) -> dict[str, Any]:
+    try:
+        text = file.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{file} is not UTF-8 text (byte {error.start}); a TOML file must be") from error
+    if not text.strip():
+        raise ValueError(f"{file} is empty; expected sections [campaign], [input], [output] and [[record]]")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{file} is not valid TOML: {error}") from error
+
+
+def _required(fields: Mapping[str, Field]) -> list[str]:
+    return [name for name, field in fields.items() if field.required]
+
+
+def _check_names(file: Path, where: str, table: Mapping[str, Any], known: tuple[str, ...], what: str) -> None:
+    for name in table:
+        if name not in known:
+            raise ValueError(
+                f"{file}: {where} has an unknown {what} `{name}`{nearest(name, known)} Known: "
+                f"{listing(known)}"
+            )
+
+
+def _checked(file: Path, where: str, table: Any, fields: Mapping[str, Field]) -> dict[str, Any]:
+    if not isinstance(table, dict):
+        found = "a list of tables" if isinstance(table, list) else f"{table!r}"
+        raise ValueError(f"{file}: {where} must be one table of fields, but is {found}")
+    _check_names(file, where, table, tuple(fields), "field")
+    values: dict[str, Any] = {}
+    for name, field in fields.items():
+        if name not in table:
+            if field.required:
+                raise ValueError(f"{file}: {where} lacks the field `{name}`; it must be {field.words}")
+            values[name] = field.default
+            continue
+        value = table[name]
+        if not field.accepts(value):
+            hint = nearest(value, field.choices) if isinstance(value, str) else ""
+            raise ValueError(f"{file}: {where} {name} = {value!r} must be {field.words}{hint}")
+        values[name] = field.convert(value)
+    return values
+
+
+def _check_together(file: Path, sections: Mapping[str, Any], records: tuple[Mapping[str, Any], ...]) -> None:
+    drive, mass = sections["input"]["quantity"], sections["input"]["moving_mass"]
+    if drive == "reaction_mass_acceleration" and mass is None:
+        raise ValueError(
+            f"{file}: [input] lacks the field `moving_mass`; a reaction mass of so many kg turns its "
+            "acceleration into the force -moving_mass * acceleration"
+        )
+    if drive != "reaction_mass_acceleration" and mass is not None:
+        raise ValueError(
+            f'{file}: [input] moving_mass = {mass} belongs to quantity = "reaction_mass_acceleration" only, '
+            f'but quantity = "{drive}"'
+        )
+    if drive == "base_acceleration" and sections["floor"] is not None:
+        raise ValueError(
+            f'{file}: [floor] belongs to an isolator on a floor, but [input] quantity = "base_acceleration" '
+            "says that the base itself is driven; its motion is the input"
+        )
+    _check_columns(file, sections)
+    for number, record in enumerate(records, start=1):
+        _check_kind(f"{file}: [[record]] number {number}", record)
+    if not any(record["role"] == "fit" for record in records):
+        raise ValueError(f'{file}: no [[record]] has role = "fit"; at least one record is needed to fit')
+
+
+def _check_columns(file: Path, sections: Mapping[str, Any]) -> None:
+    named: dict[str, str] = {}
+    for name in ("input", "output", "floor"):
+        column = None if sections[name] is None else sections[name]["column"]
+        if column in named:
+            raise ValueError(
+                f'{file}: [{named[column]}] and [{name}] both name column = "{column}"; '
+                "they must be two different channels"
+            )
+        if column is not None:
+            named[column] = name
+
+
+def _check_kind(where: str, record: Mapping[str, Any]) -> None:
+    kind = record["kind"]
+    for field, implied in (("period", "periodic"), ("schedule", "stepped_sine")):
+        if record[field] is not None and kind not in (None, implied):
+            raise ValueError(
+                f'{where} has kind = "{kind}" and a {field}; a record with a {field} is of kind "{implied}"'
+            )
+    if kind == "periodic" and record["period"] is None:
+        raise ValueError(f'{where} has kind = "periodic", but lacks the field `period` (samples)')

@@ -1,0 +1,114 @@
+"""What an undeclared excitation is: free decay, blow, stepped sine, sweep, or anything else (broadband)."""
+
+import numpy as np
+from jaxtyping import Float
+
+from .._blow import ABOVE_NOISE, BRIEF, drive_noise, driven_samples
+from .._record import Dwell, Kind
+from ..spectrum import power_spectrum, ringing_frequency
+from ._find_dwells import rising_crossings, segment_dwells
+
+_PARTS = 10
+"""Parts of a record whose sizes are compared."""
+
+_DIED_OUT = 0.7
+"""A motion whose end is above this share of its largest part has not died out."""
+
+_IDLE = 0.1
+"""A drive below this share of the inertia, within the band of the motion, did not make the motion ..."""
+
+_FEATURELESS = 4.0
+"""... if its power there is not above so many times that of its other frequencies either."""
+
+
+def detect_kind(
+    drive: Float[np.ndarray, " time"],
+    response: Float[np.ndarray, " time"],
+    rate: float,
+    inertia: float | None = None,
+) -> tuple[tuple[Dwell, ...], Kind]:
+    """Gives the dwells (of a stepped sine) and the kind of a record without period or schedule.
+
+    Args:
+        drive: Input, (time,).
+        response: Output, (time,).
+        rate: Samples per second [Hz].
+        inertia: Input per unit of output that inertia alone would take (the mass, where the output is an
+            acceleration), or None where it is not known; it tells a small input from none.
+
+    Returns:
+        Dwells and kind.
+    """
+    if _dies_out(response):
+        if _is_brief(drive):
+            return (), "impulse"
+        if _is_idle(drive, response, rate, inertia):
+            return (), "free_decay"
+    crossings = rising_crossings(drive, rate)
+    if crossings.size < 6:
+        return (), "broadband"
+    periods = np.diff(crossings)
+    if float(np.median(np.abs(np.diff(periods)))) > 0.1 * float(np.median(periods)):
+        return (), "broadband"
+    dwells = segment_dwells(drive, rate)
+    covered = sum(dwell.stop - dwell.start for dwell in dwells)
+    if len(dwells) > 1 and _glides(crossings, dwells, rate):
+        return (), "swept"
+    if covered < 0.5 * drive.size:
+        return (), "swept" if _is_monotone(periods) else "broadband"
+    return dwells, "stepped_sine"
+
+
+def _glides(crossings: Float[np.ndarray, " crossing"], dwells: tuple[Dwell, ...], rate: float) -> bool:
+    """Whether the period changes as much within the found dwells as between them."""
+    periods, middle = np.diff(crossings), 0.5 * (crossings[1:] + crossings[:-1])
+    within, centres = [], []
+    for dwell in dwells:
+        inside = (middle >= dwell.start / rate) & (middle < dwell.stop / rate)
+        if np.count_nonzero(inside) >= 3:
+            slope = np.polyfit(middle[inside], periods[inside], 1)[0]
+            within.append(abs(slope) * (dwell.stop - dwell.start) / rate)
+            centres.append(float(np.mean(periods[inside])))
+    if len(within) < 2:
+        return False
+    return float(np.median(within)) > 0.5 * float(np.median(np.abs(np.diff(centres))))
+
+
+def _is_monotone(periods: Float[np.ndarray, " cycle"]) -> bool:
+    smooth = np.convolve(periods, np.full(5, 0.2), mode="valid") if periods.size >= 10 else periods
+    steps = np.diff(smooth)
+    return abs(int(np.sum(np.sign(steps)))) > 0.7 * steps.size
+
+
+def _dies_out(response: Float[np.ndarray, " time"]) -> bool:
+    """Whether the motion is largest near its beginning and has fallen off by its end."""
+    rest = float(np.mean(response[-max(response.size // _PARTS, 1) :]))
+    size = np.array([np.sqrt(np.mean(part**2)) for part in np.array_split(response - rest, _PARTS)])
+    return bool(np.argmax(size) < 3 and size[-1] < _DIED_OUT * np.max(size))
+
+
+def _is_brief(drive: Float[np.ndarray, " time"]) -> bool:
+    """Whether the drive stands above its noise for a small share of the record only."""
+    peak = float(np.max(np.abs(drive - np.median(drive))))
+    share = np.count_nonzero(driven_samples(drive)) / drive.size
+    return bool(peak > 2.0 * ABOVE_NOISE * drive_noise(drive) and share < BRIEF)
+
+
+def _is_idle(
+    drive: Float[np.ndarray, " time"],
+    response: Float[np.ndarray, " time"],
+    rate: float,
+    inertia: float | None,
+) -> bool:
+    """Whether the drive knows nothing of the motion: it is zero, or noise far below the inertia."""
+    if np.ptp(drive) == 0.0:
+        return True
+    frequency, motion = power_spectrum(response, rate)
+    noise = power_spectrum(drive, rate)[1]
+    ringing = ringing_frequency(response, rate)
+    band = (frequency >= 0.5 * ringing) & (frequency <= 2.0 * ringing)
+    if np.mean(noise[band]) > _FEATURELESS * np.median(noise[1:]):
+        return False
+    if inertia is None:
+        return True
+    return bool(np.sum(noise[band]) < _IDLE**2 * inertia**2 * np.sum(motion[band]))

@@ -1,0 +1,98 @@
+"""The sampling rate: declared, from a time column or stated by the file; where several say, they agree."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from .._wording import row
+
+_AGREE = 1e-3  # relative; a written time column or UFF step is rounded, a wrong rate is off by more
+
+
+def find_rate(
+    file: Path,
+    declared: float | None,
+    stated: float | None,
+    time: Float[np.ndarray, " time"] | None,
+    column: str | None,
+    first: int,
+) -> float:
+    """Gives the sampling rate of a record [Hz].
+
+    Args:
+        file: For the error.
+        declared: [sampling] rate [Hz], or None.
+        stated: Rate that the data file itself states [Hz], or None.
+        time: The record's time column [s], or None.
+        column: Its name.
+        first: Row of the record's first sample in the file, for the error.
+
+    Returns:
+        The declared rate if there is one, else that of the time column, else the stated one.
+
+    Raises:
+        ValueError: If there is none, if they contradict each other, or if the time column has a gap, runs
+            backwards or repeats a time.
+    """
+    measured = None if time is None else uniform_rate(file, time, str(column), first)
+    said = [
+        ("[sampling] rate", declared),
+        (f"time column `{column}`", measured),
+        ("the file's own time base", stated),
+    ]
+    known = [(name, rate) for name, rate in said if rate is not None]
+    if not known:
+        raise ValueError(
+            f'{file}: the sampling rate is not known; give [sampling] rate = ... or time = "column"'
+        )
+    first_name, chosen = known[0]
+    for name, rate in known[1:]:
+        if abs(rate / chosen - 1.0) > _AGREE:
+            raise ValueError(
+                f"{file}: {first_name} says {chosen:.9g} Hz, but {name} says {rate:.9g} Hz; they must agree"
+            )
+    return chosen
+
+
+def uniform_rate(file: Path, time: Float[np.ndarray, " time"], column: str, first: int) -> float:
+    """Gives the rate of a time column that must be uniform but may be rounded [Hz].
+
+    Raises:
+        ValueError: If a time is not finite, repeats, runs backwards, or leaves a gap; names the row.
+    """
+    wrong = np.flatnonzero(~np.isfinite(time))
+    if wrong.size:
+        at = int(wrong[0])
+        raise ValueError(
+            f"{file}: time column `{column}` is {time[at]} at {row(first + at)}; it must be finite"
+        )
+    steps = np.diff(time)
+    wrong = np.flatnonzero(steps <= 0)
+    if wrong.size:
+        at = int(wrong[0]) + 1
+        how = "repeats" if time[at] == time[at - 1] else "runs backwards"
+        raise ValueError(
+            f"{file}: time column `{column}` {how} at {row(first + at)}: {time[at]:.9g} s follows "
+            f"{time[at - 1]:.9g} s; it must increase strictly"
+        )
+    usual = float(np.median(steps))
+    jitter = float(np.median(np.abs(steps - usual)))
+    limit = usual * 1.5 + 4.0 * jitter
+    at = int(np.argmax(steps)) + 1
+    if steps[at - 1] > limit:
+        raise ValueError(
+            f"{file}: time column `{column}` has a gap at {row(first + at)}: {time[at]:.9g} s follows "
+            f"{time[at - 1]:.9g} s, but the usual step is {usual:.6g} s; samples are missing"
+        )
+    step = float((time[-1] - time[0]) / (time.size - 1))
+    drift = time - time[0] - step * np.arange(time.size)
+    at = int(np.argmax(np.abs(drift)))
+    if abs(drift[at]) > 1.0 * step + 4.0 * jitter:
+        raise ValueError(
+            f"{file}: time column `{column}` is not uniform: at {row(first + at)} it is {drift[at]:.3g} s "
+            "off the "
+            f"even grid of {step:.6g} s; resample the record"
+        )
+    rate = 1.0 / step
+    return float(round(rate)) if abs(rate / max(round(rate), 1) - 1.0) < 1e-6 else rate

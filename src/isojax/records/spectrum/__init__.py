@@ -1,0 +1,29 @@
+"""isojax.records.spectrum."""
+
+from ._band import Band as Band
+from ._band import excited_band as excited_band
+from ._band import power_spectrum as power_spectrum
+from ._band import ringing_frequency as ringing_frequency
+from ._band import spectral_floor as spectral_floor
+from ._dwell_end import dwell_rest as dwell_rest
+from ._dwell_end import dwell_window as dwell_window
+from ._filter import compensate_butterworth as compensate_butterworth
+from ._filter import unsure_samples as unsure_samples
+from ._filter import zero_phase_butterworth as zero_phase_butterworth
+from ._filtered_receptance import FilterComparison as FilterComparison
+from ._filtered_receptance import Receptance as Receptance
+from ._filtered_receptance import compare_filtered_receptance as compare_filtered_receptance
+from ._filtered_receptance import receptance as receptance
+from ._harmonics import DwellHarmonics as DwellHarmonics
+from ._harmonics import dwell_harmonics as dwell_harmonics
+from ._harmonics import fit_harmonics as fit_harmonics
+from ._harmonics import harmonic_basis as harmonic_basis
+from ._harmonics import settled_window as settled_window
+from ._integrate import integrate_acceleration as integrate_acceleration
+from ._integrate import measured_state as measured_state
+from ._integrate import shift_order as shift_order
+from ._mains import HumLine as HumLine
+from ._mains import MainsCollision as MainsCollision
+from ._mains import hum_lines as hum_lines
+from ._mains import mains_collisions as mains_collisions
+from ._noise_band import NoiseBand as NoiseBand

@@ -1,0 +1,134 @@
+"""The band that a record excites, and the floor of its output's spectrum."""
+
+from dataclasses import dataclass
+from typing import cast
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import scipy.signal
+import scipy.stats
+from jaxtyping import Float
+from scipy.fft import next_fast_len
+
+from .._record import Record
+from ._noise_band import NoiseBand
+
+_AVERAGES = 15
+"""Segments over which the spectrum of a floor is averaged; they overlap by half."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Where a record's signal is.
+
+    Attributes:
+        lowest: Half of the lowest excited frequency [Hz], at least two per record; of a motion that rings
+            down a third of the frequency at which it rings, since a release or a blow excites every one.
+        highest: Frequency above which the output is noise [Hz].
+    """
+
+    lowest: float
+    highest: float
+
+
+_KNOWN: WeakKeyDictionary[Record, Band] = WeakKeyDictionary()
+"""Bands already worked out: a fit asks for each several times."""
+
+
+def power_spectrum(
+    signal: Float[np.ndarray, " time"], rate: float, averages: int = 8
+) -> tuple[Float[np.ndarray, " frequency"], Float[np.ndarray, " frequency"]]:
+    """Gives frequencies [Hz] and the one-sided power spectral density, averaged over half-overlapping Hann
+    segments.
+
+    The window is a four-term Blackman-Harris: its side lobes, below -92 dB, do not lift the floor.
+    """
+    wanted = max(64, 2 * signal.size // (averages + 1))
+    segment = min(signal.size, cast(int, next_fast_len(wanted, real=True)))
+    frequency, density = scipy.signal.welch(
+        signal - np.mean(signal), rate, window="blackmanharris", nperseg=segment, detrend="linear"
+    )
+    return frequency, density
+
+
+def spectral_floor(
+    signal: Float[np.ndarray, " time"], band: NoiseBand, *spans: tuple[float, float]
+) -> tuple[float, float]:
+    """Gives the power density of white noise that would leave the median floor of a signal's spectrum.
+
+    The spectrum is divided by the gain of the filter that the noise has passed, and the median corrected to a
+    mean by the chi-square distribution of averaged periodograms.
+
+    Args:
+        signal: Samples, (time,).
+        band: The band that the noise fills.
+        spans: Lower and upper ends [Hz]; the lines between any of them count.
+
+    Returns:
+        Power per Hz and its relative standard error; NaN where fewer than 8 lines lie between.
+
+    Source: Welch 1967 (degrees of freedom of overlapping segments).
+    """
+    frequency, density = power_spectrum(signal, band.rate, _AVERAGES)
+    inside = np.any([(frequency > low) & (frequency < high) for low, high in spans], axis=0)
+    lines = np.count_nonzero(inside)
+    if lines < 8:
+        return float("nan"), float("nan")
+    freedom, alike = _freedom(signal.size, 2 * (frequency.size - 1))
+    level = np.median(density[inside] / band.power_gain(frequency[inside]))
+    error = np.sqrt(0.5 * np.pi * (2.0 / freedom) * alike / lines)
+    return float(level * freedom / scipy.stats.chi2.ppf(0.5, freedom)), float(error)
+
+
+def _freedom(size: int, segment: int) -> tuple[float, float]:
+    """Gives the degrees of freedom of a line of the averaged spectrum, and how many lines go as one.
+
+    Both follow from the window: segments that overlap by half share some noise, and so do neighbouring lines.
+    """
+    window = np.asarray(scipy.signal.get_window("blackmanharris", segment), dtype=np.float64)
+    half = segment // 2
+    count = max(1, (size - half) // (segment - half))
+    power = float(np.sum(window**2))
+    shared = float(np.sum(window[half:] * window[: segment - half])) / power
+    freedom = 2.0 * count / (1.0 + 2.0 * shared**2 * (1.0 - 1.0 / count))
+    return freedom, segment * float(np.sum(window**4)) / power**2
+
+
+def ringing_frequency(signal: Float[np.ndarray, " time"], rate: float) -> float:
+    """Gives the frequency of the strongest line of a signal's spectrum [Hz]."""
+    frequency, power = power_spectrum(signal, rate)
+    return float(frequency[1 + np.argmax(power[1:])])
+
+
+def excited_band(record: Record) -> Band:
+    """Gives the band in which a record's signal stands above its noise.
+
+    Args:
+        record: The record.
+
+    Returns:
+        The band.
+    """
+    if record not in _KNOWN:
+        _KNOWN[record] = _find_band(record)
+    return _KNOWN[record]
+
+
+def _find_band(record: Record) -> Band:
+    nyquist = 0.5 * record.rate
+    slowest = 2.0 * record.rate / record.time.size
+    frequency, output = power_spectrum(record.output, record.rate)
+    floor = float(np.quantile(output[frequency > 0.0], 0.1))
+    above = frequency[output > 30.0 * max(floor, 1e-300)]
+    highest = min(1.25 * float(above[-1]) if above.size else nyquist, 0.8 * nyquist)
+    if record.dwells:
+        lowest = 0.5 * min(dwell.frequency for dwell in record.dwells)
+    elif record.rings_down:
+        lowest = ringing_frequency(record.output, record.rate) / 3.0
+    else:
+        driven = record.output if not np.any(record.input) else record.input
+        frequency, power = power_spectrum(driven, record.rate)
+        share = np.cumsum(power) / np.sum(power)
+        lowest = 0.5 * float(frequency[np.searchsorted(share, 1e-3)])
+    lowest = min(max(lowest, slowest), 0.5 * nyquist)
+    return Band(lowest, max(highest, 1.5 * lowest))

@@ -1,0 +1,19 @@
+"""isojax.reporting.page."""
+
+from ._map_files import folds_around as folds_around
+from ._map_files import map_arrays as map_arrays
+from ._map_files import write_map as write_map
+from ._map_summary import map_summary as map_summary
+from ._page import render_page as render_page
+from ._result import result_dict as result_dict
+from ._summary import catalogue_table as catalogue_table
+from ._summary import error_table as error_table
+from ._summary import loop_summary as loop_summary
+from ._summary import parameter_table as parameter_table
+from ._summary import ranking_table as ranking_table
+from ._summary import render_text as render_text
+from ._summary import verdict_summary as verdict_summary
+from ._write import check_folder as check_folder
+from ._write import model_text as model_text
+from ._write import write_report as write_report
+from ._write import write_texts as write_texts

@@ -1,0 +1,110 @@
+"""What a stability map says, in a few lines for the terminal."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...stability import FoldCurve, StabilityMap
+from ..plots import drive_unit, quantity
+from ._map_files import result_codes
+
+_REASONS = {1: "not converged", 2: "left every bound"}
+
+
+def map_summary(
+    smap: StabilityMap,
+    *,
+    folds: FoldCurve | None = None,
+    seconds: Mapping[str, tuple[float, float]] | None = None,
+) -> str:
+    """Give what a map says: its grid, the orbits, where they are unstable or several, errors, time.
+
+    Args:
+        smap: the map.
+        folds: around cells with several orbits.
+        seconds: of each part of the work, compiling and running [s].
+
+    Returns:
+        The lines.
+    """
+    unit = drive_unit(smap.model.excitation)
+    amplitudes, frequencies = np.asarray(smap.amplitudes), np.asarray(smap.frequencies)
+    count, radius = np.asarray(smap.count), np.asarray(smap.spectral_radius)
+    several, coexisting = count > 1, radius.ndim == 3
+    layers = radius if coexisting else radius[None]
+    worst = np.fmax.reduce(layers, axis=0)
+    lines = [
+        (
+            "grid",
+            f"{amplitudes.size} amplitudes {_span(amplitudes, unit)}, "
+            f"{frequencies.size} frequencies {_span(frequencies, 'Hz')}",
+        ),
+        ("orbits", f"{count.sum()} in {count.size} cells; {_scope(smap, coexisting)}"),
+    ]
+    if count.any():
+        unstable = np.any(layers >= 1.0, axis=0)
+        lines.append(("unstable", f"{_cells(unstable)} an unstable orbit{_where(smap, unstable)}"))
+        if coexisting:
+            lines.append(("several", f"{_cells(several)} several orbits{_where(smap, several)}"))
+        row, column = np.unravel_index(int(np.nanargmax(worst)), worst.shape)
+        place = f"{quantity(amplitudes[row], unit)}, {quantity(frequencies[column], 'Hz')}"
+        lines.append(("largest |µ|", f"{worst[row, column]:.4f} at {place}"))
+        steps = smap.integrator.steps_per_period
+        lines.append(("error", f"{smap.error:.1e} in |µ| by integration, {steps} steps a period"))
+    if folds is not None:
+        lines.append(("folds", _folds(folds, unit)))
+    lines.append(("not found", _missing(smap, count, coexisting)))
+    for name, (compiling, running) in (seconds or {}).items():
+        words = f"{compiling + running:.1f} s: {compiling:.1f} s compiling, {running:.1f} s running"
+        lines.append((f"time, {name}", words))
+    width = max(len(name) for name, _ in lines)
+    return "\n".join(f"{name:<{width}}  {words}" for name, words in lines)
+
+
+def _span(axis: np.ndarray, unit: str) -> str:
+    return f"{axis[0]:.4g} to {quantity(axis[-1], unit)}" if axis.size > 1 else quantity(axis[0], unit)
+
+
+def _cells(mask: np.ndarray) -> str:
+    total = int(mask.sum())
+    return f"{total} cell{'' if total == 1 else 's'} hold{'s' if total == 1 else ''}"
+
+
+def _where(smap: StabilityMap, mask: np.ndarray) -> str:
+    if not mask.any():
+        return ""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    unit = drive_unit(smap.model.excitation)
+    spans = (
+        _span(np.asarray(axis)[[places[0], places[-1]]], own)
+        for axis, places, own in ((smap.amplitudes, rows, unit), (smap.frequencies, columns, "Hz"))
+    )
+    return f" ({', '.join(spans)})"
+
+
+def _scope(smap: StabilityMap, coexisting: bool) -> str:
+    kind = "symmetric orbits only, by the half-period map" if smap.symmetric else "orbits of one drive period"
+    return kind if coexisting else f"that of smallest motion in each, others not sought; {kind}"
+
+
+def _folds(folds: FoldCurve, unit: str) -> str:
+    ends = [
+        f"{quantity(float(c.amplitude), unit)}, {quantity(float(c.frequency), 'Hz')}" for c in folds.cusps
+    ]
+    kind = "closed curve" if bool(folds.closed) else "open curve"
+    return kind + (f", cusps at {' and '.join(ends)}" if ends else ", no cusp met")
+
+
+def _missing(smap: StabilityMap, count: np.ndarray, coexisting: bool) -> str:
+    codes = result_codes(smap)
+    first = codes[0] if coexisting else codes
+    empty = count == 0
+    parts = [
+        f"{np.sum(empty & (first == code))} {words}"
+        for code, words in _REASONS.items()
+        if np.any(empty & (first == code))
+    ]
+    words = f"{empty.sum()} cells" + (f" ({', '.join(parts)})" if parts else "")
+    # Orbits are born and vanish in pairs, so that their number is odd where none is missed.
+    even = coexisting and int(np.sum((count > 0) & (count % 2 == 0)))
+    return words + (f"; {even} cells hold an even number of orbits, so one is missing" if even else "")

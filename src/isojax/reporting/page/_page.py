@@ -1,0 +1,160 @@
+"""report.html: one page that holds everything, pictures included."""
+
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+
+from ..._parameters import list_parameters
+from ...health import CampaignHealth, campaign_health
+from ...identification import OUTPUT_UNITS, Candidate, Fit, Loop, loop_remainder, plain_unit
+from ...records import Campaign
+from ..words import (
+    budget_rows,
+    budget_words,
+    caveats,
+    dwell_words,
+    effect_words,
+    finding_words,
+    headline,
+    health_words,
+    law_rows,
+    mains_words,
+    remainder_words,
+    typeset_goodness,
+    typeset_number,
+    typeset_p_value,
+    typeset_share,
+    typeset_unit,
+)
+from ..words import typeset_with_error as with_error
+from ._pictures import draw_pictures
+from ._summary import error_rows, parameter_words
+
+_VERDICTS = {
+    "none": "nothing missing",
+    "found": "found",
+    "partly_explained": "partly explained",
+    "unexplained": "unexplained",
+}
+_MOST = 12
+
+
+def render_page(loop: Loop, health: CampaignHealth | None = None) -> str:
+    """Give report.html: self-contained, no script, no outside resource.
+
+    Args:
+        loop: the closed loop.
+        health: of its campaign; worked out here if omitted.
+
+    Returns:
+        The page.
+    """
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    source = files("isojax.reporting").joinpath("report.html.jinja").read_text(encoding="utf-8")
+    health = campaign_health(loop) if health is None else health
+    return environment.from_string(source).render(_content(loop, health))
+
+
+def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
+    before, after = loop.before, loop.after
+    same = before is after
+    campaign = loop.campaign
+    quantity = campaign.output.quantity
+    remainder = loop_remainder(loop)
+    return {
+        "title": campaign.title,
+        "verdict": loop.verdict,
+        "verdict_words": _VERDICTS[loop.verdict],
+        "headline": headline(loop),
+        "reason": loop.last.reason,
+        "same": same,
+        "findings": [
+            {
+                "effect": one.effect,
+                "words": effect_words(one.effect),
+                "lines": finding_words(one),
+                "ranking": [_candidate(candidate, campaign) for candidate in one.ranking[:_MOST]],
+            }
+            for one in loop.findings
+        ],
+        "last_ranking": [_candidate(candidate, campaign) for candidate in loop.last.ranking[:_MOST]],
+        "unit": typeset_unit(OUTPUT_UNITS[quantity]),
+        "errors": error_rows(before, after),
+        "declared": _elements(before),
+        "added": " and ".join(effect_words(one.effect) for one in loop.findings),
+        "parameters": [
+            (
+                "isolated mass" if entry.name == "mass" else effect_words(entry.name.partition(".")[0]),
+                entry.name,
+                entry.spec.symbol,
+                parameter_words(before, entry.name),
+                parameter_words(after, entry.name),
+            )
+            for entry in list_parameters(after.model)
+        ],
+        "bounds": [
+            (
+                effect,
+                effect_words(effect),
+                f"{typeset_number(upper, 3)} {typeset_unit(plain_unit(unit, campaign))}",
+            )
+            for effect, (upper, unit) in loop.bounds.items()
+        ],
+        "remainder_lines": () if remainder is None else remainder_words(remainder),
+        "remainder_laws": [] if remainder is None else law_rows(remainder.pursuit),
+        "facts": _facts(loop),
+        "health": (
+            *health_words(health.data, after),
+            *mains_words(health, OUTPUT_UNITS[quantity]),
+            *dwell_words(health.dwells, campaign.input.quantity),
+            *budget_words(health.budget, after, loop.findings),
+        ),
+        "budget": budget_rows(health.budget, after),
+        "guess_notes": loop.guess.notes,
+        "caveats": caveats(loop),
+        "fit_report_before": str(before),
+        "fit_report_after": str(after),
+        **draw_pictures(loop, health),
+        "version": version("isojax"),
+        "seconds": f"{loop.seconds:.0f}",
+    }
+
+
+def _elements(fit: Fit) -> str:
+    """Give the effects of a model in words."""
+    return ", ".join(effect_words(element.name) for element in fit.model.elements)
+
+
+def _facts(loop: Loop) -> list[tuple[str, str]]:
+    campaign = loop.campaign
+    length = sum(record.time.size for record in campaign.records) / campaign.rate
+    levels = sorted({record.level for record in campaign.records if record.level is not None})
+    kinds = sorted({record.kind.replace("_", " ") for record in campaign.records})
+    facts = [
+        ("isolated mass", f"{campaign.mass:g} kg"),
+        ("input", campaign.input.quantity.replace("_", " ")),
+        ("output", campaign.output.quantity),
+        ("records", f"{len(campaign.fit_records)} fitted, {len(campaign.holdout_records)} held out"),
+        ("length", f"{length:.0f} s at {campaign.rate:g} Hz"),
+        ("excitation", ", ".join(kinds)),
+    ]
+    if levels:
+        facts.append(("levels", ", ".join(f"{level:g}" for level in levels)))
+    return facts
+
+
+def _candidate(one: Candidate, campaign: Campaign) -> dict[str, Any]:
+    return {
+        "effect": one.effect,
+        "words": effect_words(one.effect),
+        "z": typeset_number(one.z, 3),
+        "p": typeset_p_value(one.p_value),
+        "strength": with_error(one.strength, one.strength_error, plain_unit(one.unit, campaign)),
+        "visibility": typeset_share(one.visibility),
+        "chi2_per_dof": typeset_goodness(one.chi2_per_dof),
+        "delta_bic": typeset_number(one.delta_bic, 3),
+        "likeness": f"{round(one.likeness, 2) + 0.0:.2f}",  # no negative zero
+        "admissible": one.admissible,
+    }

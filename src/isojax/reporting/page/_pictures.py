@@ -1,0 +1,282 @@
+"""The pictures of the report, drawn and encoded."""
+
+import base64
+from collections.abc import Callable
+from io import BytesIO
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..._results import is_successful
+from ...health import CampaignHealth
+from ...identification import ClassicalGuess, Fit, Loop, loop_remainder, residual
+from ..plots import (
+    centre_frequency,
+    effect_on_its_own,
+    measured_forces,
+    pair,
+    plot_ceilings,
+    plot_correlation,
+    plot_cycle_residual,
+    plot_dwell_stability,
+    plot_effect,
+    plot_equivalent,
+    plot_errors,
+    plot_force_residual_loops,
+    plot_force_residual_map,
+    plot_ranking,
+    plot_receptance,
+    plot_remainder_map,
+    plot_remainder_parts,
+    plot_residual,
+    plot_restoring_force,
+    plot_stiffness_scatter,
+    plot_time_history,
+    plot_where,
+    trace_cycles,
+    visited_amplitudes,
+    worst_window,
+)
+
+_DPI = 144
+_HALF, _WHOLE, _HEIGHT = 5.4, 11.0, 3.1
+
+
+class Picture(NamedTuple):
+    """A picture in the report.
+
+    Attributes:
+        name: what it shows, a few words.
+        caption: how to read it.
+        data: PNG as base64.
+        wide: whether it takes the whole width.
+    """
+
+    name: str
+    caption: str
+    data: str
+    wide: bool = False
+
+
+def encode(figure: Figure) -> str:
+    """Give a figure as PNG in base64.
+
+    Args:
+        figure: the figure.
+
+    Returns:
+        The text.
+    """
+    page = BytesIO()
+    figure.savefig(page, format="png", dpi=_DPI)
+    return base64.b64encode(page.getvalue()).decode("ascii")
+
+
+def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture, ...]]:
+    """Draw the pictures of the report.
+
+    Where the fit before failed, only those are drawn that need none.
+
+    Args:
+        loop: the closed loop.
+        health: of its campaign.
+
+    Returns:
+        Section to its pictures: error_pictures, evidence_pictures, remainder_pictures, record_pictures,
+        force_pictures, health_pictures.
+    """
+    before = loop.before if is_successful(loop.before.result) else None
+    differs = loop.after is not loop.before and is_successful(loop.after.result)
+    after = loop.after if differs else None
+    return {
+        "error_pictures": () if before is None else _error_pictures(before, after),
+        "evidence_pictures": _evidence_pictures(loop, before, after),
+        "remainder_pictures": _remainder_pictures(loop),
+        "record_pictures": () if before is None else _record_pictures(before, after),
+        "force_pictures": _force_pictures(loop.guess, before, after),
+        "health_pictures": () if before is None else _health_pictures(before, after, health),
+    }
+
+
+def _draw(
+    name: str,
+    caption: str,
+    plot: Callable[..., Figure],
+    *args: Any,
+    wide: bool = False,
+    **options: Any,
+) -> tuple[Picture, ...]:
+    """Draw one picture, as a row of its own to join to others."""
+    size = (_WHOLE if wide else _HALF, _HEIGHT)
+    ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
+    return (Picture(name, caption, encode(plot(*args, ax=ax, **options)), wide),)
+
+
+def _error_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the errors before and after."""
+    goodness = "Segments restarted, over the noise. One is all that noise allows."
+    free = "Each record simulated from start to end, nothing fed back."
+    return (
+        *_draw("goodness of fit", goodness, plot_errors, before, after),
+        *_draw("free-run error", free, plot_errors, before, after, measure="nrmse"),
+    )
+
+
+def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the ranking behind each finding, or behind the verdict, and the effects by themselves."""
+    caption = "Score of each absent effect, what a refit would absorb projected out; χ²/dof where refitted."
+    rankings = [(one.ranking, one.effect, one.indistinguishable) for one in loop.findings]
+    if not rankings:
+        rankings = [(loop.last.ranking, None, ())]
+    pictures: list[Picture] = []
+    for ranking, effect, others in rankings:
+        if ranking:
+            name = "ranking" if effect is None else f"ranking that found {effect}"
+            figure = plot_ranking(
+                ranking,
+                effect=effect,
+                indistinguishable=others,
+                ax=Figure(
+                    figsize=(_WHOLE, 1.3 + 0.27 * min(10, max(3, len(ranking)))), layout="constrained"
+                ).add_subplot(),
+            )
+            pictures.append(Picture(name, caption, encode(figure), True))
+    if before is not None and any(run.record.dwells for run in before.restarts.runs):
+        caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force stays."
+        pictures += _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
+    return tuple(pictures) + _effect_pictures(loop)
+
+
+def _remainder_pictures(loop: Loop) -> tuple[Picture, ...]:
+    """Draw what is left, where something is."""
+    remainder = loop_remainder(loop)
+    if remainder is None:
+        return ()
+    pictures = _draw(
+        "how much could be explained",
+        "Free laws one after the other, and what any law could do on samples that it has not seen.",
+        plot_ceilings,
+        remainder,
+    )
+    if remainder.parts:
+        caption = "Power beyond the noise over all dwells; what the fitted coefficients absorb is gone."
+        pictures += _draw("parts of the missing force", caption, plot_remainder_parts, remainder.parts)
+    if remainder.dwells:
+        caption = "One is the noise. Level and frequency where the model errs."
+        pictures += _draw("map of what is left", caption, plot_remainder_map, remainder.dwells)
+    caption = "Drive less inertia less model, averaged; one value a place if it is a law of x and v."
+    pictures += _draw("missing force over the plane", caption, plot_force_residual_map, remainder.force_map)
+    if remainder.dwells:
+        caption = "The worst dwell of the lowest, middle and highest level; grey: noise, ±2σ a harmonic."
+        for against in ("displacement", "velocity"):
+            pictures += _draw(
+                f"missing force against {against}",
+                caption,
+                plot_force_residual_loops,
+                remainder.dwells,
+                against=against,
+            )
+    return pictures
+
+
+def _effect_pictures(loop: Loop) -> tuple[Picture, ...]:
+    lowest, highest, frequency = _motion(loop)
+    pictures: tuple[Picture, ...] = ()
+    for finding in loop.findings if is_successful(loop.after.result) else ():
+        own = effect_on_its_own(loop.after.model, finding.effect)
+        if np.any(trace_cycles(own, np.array([highest]), frequency).force):
+            caption = "The force it adds around one cycle, at the smallest and the largest visited amplitude."
+            pictures += _draw(
+                finding.effect, caption, plot_effect, loop.after, finding.effect, (lowest, highest), frequency
+            )
+    return pictures
+
+
+def _motion(loop: Loop) -> tuple[float, float, float]:
+    """Give smallest and largest displacement amplitude [m] and a typical frequency [Hz]."""
+    if loop.guess.responses:
+        return *visited_amplitudes(loop.guess), centre_frequency(loop.guess)
+    parts = [measured_forces(loop.before, record)[:2] for record in loop.campaign.fit_records]
+    sizes = [float(np.sqrt(2.0) * np.std(x)) for x, _ in parts]
+    frequencies = [float(np.std(v) / np.std(x) / (2.0 * np.pi)) for x, v in parts]
+    return min(sizes), max(sizes), float(np.mean(frequencies))
+
+
+def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the worst record against the models, and what they leave."""
+    place, low, high = worst_window(before)
+    caption = "Free run, nothing fed back; the record on which the model before is worst."
+    zoomed = "The same, at the cycles where the model before is worst."
+    left, right = residual(before), None if after is None else residual(after)
+    return (
+        *_draw("time history", caption, plot_time_history, before, after, record=place, wide=True),
+        *_draw("zoom", zoomed, plot_time_history, before, after, record=place, window=(low, high)),
+        *_draw(
+            "residual there",
+            "Measured less model.",
+            plot_residual,
+            before,
+            after,
+            record=place,
+            window=(low, high),
+        ),
+        *_draw(
+            "where the model errs",
+            "One is the noise. A trend over frequency is a hint.",
+            plot_where,
+            before,
+            after,
+        ),
+        *_draw("residual", "Whole record, one scale.", plot_residual, before, after, record=place),
+        *_draw("autocorrelation", "Fitted records; white noise stays inside.", plot_correlation, left, right),
+        *_draw(
+            "cross-correlation",
+            "Inside the band: nothing of the drive is left in it.",
+            plot_correlation,
+            left,
+            right,
+            what="drive",
+        ),
+    )
+
+
+def _force_pictures(guess: ClassicalGuess, before: Fit | None, after: Fit | None) -> tuple[Picture, ...]:
+    """Draw the force laws of the models beside what the classical route sees."""
+    fits = [] if before is None else [(label, fit) for label, fit, _ in pair(before, after)]
+    pictures: tuple[Picture, ...] = ()
+    if guess.responses or guess.linear:
+        caption = "Displacement over the measured force, by level and sweep direction."
+        pictures += _draw("receptance", caption, plot_receptance, guess)
+    if guess.responses and fits:
+        caption = "Free resonance of the fitted model over amplitude, through the measured curves."
+        pictures += _draw("backbone", caption, plot_receptance, guess, what="displacement", fits=fits)
+        caption = "Models by harmonic balance; marks are the classical route, exact only for light damping."
+        for what in ("stiffness", "damping"):
+            pictures += _draw(f"equivalent {what}", caption, plot_equivalent, guess, fits, what=what)
+    if before is not None:
+        caption = "Drive less inertia; models with memories at rest. Beyond the visited range: extrapolation."
+        for what in ("stiffness", "damping"):
+            pictures += _draw(
+                f"restoring force, {what}", caption, plot_restoring_force, before, after, what=what
+            )
+    return pictures
+
+
+def _health_pictures(before: Fit, after: Fit | None, health: CampaignHealth) -> tuple[Picture, ...]:
+    """Draw how the stiffness scatters between records, and how the dwells lie on the model's branches."""
+    pictures: tuple[Picture, ...] = ()
+    if len(before.campaign.records) > 1 and np.any(before.restarts.stiffness):
+        caption = "Scatter is data health; a trend in the order of the test is drift."
+        pictures += _draw(
+            "stiffness of each record", caption, plot_stiffness_scatter, before, after, wide=True
+        )
+    known = [one for one in health.dwells if not one.reason]
+    if known:
+        caption = "Each measured dwell on the fitted model's branch, by level; unstable above one."
+        pictures += _draw("multipliers of the dwells", caption, plot_dwell_stability, known)
+    if any(np.isfinite(one.nearness) for one in known):
+        caption = "The fold at which the dwell's own branch ends; near it, drift moves the motion far."
+        pictures += _draw("distance to folds", caption, plot_dwell_stability, known, what="fold")
+    return pictures

@@ -1,0 +1,254 @@
+"""Curves of periodic orbits: branches, frequency responses, the backbone, transmissibility."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+from ...stability import BackboneCurve, Branch, FrequencyResponse, SpecialPoint, Transmissibility
+from ._stability_style import (
+    MILLIMETRES,
+    draw_curve,
+    draw_special_points,
+    drive_unit,
+    level_colours,
+    parameter_words,
+    quantity,
+    stability_legend,
+)
+from ._style import MEASURED, NEUTRAL, axes_for, entitle
+
+
+def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | None = None) -> Figure:
+    """Draw the response along a branch, solid where stable, with its bifurcations.
+
+    Args:
+        branch: one or a batch.
+        others: more of the same parameter, such as those that `switch_branch` gives.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ValueError: if the branches follow different parameters.
+    """
+    for other in others:
+        if other.parameter != branch.parameter:
+            raise ValueError(
+                f"Argument `others` must follow {branch.parameter!r}, but one follows {other.parameter!r}."
+            )
+    figure, ax = axes_for(ax, 6.4, 3.8)
+    kinds: set[str] = set()
+    curves = [(one, place) for one in (branch, *others) for place in range(_count(one))]
+    unstable = False
+    for (one, place), colour in zip(curves, level_colours(len(curves)), strict=True):
+        points = one.points
+        x, y, stable = (
+            _row(np.asarray(values), place) for values in (points.value, points.response, points.stable)
+        )
+        unstable |= _any_unstable(y, stable)
+        draw_curve(ax, x, MILLIMETRES * y, stable, colour, _level(one, place) if len(curves) > 1 else "")
+    for one in (branch, *others):
+        kinds |= set(draw_special_points(ax, [_placed(one, point) for point in one.special_points]))
+    ax.set_xlabel(parameter_words(branch.model, branch.parameter))
+    ax.set_ylabel("response, half peak to peak [mm]")
+    entitle(ax, "Periodic response" + (f" at {_level(branch, 0)}" if len(curves) == 1 else ""))
+    stability_legend(ax, kinds, unstable=unstable)
+    return figure
+
+
+def plot_frequency_response(
+    response: FrequencyResponse,
+    *,
+    backbone: BackboneCurve | None = None,
+    what: Literal["displacement", "phase"] = "displacement",
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw the response over frequency, past its folds, solid where stable.
+
+    Args:
+        response: at one drive amplitude or several.
+        backbone: drawn through the peaks of the displacement.
+        what: the displacement, or the phase of its fundamental after the drive.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ValueError: if `what` is neither.
+    """
+    if what not in ("displacement", "phase"):
+        raise ValueError(f'Argument `what` must be "displacement" or "phase", but is {what!r}.')
+    figure, ax = axes_for(ax, 6.4, 3.8)
+    branch = response.branch
+    shift = np.asarray(response.amplitude) * MILLIMETRES
+    values = shift if what == "displacement" else np.degrees(np.asarray(response.phase))
+    count, unstable = _count(branch), False
+    places = []
+    for place, colour in zip(range(count), level_colours(count), strict=True):
+        x, y, stable = (_row(np.asarray(v), place) for v in (response.frequency, values, response.stable))
+        unstable |= _any_unstable(y, stable)
+        draw_curve(ax, x, y, stable, colour, _level(branch, place))
+        for point in response.special_points:
+            if point.branch == place:
+                nearest = _nearest(branch, place, point)
+                height = MILLIMETRES * nearest[1] if what == "displacement" else y[nearest[0]]
+                places.append((point, float(point.frequency), float(height)))
+    kinds = draw_special_points(ax, places)
+    extra = _draw_backbone(ax, backbone) if backbone is not None and what == "displacement" else []
+    ax.set_xlabel("frequency [Hz]")
+    ax.set_ylabel(
+        "response, half peak to peak [mm]" if what == "displacement" else "phase after the drive [°]"
+    )
+    entitle(ax, "Frequency response")
+    stability_legend(ax, kinds, unstable=unstable, extra=extra)
+    return figure
+
+
+def plot_backbone(backbone: BackboneCurve, *, ax: Axes | None = None) -> Figure:
+    """Draw how free vibration and phase resonance move with the displacement.
+
+    Args:
+        backbone: the curve.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax, 5.6, 4.0)
+    handles = _draw_backbone(ax, backbone)
+    ax.set_xlabel("frequency [Hz]")
+    ax.set_ylabel("largest displacement [mm]")
+    ax.set_ylim(bottom=0.0)
+    missing = int(np.sum(~np.isfinite(np.asarray(backbone.frequency))))
+    note = f"\nphase resonance not found at {missing} of {backbone.frequency.size} points" if missing else ""
+    entitle(ax, f"Backbone{note}")
+    ax.legend(handles=handles, fontsize=7.5, frameon=False)
+    return figure
+
+
+def plot_transmissibility(transmissibility: Transmissibility, *, ax: Axes | None = None) -> Figure:
+    """Draw what passes through the isolator, solid where the orbit is stable.
+
+    Args:
+        transmissibility: with one orbit a frequency, or several.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax, 6.4, 3.8)
+    frequency = np.asarray(transmissibility.frequencies)
+    ratio = np.atleast_2d(np.asarray(transmissibility.magnitude))
+    stable = np.atleast_2d(np.asarray(transmissibility.stable))
+    unstable = False
+    for x, y, held in _threads(frequency, ratio, stable):
+        unstable |= _any_unstable(y, held)
+        draw_curve(ax, x, y, held, level_colours(1)[0])
+    ax.axhline(1.0, color=MEASURED, linewidth=0.8, linestyle=":")
+    ax.set_yscale("log")
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.set_xlabel("frequency [Hz]")
+    ax.set_ylabel("transmissibility [1]")
+    entitle(ax, "Transmissibility of the fundamental; isolates below 1")
+    stability_legend(ax, unstable=unstable)
+    return figure
+
+
+def _threads(
+    frequency: np.ndarray, values: np.ndarray, stable: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Give coexisting orbits as curves; where their number changes, one goes on into the nearest."""
+    count = np.sum(np.isfinite(values), axis=0)
+    breaks = np.flatnonzero(np.diff(count)) + 1
+    curves = []
+    for columns in np.split(np.arange(frequency.size), breaks):
+        for orbit in range(int(count[columns[0]])):
+            curves.append((frequency[columns], values[orbit, columns], stable[orbit, columns]))
+    for place in breaks:
+        few, many = (place - 1, place) if count[place - 1] < count[place] else (place, place - 1)
+        left = list(range(int(count[many])))
+        for orbit in range(int(count[few])):
+            near = min(
+                (place for place in left if stable[place, many] == stable[orbit, few]),
+                key=lambda place: abs(np.log(values[place, many] / values[orbit, few])),
+                default=None,
+            )
+            if near is None:
+                continue
+            left.remove(near)
+            ends = np.array([frequency[few], frequency[many]])
+            sizes = np.array([values[orbit, few], values[near, many]])
+            curves.append((ends, sizes, np.array([stable[orbit, few], stable[near, many]])))
+        # What is left over meets in a fold between the two frequencies.
+        for one, other in zip(left[::2], left[1::2], strict=False):
+            pair = [one, other]
+            curves.append((frequency[[many, many]], values[pair, many], stable[pair, many]))
+    return curves
+
+
+def _draw_backbone(ax: Axes, backbone: BackboneCurve) -> list[Line2D]:
+    """Draw both curves; free vibration is wide and pale, so that it shows beneath the other."""
+    height = MILLIMETRES * np.asarray(backbone.displacements)
+    free = {"color": NEUTRAL, "linewidth": 3.5, "alpha": 0.7}
+    forced = {"color": MEASURED, "linewidth": 1.2, "linestyle": "-."}
+    ax.plot(np.asarray(backbone.natural_frequency), height, **free)
+    ax.plot(np.asarray(backbone.frequency), height, **forced)
+    return [
+        Line2D([], [], label="free vibration, no damping", **free),
+        Line2D([], [], label="phase resonance", **forced),
+    ]
+
+
+def _count(branch: Branch) -> int:
+    return branch.points.value.shape[0] if branch.points.value.ndim == 2 else 1
+
+
+def _row(values: np.ndarray, place: int) -> np.ndarray:
+    return values[place] if values.ndim == 2 else values
+
+
+def _any_unstable(values: np.ndarray, stable: np.ndarray) -> bool:
+    return bool(np.any(np.isfinite(values) & ~np.asarray(stable, dtype=bool)))
+
+
+def _level(branch: Branch, place: int) -> str:
+    """Give what is held fixed along a branch."""
+    unit = drive_unit(branch.model.excitation)
+    held = {"amplitude": (branch.points.amplitude, unit), "frequency": (branch.points.frequency, "Hz")}
+    held.pop(branch.parameter, None)
+    words = [quantity(float(_row(np.asarray(values), place)[0]), own) for values, own in held.values()]
+    return ", ".join(words) + (f", period {branch.periods}" if branch.periods > 1 else "")
+
+
+def _nearest(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:
+    """Give the point of a branch that is nearest to a bifurcation, and the response in between."""
+    states = (
+        np.asarray(branch.points.y0) if branch.points.y0.ndim == 2 else np.asarray(branch.points.y0[place])
+    )
+    value, response = (_row(np.asarray(v), place) for v in (branch.points.value, branch.points.response))
+    size = np.maximum(np.nanmax(np.abs(states), axis=0), np.finfo(float).tiny)
+    span = max(float(np.ptp(value[np.isfinite(value)])), np.finfo(float).tiny)
+    away = np.concatenate(
+        [(states - np.asarray(point.y0)) / size, (value - float(point.value))[:, None] / span], axis=1
+    )
+    distance = np.linalg.norm(np.where(np.isfinite(away), away, np.inf), axis=1)
+    if not np.isfinite(distance).any():
+        return 0, float("nan")
+    first, second = np.argsort(distance)[:2]
+    total = distance[first] + distance[second]
+    share = distance[first] / total if total > 0.0 else 0.0
+    return int(first), float(response[first] + share * (response[second] - response[first]))
+
+
+def _placed(branch: Branch, point: SpecialPoint) -> tuple[SpecialPoint, float, float]:
+    _, response = _nearest(branch, point.branch, point)
+    return point, float(point.value), MILLIMETRES * response

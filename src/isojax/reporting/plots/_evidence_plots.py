@@ -1,0 +1,154 @@
+"""Pictures of the evidence: ranking of the effects, errors before and after, scatter between records."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...identification import Candidate, Fit
+from ..words import typeset_number, typeset_unit
+from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle, pair
+
+_LIKE = "#8fb8de"
+_WRONG = "#f0d5d0"
+_MOST = 10
+
+
+def plot_ranking(
+    ranking: Sequence[Candidate],
+    *,
+    effect: str | None = None,
+    indistinguishable: Sequence[str] = (),
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw how loudly the residual speaks for each effect: |z|, best ten.
+
+    Args:
+        ranking: candidates, best first.
+        effect: the one that was found, if any.
+        indistinguishable: catalogue names that the data cannot tell from it.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    shown = list(ranking)[:_MOST]
+    figure, ax = axes_for(ax, height=0.9 + 0.27 * max(3, len(shown)))
+    kinds = [_kind(candidate, effect, indistinguishable) for candidate in shown]
+    styles = {
+        "found": (AFTER, "", AFTER),
+        "cannot be told apart": (_LIKE, "//", AFTER),
+        "wrong sign or gains energy": (_WRONG, "xx", BEFORE),
+        "weaker": (NEUTRAL, "", NEUTRAL),
+    }
+    rows = np.arange(len(shown))
+    sizes = np.array([max(abs(candidate.z), 1e-2) for candidate in shown])
+    for kind, (colour, hatch, edge) in styles.items():
+        mine = np.array([found == kind for found in kinds], dtype=bool)
+        if np.any(mine):
+            bars = ax.barh(rows[mine], sizes[mine], height=0.65, color=colour, label=kind, linewidth=0.6)
+            for bar in bars:
+                bar.set(hatch=hatch, edgecolor=edge)
+    for row, candidate in enumerate(shown):
+        ax.text(1.01, row, _beside(candidate), fontsize=7.5, va="center", transform=ax.get_yaxis_transform())
+    ax.set_yticks(rows, [typeset_unit(candidate.words) for candidate in shown])
+    ax.invert_yaxis()
+    ax.set_xscale("log")
+    ax.set_xlim(0.5 * np.min(sizes, initial=1.0), 2.0 * np.max(sizes, initial=10.0))
+    ax.grid(False, axis="y")
+    ax.set_xlabel("score |z| [standard deviations]")
+    if shown:
+        ax.legend(fontsize=7.5, loc="upper right", bbox_to_anchor=(1.0, -0.16), ncols=4, frameon=False)
+    entitle(ax, "how loudly the residual speaks for each effect")
+    return figure
+
+
+def _kind(candidate: Candidate, effect: str | None, indistinguishable: Sequence[str]) -> str:
+    if candidate.effect == effect:
+        return "found"
+    if not candidate.admissible:
+        return "wrong sign or gains energy"
+    return "cannot be told apart" if candidate.effect in indistinguishable else "weaker"
+
+
+def _beside(candidate: Candidate) -> str:
+    refitted = np.isfinite(candidate.chi2_per_dof)
+    words = f"χ²/dof {candidate.chi2_per_dof:.3f}" if refitted else "not refitted"
+    return f"|z| {typeset_number(abs(candidate.z), 3)}, {words}"
+
+
+def plot_errors(
+    before: Fit,
+    after: Fit | None = None,
+    *,
+    measure: Literal["chi2_per_dof", "nrmse", "nrmse_segments"] = "chi2_per_dof",
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw an error on fitted and held-out records, before and after.
+
+    Args:
+        before: the declared model, fitted.
+        after: the extended model, fitted; omitted where there is none.
+        measure: which error.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax, width=3.4)
+    roles = [role for role in ROLES if before.errors[role] is not None]
+    scale, label, form = {
+        "chi2_per_dof": (1.0, "χ²/dof [1]", "{:.3f}"),
+        "nrmse": (100.0, "NRMSE of free runs [%]", "{:.2f}"),
+        "nrmse_segments": (100.0, "NRMSE, segments restarted [%]", "{:.2f}"),
+    }[measure]
+    shifts = (0.0,) if after is None else (-0.2, 0.2)
+    for (name, fit, colour), shift in zip(pair(before, after), shifts, strict=True):
+        values = np.array([scale * getattr(fit.errors[role], measure) for role in roles])
+        bars = ax.bar(np.arange(len(roles)) + shift, values, 0.36, color=colour, label=name)
+        ax.bar_label(bars, [form.format(value) for value in values], fontsize=8, padding=1)
+    noise = [1.0 if measure == "chi2_per_dof" else scale * _noise_share(before, role) for role in roles]
+    places = np.arange(len(roles))
+    ax.hlines(
+        noise, places - 0.45, places + 0.45, "black", linewidth=1.0, linestyle="--", label="noise alone"
+    )
+    ax.set_xticks(range(len(roles)), [ROLES[role] for role in roles])
+    ax.margins(y=0.22)
+    ax.set_xlim(-0.6, len(roles) - 0.4)
+    ax.grid(False, axis="x")
+    ax.set_ylabel(label)
+    ax.legend(fontsize=7.5, loc="upper right", ncols=3)
+    return figure
+
+
+def _noise_share(fit: Fit, role: str) -> float:
+    """Give the NRMSE that the channel's noise alone leaves on the records of a role."""
+    errors = fit.errors[role]
+    return float("nan") if errors is None else fit.noise.sigma * errors.nrmse / errors.rmse
+
+
+def plot_stiffness_scatter(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure:
+    """Draw how the linear stiffness deviates from record to record, in the order of the test.
+
+    Args:
+        before: the declared model, fitted.
+        after: the extended model, fitted; omitted where there is none.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax)
+    names = [record.name for record in before.campaign.records]
+    for label, fit, colour in pair(before, after):
+        deviation = 100.0 * fit.restarts.stiffness
+        ax.plot(range(len(names)), deviation, "o-", color=colour, markersize=4, linewidth=0.8, label=label)
+    ax.axhline(0.0, color="black", linewidth=0.8)
+    ax.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
+    ax.set_xlabel("record, in the order of the test")
+    ax.set_ylabel("deviation of k1 [%]")
+    ax.legend(fontsize=7.5)
+    entitle(ax, "linear stiffness from record to record")
+    return figure

@@ -1,0 +1,209 @@
+"""How stability is drawn: solid stable, dashed unstable, a marker for each bifurcation, words for axes."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ...models import Isolator
+from ...stability import SpecialPoint
+from ..words import typeset_unit
+from ._style import AFTER, BEFORE, LEVELS
+
+MILLIMETRES = 1e3
+
+_UNSTABLE = (0, (4, 2))
+
+
+class Mark(NamedTuple):
+    """How a bifurcation is drawn.
+
+    Attributes:
+        words: what it is called.
+        marker: its form.
+        colour: its filling.
+    """
+
+    words: str
+    marker: str
+    colour: str
+
+
+MARKS: Mapping[str, Mark] = {
+    "fold": Mark("fold", "o", BEFORE),
+    "period_doubling": Mark("period doubling", "s", "#e9c46a"),
+    "neimark_sacker": Mark("Neimark-Sacker", "^", "#2a9d8f"),
+    "symmetry_breaking": Mark("symmetry breaking", "D", "#9b5de5"),
+    "cusp": Mark("cusp", "*", "#222222"),
+}
+"""Every bifurcation, by the name of its kind."""
+
+
+def drive_words(excitation: str, symbol: str = "") -> str:
+    """Give what an axis of drive amplitudes is called.
+
+    Args:
+        excitation: "force" or "base_acceleration", as of an `Isolator`.
+        symbol: stands between name and unit.
+
+    Returns:
+        Such as "force amplitude [N]".
+    """
+    words = "force amplitude" if excitation == "force" else "amplitude of the base acceleration"
+    return f"{words}{symbol and ' '}{symbol} [{drive_unit(excitation)}]"
+
+
+def drive_unit(excitation: str) -> str:
+    """Give the unit of the drive.
+
+    Args:
+        excitation: "force" or "base_acceleration".
+
+    Returns:
+        Such as "N".
+    """
+    return "N" if excitation == "force" else typeset_unit("m/s^2")
+
+
+def parameter_words(model: Isolator, parameter: str) -> str:
+    """Give what an axis of a branch's parameter is called.
+
+    Args:
+        model: the isolator.
+        parameter: "amplitude", "frequency" or the name of a coefficient.
+
+    Returns:
+        Such as "frequency [Hz]".
+    """
+    if parameter == "amplitude":
+        return drive_words(model.excitation)
+    if parameter == "frequency":
+        return "frequency [Hz]"
+    units = {entry.name: entry.spec.unit for entry in model.parameters}
+    unit = typeset_unit(units.get(parameter, "1"))
+    return f"{parameter.replace('_', ' ')}{f' [{unit}]' if unit else ''}"
+
+
+def draw_curve(
+    ax: Axes,
+    x: Float[np.ndarray, " point"],
+    y: Float[np.ndarray, " point"],
+    stable: Bool[np.ndarray, " point"],
+    colour: str,
+    label: str = "",
+) -> None:
+    """Draw a curve of orbits, solid where both ends of a piece are stable and dashed elsewhere.
+
+    Args:
+        ax: the axes.
+        x: along the curve; NaN parts it.
+        y: along the curve.
+        stable: whether each orbit is stable.
+        colour: of the line.
+        label: entry of the legend for its solid part.
+    """
+    stable = np.asarray(stable, dtype=bool)
+    unstable = ~stable & np.isfinite(x) & np.isfinite(y)
+    touched = unstable.copy()
+    touched[1:] |= unstable[:-1]
+    touched[:-1] |= unstable[1:]
+    ax.plot(x, np.where(stable, y, np.nan), color=colour, linewidth=1.6, label=label or None)
+    if unstable.any():
+        ax.plot(x, np.where(touched, y, np.nan), color=colour, linewidth=1.3, linestyle=_UNSTABLE)
+
+
+def draw_special_points(
+    ax: Axes, points: Iterable[tuple[SpecialPoint | Any, float, float]]
+) -> tuple[str, ...]:
+    """Mark bifurcations.
+
+    Args:
+        ax: the axes.
+        points: each with its place.
+
+    Returns:
+        The kinds that were drawn.
+    """
+    found: dict[str, list[tuple[float, float]]] = {}
+    for point, x, y in points:
+        if np.isfinite(x) and np.isfinite(y):
+            found.setdefault(point if isinstance(point, str) else point.kind, []).append((x, y))
+    for kind, places in found.items():
+        ax.plot(*np.transpose(places), zorder=5, **_form(MARKS[kind]))
+    return tuple(found)
+
+
+def _form(mark: Mark) -> dict[str, Any]:
+    return {
+        "linestyle": "none",
+        "marker": mark.marker,
+        "markersize": 9 if mark.marker == "*" else 6,
+        "markerfacecolor": mark.colour,
+        "markeredgecolor": "#222222",
+        "markeredgewidth": 0.8,
+    }
+
+
+def mark_handle(kind: str) -> Line2D:
+    """Give the entry of a bifurcation in a legend.
+
+    Args:
+        kind: of the bifurcation.
+
+    Returns:
+        The handle.
+    """
+    return Line2D([], [], label=MARKS[kind].words, **_form(MARKS[kind]))
+
+
+def stability_legend(
+    ax: Axes,
+    kinds: Iterable[str] = (),
+    *,
+    unstable: bool = True,
+    extra: Iterable[Any] = (),
+) -> None:
+    """Write what solid, dashed and the markers mean, below what is labelled already.
+
+    Args:
+        ax: the axes.
+        kinds: bifurcations that were drawn.
+        unstable: whether anything dashed was drawn.
+        extra: more handles, after these.
+    """
+    handles, _ = ax.get_legend_handles_labels()
+    grey = "#555555"
+    handles.append(Line2D([], [], color=grey, linewidth=1.6, label="stable"))
+    if unstable:
+        handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_UNSTABLE, label="unstable"))
+    handles += [mark_handle(kind) for kind in MARKS if kind in set(kinds)]
+    handles += list(extra)
+    ax.legend(handles=handles, fontsize=7.5, frameon=False)
+
+
+def level_colours(count: int) -> tuple[str, ...]:
+    """Give a colour for each of some curves, lowest level first.
+
+    Args:
+        count: of the curves.
+
+    Returns:
+        The colours.
+    """
+    return (AFTER,) if count == 1 else tuple(LEVELS[place % len(LEVELS)] for place in range(count))
+
+
+def quantity(value: float, unit: str) -> str:
+    """Give a number with its unit.
+
+    Args:
+        value: the number.
+        unit: its unit.
+
+    Returns:
+        Such as "4.2 Hz".
+    """
+    return f"{float(value):.4g} {unit}".rstrip()

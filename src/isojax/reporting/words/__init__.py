@@ -1,0 +1,24 @@
+"""isojax.reporting.words."""
+
+from ._health_words import budget_rows as budget_rows
+from ._health_words import budget_words as budget_words
+from ._health_words import dwell_words as dwell_words
+from ._health_words import health_dict as health_dict
+from ._health_words import mains_words as mains_words
+from ._quantities import INPUT_WORDS as INPUT_WORDS
+from ._quantities import typeset_goodness as typeset_goodness
+from ._quantities import typeset_number as typeset_number
+from ._quantities import typeset_p_value as typeset_p_value
+from ._quantities import typeset_share as typeset_share
+from ._quantities import typeset_unit as typeset_unit
+from ._quantities import typeset_with_error as typeset_with_error
+from ._remainder_words import law_rows as law_rows
+from ._remainder_words import remainder_dict as remainder_dict
+from ._remainder_words import remainder_summary as remainder_summary
+from ._remainder_words import remainder_words as remainder_words
+from ._remainder_words import typeset_formula as typeset_formula
+from ._sentences import caveats as caveats
+from ._sentences import effect_words as effect_words
+from ._sentences import finding_words as finding_words
+from ._sentences import headline as headline
+from ._sentences import health_words as health_words

@@ -1,0 +1,292 @@
+"""The finding in words: headline, what it rests on, what it does not say."""
+
+import math
+
+import scipy.stats
+
+from ..._parameters import Parameter, list_parameters
+from ..._results import RESULTS, is_successful
+from ...elements import CATALOGUE
+from ...identification import GOOD, OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
+from ...records import DataHealth
+from ._quantities import (
+    typeset_goodness,
+    typeset_number,
+    typeset_p_value,
+    typeset_share,
+    typeset_unit,
+    typeset_with_error,
+)
+
+
+def effect_words(effect: str) -> str:
+    """Give the words for a catalogue name.
+
+    Args:
+        effect: catalogue name.
+
+    Returns:
+        Its words.
+    """
+    return typeset_unit(CATALOGUE[effect].words) if effect in CATALOGUE else effect
+
+
+def own_strength(fit: Fit, effect: str) -> tuple[Parameter, float]:
+    """Give the strength of an effect in a fitted model.
+
+    Args:
+        fit: a fit whose model has the effect.
+        effect: catalogue name.
+
+    Returns:
+        The parameter, and its standard error (NaN where it has none).
+    """
+    name = f"{effect}.{CATALOGUE[effect].strength}"
+    entry = next(entry for entry in list_parameters(fit.model) if entry.name == name)
+    return entry, fit.standard_errors.get(name, math.nan)
+
+
+def strength_words(fit: Fit, effect: str) -> str:
+    """Give the strength of an effect with its error.
+
+    Args:
+        fit: a fit whose model has the effect.
+        effect: catalogue name.
+
+    Returns:
+        Such as "Fc = 3.983 ± 0.051 N".
+    """
+    entry, error = own_strength(fit, effect)
+    unit = plain_unit(entry.spec.unit, fit.campaign)
+    return f"{entry.spec.symbol} = {typeset_with_error(float(entry.value), error, unit)}"
+
+
+def error_words(before: Fit, after: Fit) -> str:
+    """Give what happened to the error: on held-out records, else on the fitted ones.
+
+    Args:
+        before: the declared model, fitted.
+        after: the final fit.
+
+    Returns:
+        Such as "held-out χ²/dof 3.00 → 1.02".
+    """
+    role = "holdout" if before.errors["holdout"] is not None else "fit"
+    place = "held-out χ²/dof" if role == "holdout" else "χ²/dof on the fitted records (none was held out)"
+    first, last = before.errors[role], after.errors[role]
+    if first is None or last is None:
+        return f"{place} unknown"
+    if before is after:
+        return f"{place} {typeset_goodness(last.chi2_per_dof, 2)}"
+    return f"{place} {typeset_goodness(first.chi2_per_dof, 2)} → {typeset_goodness(last.chi2_per_dof, 2)}"
+
+
+WORSE = 0.01
+"""Rise of the held-out chi2/dof that matters, where chance does not explain it."""
+
+_CHANCE = 0.01
+"""Of noise alone to lie as high as held-out records that are called unexplained."""
+
+
+def headline(loop: Loop) -> str:
+    """Give the verdict in one sentence, and in a second one what held-out records say against it.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        The sentences.
+    """
+    return " ".join(part for part in (_verdict_words(loop), doubt_words(loop)) if part)
+
+
+def doubt_words(loop: Loop) -> str:
+    """Give what held-out records say against what was named.
+
+    They never move a verdict, or they would not be held out; but who reads it must hear them.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        A sentence, or nothing where they agree.
+    """
+    before, after = loop.before.errors["holdout"], loop.after.errors["holdout"]
+    if before is None or after is None or not loop.findings or not is_successful(loop.after.result):
+        return ""
+    last, rise = after.chi2_per_dof, after.chi2_per_dof - before.chi2_per_dof
+    if not math.isfinite(last):
+        return "The held-out records speak against it: the model runs away on them."
+    if last <= GOOD or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
+        return ""
+    # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
+    if rise > WORSE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
+        return "The held-out records speak against it: they are predicted worse than without it."
+    if loop.verdict == "found":
+        return "The held-out records are not explained down to their noise: there the law may be another."
+    return ""
+
+
+def _verdict_words(loop: Loop) -> str:
+    if not is_successful(loop.after.result):
+        return f"The fit failed, so nothing can be said of the model. {RESULTS[loop.after.result]}"
+    found = [_found(loop.after, one) for one in loop.findings]
+    effects, error = " and ".join(found), error_words(loop.before, loop.after)
+    verb = "were" if len(found) > 1 else "was"
+    if loop.verdict == "none":
+        return f"Nothing is missing: the declared model explains the records down to their noise; {error}."
+    if loop.verdict == "found" and found:
+        return f"{_capital(effects)}, {verb} missing; {error}."
+    if loop.verdict == "partly_explained" and len(found) > 2 and loop.bounds:
+        return (
+            f"{_capital(effects)}, explain the records together; so many may be parts that imitate one law "
+            f"which is not known here; {error} (noise alone: 1)."
+        )
+    if loop.verdict == "partly_explained" and found:
+        return f"{_capital(effects)}, {verb} missing, but something else is too; {error} (noise alone: 1)."
+    pending = loop.last.finding
+    if pending is not None and not found:
+        return (
+            f"Something is missing, and {effect_words(pending.effect)} explains it best, but no effect "
+            f"might be added; {error} (noise alone: 1)."
+        )
+    known = f" even with {effects}" if found else ""
+    return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
+
+
+def _found(fit: Fit, finding: Finding) -> str:
+    others = [effect_words(name) for name in finding.indistinguishable if name != finding.effect]
+    words = f"{effect_words(finding.effect)}, {strength_words(fit, finding.effect)}"
+    return f"{words} (or {' or '.join(others)}, which these data cannot tell from it)" if others else words
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def finding_words(finding: Finding) -> tuple[str, ...]:
+    """Give what a finding rests on, and what it leaves open.
+
+    Args:
+        finding: the finding.
+
+    Returns:
+        A sentence each.
+    """
+    chance = typeset_p_value(finding.p_value)
+    chance = chance if chance.startswith("<") else f"= {chance}"
+    lines = [
+        f"Adding it removes {typeset_share(finding.excess_explained)} of what the model left beyond the "
+        f"noise (family-wise p {chance})."
+    ]
+    if math.isfinite(finding.transfer):
+        # Above one chi2 is below its degrees of freedom there; of next to no excess no share tells.
+        removed = (
+            "leaves no excess"
+            if finding.transfer > 1.0
+            else f"removes {typeset_share(finding.transfer)} of the excess"
+        )
+        lines.append(f"On data that its refit did not see, it {removed}.")
+    others = [name for name in finding.indistinguishable if name != finding.effect]
+    if others:
+        lines.append(f"These data cannot tell it from: {', '.join(effect_words(name) for name in others)}.")
+        if finding.separating_experiment:
+            lines.append(f"What would part them: {finding.separating_experiment}")
+    return tuple(lines)
+
+
+def scatter_words(between: float, within: float) -> str:
+    """Give the scatter of the linear stiffness.
+
+    Args:
+        between: standard deviation from record to record [relative].
+        within: standard deviation from segment to segment of a record [relative]; 0 where none shows.
+
+    Returns:
+        Such as "0.05 % between records and 0.1 % within them".
+    """
+    words = f"{typeset_share(between)} between records"
+    return f"{words} and {typeset_share(within)} within them" if within > 0.0 else words
+
+
+def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
+    """Give the state of the data, before a model is blamed.
+
+    Args:
+        health: dwells, blows and repeats.
+        fit: the final fit.
+
+    Returns:
+        A sentence each.
+    """
+    sigma = typeset_number(fit.noise.sigma, 3)
+    unit = typeset_unit(OUTPUT_UNITS[fit.campaign.output.quantity])
+    lines = [f"Noise of the output: {sigma} {unit} rms, from {fit.noise.method.replace('_', ' ')}."]
+    if fit.noise.note:
+        lines.append(f"{_capital(fit.noise.note)}.")
+    if health.noise_peak is not None:
+        peak = health.noise_peak
+        lines.append(
+            "The scatter from cycle to cycle is not white: it peaks at "
+            f"{typeset_number(peak.frequency, 2)} Hz, {typeset_number(peak.height, 2)} times its level at "
+            f"high frequency, and holds {typeset_number(peak.rms, 2)} {unit} rms there. So scatters an "
+            "isolator that something unmeasured shakes, such as a moving floor: measure the floor and "
+            "declare it as [floor]."
+        )
+    if health.dwells:
+        worst = sorted(health.unsettled, key=lambda one: -one.change)[:3]
+        examples = "; ".join(
+            f"{one.record} at {one.dwell.frequency:.3g} Hz ({typeset_share(one.change)})" for one in worst
+        )
+        lines.append(
+            f"{len(health.unsettled)} of {health.dwells} dwells never settled"
+            + (f"; the worst: {examples}." if worst else ".")
+        )
+    if health.brief_blows:
+        names = ", ".join(f"{blow.record} ({blow.samples})" for blow in health.brief_blows)
+        lines.append(
+            "Blows of fewer than four samples, whose shape between them, and so the momentum that they "
+            f"gave, is a guess: {names}."
+        )
+    if health.repeats:
+        lines.append(
+            f"Repeats agree to {typeset_share(health.repeatability)} (median of {len(health.repeats)})."
+        )
+    scatter = fit.stats.stiffness_scatter
+    if math.isfinite(scatter):
+        lines.append(f"The linear stiffness scatters by {scatter_words(scatter, fit.stats.segment_scatter)}.")
+    return tuple(lines)
+
+
+def caveats(loop: Loop) -> tuple[str, ...]:
+    """Give what the verdict does not say.
+
+    Args:
+        loop: the closed loop.
+
+    Returns:
+        A sentence each.
+    """
+    after = loop.after
+    lines = [
+        f"Effects are named from a catalogue of {len(CATALOGUE)}; other causes can only show as unexplained.",
+        "χ²/dof is measured against the noise of the output channel; an error in that noise scales it.",
+    ]
+    if after.errors["holdout"] is None:
+        lines.append("No record was held out: the error after says nothing of unseen data.")
+    if loop.last.hidden:
+        names = ", ".join(effect_words(name) for name in loop.last.hidden)
+        lines.append(f"These data cannot show beside the fitted coefficients: {names}.")
+    held = {entry.name for entry in list_parameters(loop.before.model)}
+    for entry in list_parameters(after.model):
+        if not entry.spec.fitted and entry.name not in held:
+            unit = typeset_unit(plain_unit(entry.spec.unit, after.campaign))
+            value = f"{typeset_number(float(entry.value), 3)} {unit}"
+            lines.append(f"{entry.name} = {value} is declared, not fitted.")
+    jumps = after.errors["fit"]
+    if jumps is not None and jumps.nrmse > 2.0 * jumps.nrmse_segments:
+        lines.append(
+            "Free runs are far worse than restarted segments: near a fold a sweep may jump earlier or later "
+            "than its model. Judge by χ²/dof there."
+        )
+    return tuple(lines)

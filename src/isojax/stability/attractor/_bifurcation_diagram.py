@@ -1,0 +1,261 @@
+"""Where the motion goes as the drive is turned up, down, or set anew: the stroboscopic diagram."""
+
+import math
+from typing import Any, Literal, get_args
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ..._results import RESULTS
+from ..._types import check_float64
+from ...models import Integrator, Isolator, State
+from ..orbit import ascending, recorded_sine
+from ._stroboscope import (
+    any_disturbance,
+    bounded_or_not,
+    check_counts,
+    repeats_after,
+    start_states,
+    watch_settled,
+)
+
+Direction = Literal["up", "down", "both", "anew"]
+
+_CHAOS = math.log(100.0)
+"""Growth of a disturbance over the samples, as a logarithm, beyond which a motion that repeats nowhere counts
+as chaotic: more than what turning and shearing lend to a motion that is only slow to settle."""
+
+
+class BifurcationDiagram(eqx.Module):
+    """The settled motion, once a drive period, along the drive's amplitude or frequency.
+
+    Where there are several runs, an axis `run` stands in front.
+
+    Attributes:
+        model: the isolator.
+        parameter: "amplitude" or "frequency", what varies.
+        amplitudes: F0 at each point [N, or m/s^2 for base excitation].
+        frequencies: f at each point [Hz].
+        runs: direction of each run, those up first; all starts of a direction stand together.
+        samples: displacement [m], velocity [m/s], internal states at the drive's phase zero.
+        period: drive periods after which the motion repeats; 0 where it repeats after none up to the bound.
+        lyapunov: largest Lyapunov exponent over the samples [1/s].
+        chaotic: whether the motion repeats nowhere and a disturbance grew a hundredfold over the samples.
+        result: whether the motion stayed bounded; where not, its numbers are NaN.
+    """
+
+    model: Isolator
+    parameter: str = eqx.field(static=True)
+    amplitudes: Float[Array, " point"]
+    frequencies: Float[Array, " point"]
+    runs: tuple[str, ...] = eqx.field(static=True)
+    samples: Float[Array, "*run point sample state"]
+    period: Int[Array, "*run point"]
+    lyapunov: Float[Array, "*run point"]
+    chaotic: Bool[Array, "*run point"]
+    result: RESULTS
+
+    @property
+    def displacement(self) -> Float[Array, "*run point sample"]:
+        """[m]."""
+        return self.samples[..., 0]
+
+    @property
+    def velocity(self) -> Float[Array, "*run point sample"]:
+        """[m/s]."""
+        return self.samples[..., 1]
+
+
+def bifurcation_diagram(
+    model: Isolator,
+    amplitudes: Any = None,
+    frequency: Any = None,
+    *,
+    amplitude: Any = None,
+    frequencies: Any = None,
+    direction: Direction | str = "up",
+    starts: Any = None,
+    settle: int = 200,
+    samples: int = 64,
+    longest: int = 16,
+    tolerance: float = 1e-3,
+    integrator: Integrator | None = None,
+) -> BifurcationDiagram:
+    """Give the settled motion, once a drive period, as the drive's amplitude or frequency varies.
+
+    Turned up or down, the motion at one point begins where that at the point before ended, so that jumps and
+    their return show; set anew, it begins at each point from each start. All runs go side by side.
+
+    Args:
+        model: the isolator.
+        amplitudes: ascending drive amplitudes [N, or m/s^2 for base excitation], with `frequency`.
+        frequency: the one frequency that goes with them [Hz].
+        amplitude: the one drive amplitude that goes with `frequencies`.
+        frequencies: ascending [Hz].
+        direction: "up", "down", "both" (down begins where up ended), or "anew".
+        starts: state, or list of states, at which a run begins, and begins again after the motion ran away;
+            rest if omitted.
+        settle: drive periods at each point before the samples.
+        samples: drive periods that are kept.
+        longest: longest period that is told from none; at most half the samples.
+        tolerance: largest distance between a sample and its repetition, as a share of the motion: two
+            branches nearer than this count as one.
+        integrator: solver and steps.
+
+    Returns:
+        The diagram.
+
+    Raises:
+        ValueError: if not exactly one of amplitude and frequency is a list, a list is empty, not positive or
+            not ascending, `direction` is none of the four, a count is not positive, `longest` exceeds half
+            the samples, or a start has the wrong length.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Thompson & Stewart 2002, Nonlinear Dynamics and Chaos, ch. 4 and 6.
+    """
+    check_float64()
+    integrator = Integrator() if integrator is None else integrator
+    parameter, forces, band = _points(amplitudes, frequency, amplitude, frequencies)
+    if direction not in get_args(Direction):
+        raise ValueError(f"Argument `direction` must be one of {get_args(Direction)}, but is {direction!r}.")
+    check_counts(settle=settle, samples=samples, longest=longest)
+    if 2 * longest > samples:
+        raise ValueError(f"Argument `longest` must be at most half of {samples} samples, but is {longest}.")
+    begin = start_states(model, "starts", starts)
+    lanes = tuple(jnp.atleast_1d(value) for value in begin)
+    single = begin[0].ndim == 0 and direction != "both"
+    points = jnp.asarray(forces), jnp.asarray(band)
+    if direction == "anew":
+        seen = _anew(model, integrator, *points, lanes, settle, samples)
+        legs = ("anew",)
+    else:
+        legs = ("up", "down") if direction == "both" else (direction,)
+        seen = _turned(model, integrator, *points, legs, lanes, settle, samples)
+    runs = tuple(leg for leg in legs for _ in range(lanes[0].size))
+    return _diagram(model, parameter, *points, runs, *seen, longest, tolerance, single)
+
+
+def _points(
+    amplitudes: Any, frequency: Any, amplitude: Any, frequencies: Any
+) -> tuple[str, Float[np.ndarray, " point"], Float[np.ndarray, " point"]]:
+    """Give what varies, and amplitude and frequency at each point."""
+    asked = (amplitudes is not None, frequency is not None, amplitude is not None, frequencies is not None)
+    if asked == (True, True, False, False):
+        names, values, held = ("amplitudes", "frequency"), amplitudes, frequency
+    elif asked == (False, False, True, True):
+        names, values, held = ("frequencies", "amplitude"), frequencies, amplitude
+    else:
+        raise ValueError(
+            "Arguments `amplitudes` and `frequency`, or `amplitude` and `frequencies`, must be given, but "
+            f"they are {amplitudes}, {frequency}, {amplitude} and {frequencies}."
+        )
+    varied, single = ascending(names[0], values), np.asarray(held, dtype=float)
+    if single.ndim or not 0.0 < single < math.inf:
+        raise ValueError(f"Argument `{names[1]}` must be one positive number, but is {held}.")
+    still = np.full(len(varied), single)
+    if names[0] == "amplitudes":
+        return "amplitude", varied, still
+    return "frequency", still, varied
+
+
+def _seen(
+    model: Isolator,
+    integrator: Integrator,
+    setting: tuple[Array, Array],
+    state: State,
+    tangent: State,
+    settle: int,
+    samples: int,
+) -> tuple[tuple[State, State], tuple[Array, Array]]:
+    """Give where motion and disturbance end, and the samples and the disturbance's growth, motion first."""
+    drive = recorded_sine(model, *setting)
+    seen = watch_settled(model, integrator, drive, state, tangent, settle, samples)
+    path = jnp.moveaxis(jnp.stack(seen.samples, axis=-1), 0, 1)
+    return (seen.state, seen.tangent), (path, seen.growth.T)
+
+
+@eqx.filter_jit
+def _turned(
+    model: Isolator,
+    integrator: Integrator,
+    amplitudes: Float[Array, " point"],
+    frequencies: Float[Array, " point"],
+    legs: tuple[str, ...],
+    begin: State,
+    settle: int,
+    samples: int,
+) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
+    def point(carry: tuple[State, State], setting: tuple[Array, Array]) -> Any:
+        state, tangent = carry
+        finite = jnp.all(jnp.isfinite(jnp.stack(state + tangent)), axis=0)
+        state = tuple(jnp.where(finite, now, first) for now, first in zip(state, begin, strict=True))
+        tangent = tuple(jnp.where(finite, now, 1.0) for now in tangent)
+        return _seen(model, integrator, setting, state, tangent, settle, samples)
+
+    ways = [slice(None, None, -1 if leg == "down" else 1) for leg in legs]
+    forces = jnp.concatenate([amplitudes[way] for way in ways])
+    band = jnp.concatenate([frequencies[way] for way in ways])
+    _, kept = jax.lax.scan(point, (begin, any_disturbance(begin)), (forces, band))
+    # From leg after leg to runs side by side, each by rising amplitude or frequency.
+    count = amplitudes.size
+    parts = [[v[n * count : (n + 1) * count][way] for n, way in enumerate(ways)] for v in kept]
+    return jnp.concatenate(parts[0], axis=1), jnp.concatenate(parts[1], axis=1)
+
+
+@eqx.filter_jit
+def _anew(
+    model: Isolator,
+    integrator: Integrator,
+    amplitudes: Float[Array, " point"],
+    frequencies: Float[Array, " point"],
+    begin: State,
+    settle: int,
+    samples: int,
+) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
+    points, runs = amplitudes.size, begin[0].size
+    setting = jnp.repeat(amplitudes, runs), jnp.repeat(frequencies, runs)
+    state = tuple(jnp.tile(value, points) for value in begin)
+    _, kept = _seen(model, integrator, setting, state, any_disturbance(state), settle, samples)
+    path, growth = kept
+    return path.reshape(points, runs, samples, -1), growth.reshape(points, runs, samples)
+
+
+@eqx.filter_jit
+def _diagram(
+    model: Isolator,
+    parameter: str,
+    amplitudes: Float[Array, " point"],
+    frequencies: Float[Array, " point"],
+    runs: tuple[str, ...],
+    path: Float[Array, "point run sample state"],
+    growth: Float[Array, "point run sample"],
+    longest: int,
+    tolerance: float,
+    single: bool,
+) -> BifurcationDiagram:
+    finite = jnp.all(jnp.isfinite(path), axis=(2, 3))
+    samples = path.shape[2]
+    strobe = jnp.moveaxis(path, 2, 0)
+    omega = jnp.broadcast_to(2.0 * math.pi * frequencies[:, None], strobe.shape[:-1])
+    period = repeats_after(strobe[..., 0], strobe[..., 1], omega, longest, tolerance)
+    period = jnp.where(finite, period, 0)
+    total = jnp.where(finite, jnp.sum(growth, axis=2), jnp.nan)
+
+    def shown(values: Array) -> Array:
+        return values[:, 0] if single else jnp.swapaxes(values, 0, 1)
+
+    return BifurcationDiagram(
+        model,
+        parameter,
+        amplitudes,
+        frequencies,
+        runs,
+        shown(jnp.where(finite[..., None, None], path, jnp.nan)),
+        shown(period),
+        shown(total * frequencies[:, None] / samples),
+        shown((period == 0) & (total > _CHAOS)),
+        bounded_or_not(shown(finite)),
+    )

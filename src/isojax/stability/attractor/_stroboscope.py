@@ -1,0 +1,220 @@
+"""The motion seen once a drive period, with the growth of a small disturbance beside it."""
+
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ..._results import RESULTS
+from ..._types import Lanes, as_float64
+from ...models import Integrator, Isolator, State
+from ..orbit import Sine, period_map
+
+_TURNING = 20
+"""Periods before the first sample in which a disturbance turns to the direction in which it grows most."""
+
+
+class Watched(NamedTuple):
+    """What the stroboscope saw.
+
+    Attributes:
+        state: after the last period.
+        tangent: a disturbance then, of unit size.
+        samples: each state after each period, period first.
+        growth: logarithm by which the disturbance grew over each period, period first.
+    """
+
+    state: State
+    tangent: State
+    samples: State
+    growth: Lanes
+
+
+def any_disturbance(state: State) -> State:
+    """Give a disturbance that has a share in every direction.
+
+    Args:
+        state: the state that it goes with.
+
+    Returns:
+        One value a state.
+    """
+    return tuple(jnp.ones_like(value) for value in state)
+
+
+def watch(
+    model: Isolator, integrator: Integrator, drive: Sine, state: State, tangent: State, periods: int
+) -> Watched:
+    """Watch the motion once a period.
+
+    The disturbance follows the derivative of the period map along the motion and is brought back to unit size
+    after each period; velocity counts over the drive's angular frequency.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period and solver.
+        drive: the drive that acts.
+        state: at t = 0; any leading shape.
+        tangent: disturbance at t = 0, same shapes.
+        periods: drive periods.
+
+    Returns:
+        What was seen.
+
+    Source: Benettin et al. 1980, Meccanica 15:9 (renormalisation).
+    """
+
+    def size(values: State) -> Array:
+        place, speed, *inner = values
+        square = place**2 + (speed / drive.angular_frequency) ** 2
+        return jnp.sqrt(sum((value**2 for value in inner), start=square))
+
+    def body(carry: tuple[State, State], _: None) -> tuple[tuple[State, State], tuple[State, Lanes]]:
+        here, disturbed = carry
+        moved, turned = jax.jvp(lambda z: period_map(model, integrator, drive, z), (here,), (disturbed,))
+        factor = size(turned)
+        unit = tuple(value / jnp.where(factor == 0.0, 1.0, factor) for value in turned)
+        return (moved, unit), (moved, jnp.log(factor))
+
+    first = size(tangent)
+    begin = (state, tuple(value / first for value in tangent))
+    (state, tangent), (samples, growth) = jax.lax.scan(body, begin, length=periods)
+    return Watched(state, tangent, samples, growth)
+
+
+def settle_down(model: Isolator, integrator: Integrator, drive: Sine, state: State, periods: int) -> State:
+    """Give the state after some periods.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period and solver.
+        drive: the drive that acts.
+        state: at t = 0; any leading shape.
+        periods: drive periods.
+
+    Returns:
+        The state then.
+    """
+
+    def body(here: State, _: None) -> tuple[State, None]:
+        return period_map(model, integrator, drive, here), None
+
+    return jax.lax.scan(body, state, length=periods)[0]
+
+
+def watch_settled(
+    model: Isolator,
+    integrator: Integrator,
+    drive: Sine,
+    state: State,
+    tangent: State,
+    settle: int,
+    periods: int,
+) -> Watched:
+    """Watch the motion once it has settled; a disturbance follows it from shortly before.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period and solver.
+        drive: the drive that acts.
+        state: at t = 0; any leading shape.
+        tangent: disturbance, same shapes.
+        settle: drive periods before.
+        periods: drive periods to watch.
+
+    Returns:
+        What was seen.
+    """
+    turning = min(settle, _TURNING)
+    state = settle_down(model, integrator, drive, state, settle - turning)
+    before = watch(model, integrator, drive, state, tangent, turning)
+    return watch(model, integrator, drive, before.state, before.tangent, periods)
+
+
+def repeats_after(
+    displacement: Float[Array, "sample ..."],
+    velocity: Float[Array, "sample ..."],
+    angular_frequency: Lanes,
+    longest: int,
+    tolerance: float,
+) -> Int[Array, "..."]:
+    """Give the drive periods after which a motion repeats.
+
+    Args:
+        displacement: once a period [m].
+        velocity: once a period [m/s].
+        angular_frequency: of the drive [rad/s].
+        longest: periods to try.
+        tolerance: largest distance between a sample and its repetition, displacement and velocity over the
+            angular frequency, as a share of the largest sample.
+
+    Returns:
+        The smallest count of periods; 0 where there is none up to `longest`, or the motion is not finite.
+    """
+    reduced = velocity / angular_frequency
+    size = jnp.max(jnp.hypot(displacement, reduced), axis=0)
+    found = jnp.zeros(size.shape, dtype=int)
+    for period in range(longest, 0, -1):
+        gap = jnp.hypot(displacement[period:] - displacement[:-period], reduced[period:] - reduced[:-period])
+        found = jnp.where(jnp.max(gap, axis=0) <= tolerance * size, period, found)
+    return found
+
+
+def bounded_or_not(finite: Bool[Array, "..."]) -> RESULTS:
+    """Give the outcome of motions.
+
+    Args:
+        finite: whether each stayed finite.
+
+    Returns:
+        Success, or `not_finite`.
+    """
+
+    def ending(well: Array) -> RESULTS:
+        return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_finite)
+
+    for _ in range(finite.ndim):
+        ending = jax.vmap(ending)
+    return ending(finite)
+
+
+def check_counts(**counts: int) -> None:
+    """Refuse counts that are not positive.
+
+    Args:
+        **counts: each by the name of its argument.
+
+    Raises:
+        ValueError: if one is below one.
+    """
+    for name, count in counts.items():
+        if count < 1:
+            raise ValueError(f"Argument `{name}` must be a positive count, but is {count}.")
+
+
+def start_states(model: Isolator, name: str, starts: Any) -> State:
+    """Give starts, one array a state.
+
+    Args:
+        model: the isolator.
+        name: of the argument.
+        starts: one state, a list of states, or None for rest.
+
+    Returns:
+        The states, with the axis of the list if there is one.
+
+    Raises:
+        ValueError: if a start holds another number of states than the model.
+    """
+    states = 2 + model.internal_states
+    if starts is None:
+        return (jnp.zeros(()),) * states
+    table = as_float64(np.asarray(starts, dtype=float))
+    if table.ndim not in (1, 2) or table.shape[-1] != states:
+        raise ValueError(
+            f"Argument `{name}` must hold {states} numbers a state, but has shape {table.shape}."
+        )
+    return tuple(jnp.moveaxis(table, -1, 0))

@@ -1,0 +1,16 @@
+"""isojax.stability.branch."""
+
+from ._bifurcation_curves import Cusp as Cusp
+from ._bifurcation_curves import FoldCurve as FoldCurve
+from ._bifurcation_curves import PeriodDoublingCurve as PeriodDoublingCurve
+from ._branch import Branch as Branch
+from ._branch import BranchPoints as BranchPoints
+from ._branch import SpecialPoint as SpecialPoint
+from ._branch_switching import switch_branch as switch_branch
+from ._codimension_two import fold_curve as fold_curve
+from ._codimension_two import period_doubling_curve as period_doubling_curve
+from ._continuation import continue_branch as continue_branch
+from ._nearest_folds import NearestFolds as NearestFolds
+from ._nearest_folds import find_nearest_folds as find_nearest_folds
+from ._parameter_family import Family as Family
+from ._special_points import special_point as special_point

@@ -1,0 +1,199 @@
+"""A branch of periodic orbits: its points, its bifurcations, and what following another one needs."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Complex, Float
+
+from ..._results import RESULTS
+from ...models import Integrator, Isolator, State
+from ..orbit import Sine, modulus, multipliers, trajectory
+from ._extended_system import Kind
+from ._parameter_family import Family
+
+
+class BranchPoints(eqx.Module):
+    """Points along a branch, in the order in which they were found; NaN past the end of the shorter branches
+    of a batch.
+
+    Attributes:
+        value: of the parameter [its SI unit].
+        amplitude: F0 [N, or m/s^2 for base excitation].
+        frequency: f [Hz].
+        y0: state at t = 0, SI units.
+        response: half the peak-to-peak displacement [m].
+        multipliers: over the period of the orbit, in falling modulus.
+        half_period_multipliers: those of the half-period map; NaN where the orbits are not symmetric.
+        tangent: unit vector along the branch, of the scaled state and the share of the parameter's range.
+    """
+
+    value: Float[Array, "*points"]
+    amplitude: Float[Array, "*points"]
+    frequency: Float[Array, "*points"]
+    y0: Float[Array, "*points state"]
+    response: Float[Array, "*points"]
+    multipliers: Complex[Array, "*points multiplier"]
+    half_period_multipliers: Complex[Array, "*points multiplier"]
+    tangent: Float[Array, "*points unknown"]
+
+    @property
+    def spectral_radius(self) -> Float[Array, "*points"]:
+        """Largest modulus of the multipliers."""
+        return modulus(self.multipliers[..., 0])
+
+    @property
+    def stable(self) -> Bool[Array, "*points"]:
+        """Whether every disturbance dies out."""
+        return self.spectral_radius < 1.0
+
+
+class SpecialPoint(eqx.Module):
+    """A bifurcation of periodic orbits.
+
+    Attributes:
+        kind: "fold", "period_doubling", "neimark_sacker" or "symmetry_breaking".
+        periods: drive periods after which the orbit repeats.
+        branch: which branch of a batch it lies on; 0 for a single one.
+        value: of the parameter [its SI unit].
+        amplitude: F0 [N, or m/s^2 for base excitation].
+        frequency: f [Hz].
+        y0: state at t = 0, SI units.
+        multipliers: over `periods` drive periods, in falling modulus.
+        half_period_multipliers: those of the half-period map; NaN where the orbit is not symmetric.
+        direction: direction of the state in which the orbit loses its hold, SI units; of a pair
+            its real part.
+        result: whether it was found to the tolerance of a single orbit; if not, its numbers are NaN.
+        family: isolators and drives along the parameter.
+        integrator: steps and solver.
+        symmetric: whether it was closed with the half-period map.
+    """
+
+    kind: Kind = eqx.field(static=True)
+    periods: int = eqx.field(static=True)
+    branch: int = eqx.field(static=True)
+    value: Float[Array, ""]
+    amplitude: Float[Array, ""]
+    frequency: Float[Array, ""]
+    y0: Float[Array, " state"]
+    multipliers: Complex[Array, " multiplier"]
+    half_period_multipliers: Complex[Array, " multiplier"]
+    direction: Float[Array, " state"]
+    result: RESULTS
+    family: Family
+    integrator: Integrator
+    symmetric: bool = eqx.field(static=True)
+
+    @property
+    def spectral_radius(self) -> Float[Array, ""]:
+        """Largest modulus of the multipliers."""
+        return modulus(self.multipliers[0])
+
+
+class Branch(eqx.Module):
+    """Periodic orbits along one parameter, or a batch of such branches.
+
+    Attributes:
+        model: the isolator.
+        parameter: what varies.
+        periods: drive periods after which the orbits repeat.
+        symmetric: whether they were closed with the half-period map, so that the second half of each is minus
+            the first.
+        closed: whether the branch returns to its first point.
+        points: the orbits.
+        special_points: bifurcations in the order of the branch; of a batch, branch after branch.
+        result: whether the branch was followed to the end of the range, or back to its beginning.
+        family: isolators and drives along the parameter.
+        integrator: steps and solver.
+        scale: size of each state.
+        longest: largest step.
+    """
+
+    model: Isolator
+    parameter: str = eqx.field(static=True)
+    periods: int = eqx.field(static=True)
+    symmetric: bool = eqx.field(static=True)
+    closed: Bool[Array, "*branch"]
+    points: BranchPoints
+    special_points: tuple[SpecialPoint, ...]
+    result: RESULTS
+    family: Family
+    integrator: Integrator
+    scale: Float[Array, "*branch state"]
+    longest: float = eqx.field(static=True)
+
+
+def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float[Array, ""]:
+    """Give half the peak-to-peak displacement, each peak by a parabola through its sample [m].
+
+    Args:
+        model: the isolator.
+        drive: the drive that acts.
+        path: states at equidistant instants of the motion, time first.
+        turns: drive periods that the path lasts.
+
+    Returns:
+        The amplitude.
+    """
+    samples = path[0].shape[0]
+
+    def peak(sign: float) -> Array:
+        place = jnp.argmax(sign * path[0])
+        state = tuple(along[place] for along in path)
+        phase = 2.0 * math.pi * turns * place / (samples - 1)
+        u, u_rate = drive.at(jnp.sin(phase), jnp.cos(phase))
+        bend = model.acceleration(state, u, u_rate)
+        return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
+
+    return 0.5 * (peak(1.0) - peak(-1.0))
+
+
+def branch_point(
+    family: Family,
+    integrator: Integrator,
+    turns: float,
+    scale: Float[Array, " state"],
+    unknown: Float[Array, " unknown"],
+    tangent: Float[Array, " unknown"],
+) -> BranchPoints:
+    """Give what is known of one point of a branch.
+
+    Args:
+        family: isolators and drives.
+        integrator: steps and solver.
+        turns: drive periods of the map.
+        scale: size of each state.
+        unknown: scaled state and share of the parameter.
+        tangent: along the branch.
+
+    Returns:
+        The point. Its derivatives by the model are those of the branch moving across itself.
+    """
+    states = scale.shape[0]
+    frozen = jax.lax.stop_gradient(family)
+
+    def open_end(at: Family, here: Array) -> Array:
+        moved = at.image(integrator, turns, scale, here[:states], here[states:])
+        return moved - here[:states]
+
+    slope = jax.jacfwd(lambda here: open_end(frozen, here))(unknown)
+    left = jnp.concatenate([open_end(family, unknown), jnp.zeros(1)])
+    unknown = unknown - jnp.linalg.solve(jnp.concatenate([slope, tangent[None]]), left)
+    scaled, shares = unknown[:states], unknown[states:]
+    setting = family.at(shares)
+    matrix = jax.jacfwd(lambda z: family.image(integrator, turns, scale, z, shares))(scaled)
+    roots = multipliers(matrix)
+    half = turns == 0.5
+    lasting = max(turns, 1.0)
+    path = trajectory(setting.model, integrator, setting.drive, tuple(scaled * scale), turns=lasting)
+    return BranchPoints(
+        family.values(shares)[0],
+        jnp.asarray(setting.amplitude),
+        jnp.asarray(setting.frequency),
+        scaled * scale,
+        half_range(setting.model, setting.drive, path, lasting),
+        roots * roots if half else roots,
+        roots if half else jnp.full(states, jnp.nan + 0j),
+        tangent,
+    )

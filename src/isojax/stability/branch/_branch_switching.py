@@ -1,0 +1,76 @@
+"""Onto the branch that leaves another: orbits of doubled period, and orbits that have lost their symmetry."""
+
+import jax
+import jax.numpy as jnp
+
+from ..._results import is_successful
+from ..._types import check_float64
+from ..orbit import is_odd
+from ._branch import Branch, SpecialPoint
+from ._continuation import assemble, one_of, refuse_traced, trace
+
+
+def switch_branch(
+    branch: Branch,
+    special_point: SpecialPoint,
+    *,
+    step: float | None = None,
+    most: int = 1000,
+) -> Branch:
+    """Follow the branch that leaves at a period doubling or at a broken symmetry.
+
+    It begins a quarter of a step from the point in its critical direction, closed over twice the period
+    (doubling) or over the full period in place of half of one (broken symmetry). The direction's sign is no
+    choice: the two sides are one doubled orbit a period later, or mirror images.
+
+    Args:
+        branch: the branch on which the point lies.
+        special_point: of kind "period_doubling" or "symmetry_breaking".
+        step: largest step; that of `branch` if omitted.
+        most: points to give up after.
+
+    Returns:
+        The new branch, over the range of the old one.
+
+    Raises:
+        ValueError: if the point is of another kind, was not found, or lies on no branch of the batch, or
+            `step` or `most` is not positive.
+
+    Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Kuznetsov 2004, Elements of Applied
+    Bifurcation Theory, sec. 10.2.
+    """
+    check_float64()
+    refuse_traced(branch.model, special_point.value)
+    step = branch.longest if step is None else step
+    for name, value in (("step", step), ("most", most)):
+        if not value > 0:
+            raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
+    if special_point.kind not in ("period_doubling", "symmetry_breaking"):
+        raise ValueError(
+            "Argument `special_point` must be of kind period_doubling or symmetry_breaking, but is of kind "
+            f"{special_point.kind}."
+        )
+    if not is_successful(special_point.result):
+        raise ValueError("Argument `special_point` must be one that was found, but its numbers are NaN.")
+    scales = jnp.atleast_2d(branch.scale)
+    if special_point.branch >= scales.shape[0]:
+        raise ValueError(
+            f"Argument `special_point` must lie on one of {scales.shape[0]} branches, but is of branch "
+            f"{special_point.branch}."
+        )
+    lane = slice(special_point.branch, special_point.branch + 1)
+    scale = scales[lane]
+    family = branch.family
+    family = one_of(family, jnp.atleast_1d(family.amplitude)[lane], jnp.atleast_1d(family.frequency)[lane])
+    periods = special_point.periods * (2 if special_point.kind == "period_doubling" else 1)
+    frozen, point = jax.lax.stop_gradient((family, special_point))
+    direction = point.direction / scale[0]
+    tangent = jnp.concatenate([direction / jnp.linalg.norm(direction), jnp.zeros(1)])
+    share = (point.value - frozen.start) / (frozen.stop - frozen.start)
+    origin = jnp.concatenate([point.y0 / scale[0], share])
+    first = (origin + 0.25 * step * tangent)[None]
+    followed = trace(
+        frozen, branch.integrator, float(periods), scale, first, tangent[None], tangent[None], step, most
+    )
+    odd = is_odd(frozen.model)
+    return assemble(family, branch.integrator, periods, False, odd, scale, followed, batched=False, step=step)

@@ -1,0 +1,334 @@
+"""Branches of periodic orbits along one parameter, past their folds."""
+
+import math
+from collections.abc import Sequence
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+
+from ..._parameters import list_parameters
+from ..._results import RESULTS
+from ..._types import Lanes, Scalar, as_float64, check_float64
+from ...models import Integrator, Isolator
+from ..orbit import is_odd, response_start
+from ._arc_length import CLOSED, REACHED_BOUND, Followed, follow
+from ._branch import Branch, BranchPoints, branch_point
+from ._parameter_family import Family
+from ._special_points import find_special_points
+
+_TRIALS = 33
+"""Parameters at which the size of the motion is estimated beforehand."""
+
+
+def tracing_steps() -> Integrator:
+    """Give the steps with which curves are followed where none are asked for.
+
+    Returns:
+        256 steps a period: what is located along a curve starts the search for the exact point.
+    """
+    return Integrator(steps_per_period=256)
+
+
+def refuse_traced(*values: object) -> None:
+    """Refuse to work under a transformation that hides the numbers.
+
+    Args:
+        *values: pytrees whose numbers must be known.
+
+    Raises:
+        ValueError: if a number is known to no one yet, as under `jax.jit` or `jax.vmap`.
+    """
+    for leaf in jax.tree.leaves(jax.lax.stop_gradient(values)):
+        if isinstance(leaf, Tracer):
+            raise ValueError(
+                "Argument `model` must hold known numbers, because how many points a curve has depends on "
+                "them, but it is being traced; call outside jax.jit and jax.vmap (jax.jacfwd works)."
+            )
+
+
+def continue_branch(
+    model: Isolator,
+    *,
+    parameter: str,
+    start: Scalar | float,
+    stop: Scalar | float,
+    amplitude: Lanes | float | None = None,
+    frequency: Lanes | float | None = None,
+    start_state: Sequence[Scalar | float] | Float[Array, " state"] | None = None,
+    periods: int = 1,
+    symmetric: bool | None = None,
+    step: float = 0.02,
+    most: int = 1000,
+    integrator: Integrator | None = None,
+) -> Branch:
+    """Follow a branch of periodic orbits along the drive's amplitude, its frequency or any coefficient.
+
+    Pseudo-arc-length continuation of the period map's fixed point; of symmetric orbits of odd models, of the
+    half-period map's. Bifurcations are located on the way and then found anew with the motion split at its
+    kinks. `jax.jacfwd` over the model works: the special points move as they do when found anew, the points
+    of the branch across it.
+
+    Args:
+        model: the isolator.
+        parameter: "amplitude", "frequency", or a coefficient by its name in reports, such as
+            `cubic_stiffness.coefficient` or `mass`.
+        start: value of the parameter where the branch begins.
+        stop: value where it ends; it also ends where it comes back to `start`.
+        amplitude: F0 [N, or m/s^2 for base excitation], where it is not the parameter.
+        frequency: f [Hz], where it is not the parameter. An array here or there gives a batch of branches,
+            followed together.
+        start_state: state at t = 0 near an orbit at `start`; the one-harmonic balance with the smallest
+            motion if omitted.
+        periods: drive periods after which the orbits repeat.
+        symmetric: whether to follow symmetric orbits with the half-period map; if omitted, so for an odd
+            model without a `start_state`.
+        step: largest step, over the size of the motion and the range of the parameter.
+        most: points to give up after.
+        integrator: solver and steps; 256 a period if omitted.
+
+    Returns:
+        The branch. Where it ends early `result` says so, and the points found so far stand.
+
+    Raises:
+        ValueError: if `parameter` is none of the model's, the drive is incomplete or said twice, the range is
+            empty or not finite, a frequency is not positive, `start_state` has the wrong length, `symmetric`
+            is asked of a model that is not odd, or `step`, `most` or `periods` is not positive.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Nayfeh & Balachandran 1995, sec. 6.1.
+    """
+    check_float64()
+    refuse_traced(model, amplitude, frequency, start, stop)
+    integrator = tracing_steps() if integrator is None else integrator
+    family, batched = _family(model, parameter, start, stop, amplitude, frequency)
+    states = 2 + model.internal_states
+    if start_state is not None and len(start_state) != states:
+        raise ValueError(f"Argument `start_state` must hold {states} states, but holds {len(start_state)}.")
+    for name, value in (("periods", periods), ("step", step), ("most", most)):
+        if not value > 0:
+            raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
+    odd = is_odd(jax.lax.stop_gradient(model))
+    half = odd and periods == 1 and (bool(symmetric) or (symmetric is None and start_state is None))
+    if symmetric and not half:
+        raise ValueError(
+            "Argument `symmetric` must be False for a model that is not odd and for orbits of several "
+            "periods, but is True."
+        )
+    begin = None if start_state is None else jnp.stack([as_float64(value) for value in start_state])
+    frozen = jax.lax.stop_gradient(family)
+    first, scale = _starts(frozen, begin)
+    fixed = jnp.zeros((*scale.shape[:1], states + 1)).at[:, -1].set(1.0)
+    turns = 0.5 if half else float(periods)
+    followed = trace(frozen, integrator, turns, scale, first, fixed, fixed, step, most)
+    return assemble(family, integrator, periods, half, odd, scale, followed, batched, step)
+
+
+def _family(
+    model: Isolator,
+    parameter: str,
+    start: Scalar | float,
+    stop: Scalar | float,
+    amplitude: Lanes | float | None,
+    frequency: Lanes | float | None,
+) -> tuple[Family, bool]:
+    """Check what is varied and what is held; give the family, drive with an axis, and whether asked so."""
+    if parameter not in ("amplitude", "frequency"):
+        names = [entry.name for entry in list_parameters(model)]
+        if parameter not in names:
+            raise ValueError(
+                f"Argument `parameter` must be amplitude, frequency or one of {', '.join(names)}, but is "
+                f"{parameter!r}."
+            )
+    held = {"amplitude": amplitude, "frequency": frequency}
+    for name, value in held.items():
+        if (value is None) != (name == parameter):
+            wanted = "omitted where it is the parameter" if name == parameter else "given"
+            raise ValueError(f"Argument `{name}` must be {wanted}, but is {value}.")
+    start, stop = as_float64(start), as_float64(stop)
+    ends = [float(jax.lax.stop_gradient(end)) for end in (start, stop)]
+    if not all(map(math.isfinite, ends)) or ends[0] == ends[1]:
+        raise ValueError(
+            f"Argument `stop` must be finite and differ from `start`, but they are {ends[1]} and {ends[0]}."
+        )
+    drive = {name: as_float64(0.0 if value is None else value) for name, value in held.items()}
+    swept = (
+        np.asarray(ends)
+        if parameter == "frequency"
+        else np.asarray(jax.lax.stop_gradient(drive["frequency"]))
+    )
+    if not np.all((swept > 0.0) & np.isfinite(swept)):
+        name = "start" if parameter == "frequency" else "frequency"
+        raise ValueError(f"Argument `{name}` must be a positive frequency, but is {swept} Hz.")
+    shape = np.broadcast_shapes(*(value.shape for value in drive.values()))
+    if len(shape) > 1:
+        raise ValueError(f"Argument `{parameter}`'s partner must be a number or a list, but has {shape}.")
+    lanes = {name: jnp.broadcast_to(value, shape or (1,)) for name, value in drive.items()}
+    family = Family(model, lanes["amplitude"], lanes["frequency"], start[None], stop[None], (parameter,))
+    return family, bool(shape)
+
+
+def one_of(family: Family, amplitude: Array, frequency: Array) -> Family:
+    """Give one member of a batch.
+
+    Args:
+        family: the batch.
+        amplitude: F0 of the one.
+        frequency: f of the one [Hz].
+
+    Returns:
+        The member.
+    """
+    return eqx.tree_at(lambda f: (f.amplitude, f.frequency), family, (amplitude, frequency))
+
+
+@eqx.filter_jit
+def _starts(
+    family: Family, begin: Float[Array, " state"] | None
+) -> tuple[Float[Array, "branch unknown"], Float[Array, "branch state"]]:
+    """Give the first point of each branch, and the size of its states over the range."""
+
+    def lane(amplitude: Array, frequency: Array) -> tuple[Array, Array]:
+        here = one_of(family, amplitude, frequency)
+
+        def answer(share: Array) -> tuple[Array, Array]:
+            setting = here.at(share[None])
+            state = response_start(*setting)
+            omega = setting.drive.angular_frequency
+            motion = jnp.hypot(state[0], state[1] / omega)
+            return state, jnp.concatenate([jnp.stack([motion, motion * omega]), jnp.abs(state[2:])])
+
+        state, sizes = jax.vmap(answer)(jnp.linspace(0.0, 1.0, _TRIALS))
+        size = jnp.max(jnp.where(jnp.isfinite(sizes), sizes, 0.0), axis=0)
+        scale = jnp.where(size > 0.0, size, 1.0)
+        first = state[0] if begin is None else begin
+        return jnp.concatenate([first / scale, jnp.zeros(1)]), scale
+
+    return jax.vmap(lane)(family.amplitude, family.frequency)
+
+
+@eqx.filter_jit
+def trace(
+    family: Family,
+    integrator: Integrator,
+    turns: float,
+    scale: Float[Array, "branch state"],
+    first: Float[Array, "branch unknown"],
+    row: Float[Array, "branch unknown"],
+    tangent: Float[Array, "branch unknown"],
+    step: float,
+    most: int,
+) -> Followed:
+    """Follow a batch of branches.
+
+    Args:
+        family: isolators and drives, drive with a leading axis.
+        integrator: steps and solver.
+        turns: drive periods of the map.
+        scale: size of each state.
+        first: start of each: scaled state and share.
+        row: see `follow`.
+        tangent: see `follow`.
+        step: largest step.
+        most: points at most.
+
+    Returns:
+        The curves.
+    """
+    states = scale.shape[1]
+    free = jnp.full(states, jnp.inf)
+
+    def lane(
+        amplitude: Array, frequency: Array, scale: Array, first: Array, row: Array, way: Array
+    ) -> Followed:
+        here = one_of(family, amplitude, frequency)
+
+        def open_end(u: Array) -> Array:
+            return here.image(integrator, turns, scale, u[:states], u[states:]) - u[:states]
+
+        lower, upper = jnp.concatenate([-free, jnp.zeros(1)]), jnp.concatenate([free, jnp.ones(1)])
+        return follow(open_end, first, row, way, lower, upper, step=step, most=most)
+
+    return jax.vmap(lane)(family.amplitude, family.frequency, scale, first, row, tangent)
+
+
+@eqx.filter_jit
+def _points(
+    family: Family, integrator: Integrator, turns: float, scale: Array, unknowns: Array, tangents: Array
+) -> BranchPoints:
+    def lane(
+        amplitude: Array, frequency: Array, scale: Array, unknown: Array, tangent: Array
+    ) -> BranchPoints:
+        here = one_of(family, amplitude, frequency)
+        return jax.vmap(lambda u, t: branch_point(here, integrator, turns, scale, u, t))(unknown, tangent)
+
+    return jax.vmap(lane)(family.amplitude, family.frequency, scale, unknowns, tangents)
+
+
+def assemble(
+    family: Family,
+    integrator: Integrator,
+    periods: int,
+    half: bool,
+    odd: bool,
+    scale: Float[Array, "branch state"],
+    followed: Followed,
+    batched: bool,
+    step: float,
+) -> Branch:
+    """Give the branch of traced points: what is known of each, and the bifurcations between them.
+
+    Args:
+        family: isolators and drives, drive with a leading axis.
+        integrator: steps and solver.
+        periods: drive periods after which the orbits repeat.
+        half: whether they were closed with the half-period map.
+        odd: whether the model is odd.
+        scale: size of each state.
+        followed: the traced points.
+        batched: whether to keep the leading axis.
+        step: largest step.
+
+    Returns:
+        The branch.
+    """
+    turns = 0.5 if half else float(periods)
+    counts = np.asarray(followed.found)
+    # Rounded up, so that few shapes are compiled.
+    room = min(-(-max(int(counts.max()), 2) // 128) * 128, followed.unknowns.shape[1])
+    unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
+    points = _points(family, integrator, turns, scale, unknowns, tangents)
+    special = find_special_points(family, integrator, periods, half, odd, scale, unknowns, tangents, counts)
+    longest = int(counts.max())
+
+    def crop(values: Array) -> Array:
+        used = jnp.asarray(np.arange(longest) < counts[:, None])
+        used = used.reshape(used.shape + (1,) * (values.ndim - 2))
+        kept = jnp.where(used, values[:, :longest], jnp.nan)
+        return kept if batched else kept[0]
+
+    def single(values: Array) -> Array:
+        return values if batched else values[0]
+
+    ended = (followed.ending == REACHED_BOUND) | (followed.ending == CLOSED)
+    good = RESULTS.promote(diffrax.RESULTS.successful)
+    result = jax.vmap(lambda well: RESULTS.where(well, good, RESULTS.not_converged))(ended)
+    kept = one_of(family, single(family.amplitude), single(family.frequency))
+    return Branch(
+        family.model,
+        family.names[0],
+        periods,
+        half,
+        single(followed.ending == CLOSED),
+        jax.tree.map(crop, points),
+        special,
+        result if batched else jax.tree.map(lambda value: value[0], result),
+        kept,
+        integrator,
+        single(scale),
+        step,
+    )

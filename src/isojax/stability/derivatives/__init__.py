@@ -1,0 +1,4 @@
+"""isojax.stability.sensitivity."""
+
+from ._sensitivity import Sensitivity as Sensitivity
+from ._sensitivity import sensitivity as sensitivity

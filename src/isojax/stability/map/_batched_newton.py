@@ -1,0 +1,321 @@
+"""Newton passes over many cells at once: orbits and multipliers of a chunk of a map."""
+
+import math
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
+from jaxtyping import Array, Complex, Float, Int
+
+from ..._types import Lanes
+from ...models import Integrator, Isolator, State
+from ..orbit import Crossings, Sine, advance_in_pieces, modulus, multipliers
+from ._starts import Candidates, candidate_starts
+from ._surface import Surface
+
+_PASSES = 12
+"""Newton steps after which a cell counts as failed."""
+
+SAMPLED = 1024
+"""Cells of which the integration error is found, and that share a further pass where the first did not do."""
+
+CLOSED = 1e-9
+"""Relative step after which an orbit is closed far better than it is integrated."""
+
+_WIDE = {"xla_cpu_prefer_vector_width": 512}
+"""A tenth faster where processors have such vectors; the compiler's own preference is half of it."""
+
+FOUND, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
+"""Codes of how the search in a cell ended."""
+
+
+class Found(NamedTuple):
+    """Orbits of a list of candidates, each from the phase at which its start is largest.
+
+    Attributes:
+        states: there.
+        direction: drive over its amplitude, sine and cosine part, tau counted from there.
+        phases: where the orbit passes kinks.
+        multipliers: over one drive period.
+        radius: largest modulus.
+        swing: half the peak-to-peak displacement [m].
+        code: how the search ended.
+    """
+
+    states: Float[np.ndarray, "candidate state"]
+    direction: Float[np.ndarray, "candidate 2"]
+    phases: Float[np.ndarray, "candidate crossing"]
+    multipliers: Complex[np.ndarray, "candidate multiplier"]
+    radius: Float[np.ndarray, " candidate"]
+    swing: Float[np.ndarray, " candidate"]
+    code: Int[np.ndarray, " candidate"]
+
+
+class Lane(NamedTuple):
+    """What one orbit is found from: one number each, or one lane of numbers.
+
+    Attributes:
+        state: start.
+        drive: the drive, tau counted from the start.
+        phases: where the orbit passes kinks.
+        swing: its size [m].
+    """
+
+    state: State
+    drive: Sine
+    phases: State
+    swing: Lanes
+
+
+class Method(eqx.Module):
+    """How a period is integrated over.
+
+    Attributes:
+        integrator: the solver and the tolerances.
+        half: whether the half-period map is used.
+        sides: signs of the kinks on each piece; None where orbits are not split.
+        steps: a period; a number on the device, so that one compiled pass serves for all.
+    """
+
+    integrator: Integrator
+    half: bool = eqx.field(static=True)
+    sides: Float[Array, "piece kink"] | None
+    steps: Int[Array, ""]
+
+    def finer(self, times: int) -> "Method":
+        """Give the same way with more steps.
+
+        Args:
+            times: how many times as many.
+
+        Returns:
+            The method.
+        """
+        return Method(self.integrator, self.half, self.sides, self.steps * times)
+
+    def moved(self, model: Isolator, lane: Lane) -> State:
+        """Give the state one period later, or minus the state half a period later.
+
+        Args:
+            model: the isolator.
+            lane: one orbit.
+
+        Returns:
+            The state.
+        """
+        phases = () if self.sides is None else lane.phases
+        pieces = len(phases) + 1
+        parts = pieces * (2 if self.half else 1)
+        steps = (self.steps + parts - 1) // parts
+        crossings = Crossings(
+            jnp.stack(phases) if phases else jnp.zeros(0),
+            jnp.full(pieces - 1, -1),
+            self.sides,
+            jnp.array(True),
+        )
+        end = math.pi if self.half else 2.0 * math.pi
+        after, _ = advance_in_pieces(model, self.integrator, lane.drive, lane.state, crossings, end, steps)
+        return tuple(-value for value in after) if self.half else after
+
+
+def newton_step(model: Isolator, method: Method, lane: Lane) -> tuple[State, Float[Array, "state state"]]:
+    """Give the step of Newton's method on the period map of one orbit, and the derivative of that map.
+
+    Args:
+        model: the isolator.
+        method: how to integrate.
+        lane: the orbit.
+
+    Returns:
+        Change of the state that closes the orbit to first order; derivative of the map at the state.
+    """
+
+    def moved(begin: State) -> tuple[State, State]:
+        end = method.moved(model, lane._replace(state=begin))
+        return end, end
+
+    slopes, end = jax.jacfwd(moved, has_aux=True)(lane.state)
+    gap = [b - a for a, b in zip(lane.state, end, strict=True)]
+    matrix = jnp.stack([jnp.stack(row) for row in slopes])
+    if len(lane.state) > 2:
+        return tuple(jnp.linalg.solve(jnp.eye(len(gap)) - matrix, jnp.stack(gap))), matrix
+    (a, b), (c, d) = slopes
+    determinant = (1.0 - a) * (1.0 - d) - b * c
+    step = (((1.0 - d) * gap[0] + b * gap[1]) / determinant, (c * gap[0] + (1.0 - a) * gap[1]) / determinant)
+    return step, matrix
+
+
+@eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
+def _pass(model: Isolator, method: Method, lanes: Lane) -> tuple[State, Lanes, Array, Lanes]:
+    step, matrix = jax.vmap(lambda lane: newton_step(model, method, lane))(lanes)
+    state, swing, omega = lanes.state, lanes.swing, lanes.drive.angular_frequency
+    scales = (swing, swing * omega, *(jnp.maximum(jnp.abs(s), 1e-3 * swing) for s in state[2:]))
+    size = jnp.max(jnp.stack([jnp.abs(d) / c for d, c in zip(step, scales, strict=True)]), axis=0)
+    # Far off, a full step may leave the basin of the orbit that the start is near to.
+    damping = jnp.minimum(1.0, 0.3 / size)
+    moved = tuple(s + damping * d for s, d in zip(state, step, strict=True))
+    roots = multipliers(matrix)
+    roots = roots * roots if method.half else roots
+    return moved, size, roots, modulus(roots[..., 0])
+
+
+@eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
+def _lanes(model: Isolator, tables: Any, where: Any) -> Lane:
+    stacked, displacements, rest, forces, frequencies = tables
+    force, column, interval = where
+    push, rate = forces[force], frequencies[column]
+    states = 2 + model.internal_states
+    starts = candidate_starts(stacked, displacements, rest, states, push, column, interval)
+    sine, cosine = starts.direction
+    return Lane(starts.states, Sine(push * sine, push * cosine, rate), starts.phases, starts.swing)
+
+
+class CellSolver(eqx.Module):
+    """What finds the orbits of any list of candidates.
+
+    Attributes:
+        model: the isolator.
+        method: how to integrate.
+        tables: the surface and the axes of the map, on the device.
+        sharding: how a chunk is spread over devices.
+    """
+
+    model: Isolator
+    method: Method
+    tables: tuple[Any, ...]
+    sharding: NamedSharding = eqx.field(static=True)
+
+    def __call__(self, candidates: Candidates, size: int, limit: float | None = None) -> Found:
+        """Find the orbits of candidates.
+
+        Args:
+            candidates: at most `size` of them.
+            size: lanes of the compiled pass.
+            limit: see `improve`.
+
+        Returns:
+            Their orbits.
+        """
+        where = jax.device_put([padded(values, size) for values in candidates[:3]], self.sharding)
+        lanes = _lanes(self.model, self.tables, where)
+        return self.improve(self.method, lanes, candidates.force.size, limit)
+
+    def improve(self, method: Method, lanes: Lane, count: int, limit: float | None = None) -> Found:
+        """Improve starts until each has converged or failed.
+
+        Args:
+            method: how to integrate.
+            lanes: the starts.
+            count: how many of the lanes matter.
+            limit: largest relative step after which an orbit needs no other; that of maps if omitted.
+
+        Returns:
+            The orbits.
+        """
+        limit = method.integrator.map_tolerance if limit is None else limit
+        moved, *rest = _pass(self.model, method, lanes)
+        lanes = lanes._replace(state=moved)
+        lanes, step, roots, radius = jax.tree_util.tree_map(lambda it: np.asarray(it)[:count], (lanes, *rest))
+        for _ in range(_PASSES - 1):
+            late = np.flatnonzero(~(step <= limit) & np.isfinite(radius))
+            if not late.size:
+                break
+            if not step.flags.writeable:
+                lanes, step, roots, radius = jax.tree_util.tree_map(np.array, (lanes, step, roots, radius))
+            for begin in range(0, late.size, SAMPLED):
+                block = late[begin : begin + SAMPLED]
+                some = jax.tree_util.tree_map(lambda it, block=block: padded(it[block], SAMPLED), lanes)
+                again = _pass(self.model, method, jax.device_put(some, self.sharding))
+                targets = [*lanes.state, step, roots, radius]
+                for target, value in zip(targets, [*again[0], *again[1:]], strict=True):
+                    target[block] = np.asarray(value)[: block.size]
+        states = np.stack(lanes.state, axis=-1)
+        finite = np.isfinite(radius) & np.all(np.isfinite(states), axis=-1)
+        code = np.where(finite, np.where(step <= limit, FOUND, NOT_CONVERGED), NOT_FINITE).astype(np.int8)
+        push = np.hypot(lanes.drive.sine, lanes.drive.cosine)
+        direction = np.stack([lanes.drive.sine / push, lanes.drive.cosine / push], axis=-1)
+        phases = np.stack(lanes.phases, axis=-1) if lanes.phases else np.zeros((count, 0))
+        numbers = (states, roots, radius, np.asarray(lanes.swing))
+        if (code != FOUND).any():
+            numbers = tuple(np.array(values) for values in numbers)
+            for values in numbers:
+                values[code != FOUND] = np.nan
+        states, roots, radius, swing = numbers
+        return Found(states, direction, phases, roots, radius, swing, code)
+
+
+def padded(values: np.ndarray, size: int) -> np.ndarray:
+    """Fill up to a fixed length by repeating the last value, so that one compiled pass serves.
+
+    Args:
+        values: the values.
+        size: the length.
+
+    Returns:
+        Values of that length.
+    """
+    return np.concatenate([values, np.repeat(values[-1:], size - values.shape[0], axis=0)])
+
+
+def cell_solvers(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    surface: Surface,
+    forces: Float[np.ndarray, " force"],
+    devices: Any,
+) -> tuple[CellSolver, CellSolver]:
+    """Give the solvers of a map's cells.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period.
+        half: whether to use the half-period map.
+        surface: orbits over displacement and frequency.
+        forces: drive amplitudes of the map.
+        devices: to spread chunks over; all local ones if None.
+
+    Returns:
+        That of the orbits which share the order of kinks, and that of the others, which are not split and
+        take four times the steps instead.
+    """
+    mesh = Mesh(np.asarray(jax.local_devices() if devices is None else devices), ("cell",))
+    everywhere = NamedSharding(mesh, PartitionSpec())
+    tables = (surface.tables, surface.amplitudes, surface.rest, forces, surface.frequencies)
+    placed = tuple(jax.device_put(jnp.asarray(table), everywhere) for table in tables)
+    cells = NamedSharding(mesh, PartitionSpec("cell"))
+    steps = jnp.asarray(integrator.steps_a_period(model))
+    split = Method(integrator, half, jnp.asarray(surface.sides), steps)
+    whole = Method(integrator, half, None, 4 * steps)
+    return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
+
+
+@eqx.filter_jit
+def states_at_zero(model: Isolator, method: Method, lanes: Lane) -> State:
+    """Give the states of orbits at t = 0 of the recorded drive.
+
+    Args:
+        model: the isolator.
+        method: how to integrate.
+        lanes: the orbits, a lane each.
+
+    Returns:
+        Displacement, velocity, internal states.
+    """
+
+    def one(lane: Lane) -> State:
+        drive = lane.drive
+        lead = jnp.arctan2(drive.cosine, drive.sine) + drive.angular_frequency * model.shift()
+        whole = 2.0 * math.pi
+        target = jnp.mod(-lead, whole)
+        turned = method.half & (target >= math.pi)
+        target = jnp.where(turned, target - math.pi, target)
+        nothing = Crossings(jnp.zeros(0), jnp.zeros(0, int), None, jnp.array(True))
+        steps = 4 * method.steps
+        state, _ = advance_in_pieces(model, method.integrator, drive, lane.state, nothing, target, steps)
+        return tuple(jnp.where(turned, -value, value) for value in state)
+
+    return jax.vmap(one)(lanes)

@@ -1,0 +1,139 @@
+"""A long list of orbits in chunks, each kept on disk as it is done, so that a killed run goes on."""
+
+import hashlib
+import io
+import json
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import jax
+import numpy as np
+from jax.experimental import multihost_utils
+
+from ..._cores import usable_cores
+from ...models import write_whole
+from ._batched_newton import CellSolver, Found
+from ._starts import Candidates
+
+FEWEST = 1024
+"""Lanes of the smallest pass: below it a pass costs no less."""
+
+
+def fingerprint(*parts: object) -> str:
+    """Give a short word that tells one map from another.
+
+    Args:
+        *parts: models, integrators, arrays, numbers.
+
+    Returns:
+        Hexadecimal word.
+    """
+    word = hashlib.sha256()
+    for part in parts:
+        leaves, structure = jax.tree_util.tree_flatten(part)
+        word.update(str(structure).encode())
+        for leaf in leaves:
+            word.update(np.asarray(leaf).tobytes() if not callable(leaf) else repr(leaf).encode())
+    return word.hexdigest()[:16]
+
+
+def run_chunks(
+    solver: CellSolver,
+    candidates: Candidates,
+    chunk: int,
+    folder: Path | None,
+    name: str,
+    progress: Callable[[str], None] | None,
+) -> Found:
+    """Find the orbits of all candidates, chunk by chunk.
+
+    Under `jax.distributed` each process does its share of the chunks and all get the whole.
+
+    Args:
+        solver: what finds the orbits of a chunk.
+        candidates: all of them.
+        chunk: orbits a chunk.
+        folder: where finished chunks are kept, or None.
+        name: first word of the files' names.
+        progress: called with a line now and then.
+
+    Returns:
+        The orbits, in the order of the candidates.
+    """
+    total = candidates.force.size
+    # No wider than need be: small maps compile and run a small pass. At least one lane for each device.
+    lanes = min(chunk, max(1 << max(total - 1, 0).bit_length(), FEWEST))
+    begins = list(range(0, total, lanes))
+    states = 2 + solver.model.internal_states
+    kinks = solver.tables[0].shape[0] - states - 1
+    processes, own = jax.process_count(), jax.process_index()
+
+    def one(place: int) -> Found:
+        begin = begins[place]
+        if place % processes != own:
+            return _blank(min(lanes, total - begin), states, kinks)
+        path = None if folder is None else folder / f"{name}-{place:05d}.npz"
+        if path is not None and path.exists():
+            with np.load(path) as kept:
+                return Found(*(kept[field] for field in Found._fields))
+        part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
+        if path is not None:
+            buffer = io.BytesIO()
+            np.savez(buffer, **part._asdict())
+            write_whole(path, buffer.getvalue())
+        if progress is not None:
+            progress(f"{min(begin + lanes, total)} of {total} orbits")
+        return part
+
+    # A pass keeps one core busy; each core runs its own. Chunks over several devices go one by one.
+    cores = 1 if solver.sharding.num_devices > 1 else usable_cores()
+    with ThreadPoolExecutor(cores) as pool:
+        parts = list(pool.map(one, range(len(begins))))
+    whole = (
+        Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+        if parts
+        else _blank(0, states, kinks)
+    )
+    if processes > 1:
+        gathered = multihost_utils.process_allgather(whole)
+        owner = np.repeat(np.arange(len(begins)) % processes, [part.radius.size for part in parts])
+        whole = Found(*(np.asarray(values)[owner, np.arange(total)] for values in gathered))
+    return whole
+
+
+def _blank(count: int, states: int, kinks: int) -> Found:
+    return Found(
+        np.full((count, states), np.nan),
+        np.full((count, 2), np.nan),
+        np.full((count, kinks), np.nan),
+        np.full((count, states), np.nan + 0j),
+        np.full(count, np.nan),
+        np.full(count, np.nan),
+        np.zeros(count, np.int8),
+    )
+
+
+def claim_folder(folder: Path, identity: str) -> None:
+    """Mark a folder as this map's, or refuse it.
+
+    Args:
+        folder: to keep chunks in.
+        identity: word for this very map.
+
+    Raises:
+        ValueError: if it belongs to another map.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    label = folder / "map.json"
+    if not label.exists():
+        if any(folder.glob("*.npz")):
+            raise ValueError(f"Argument `checkpoint` names {folder}, which holds chunks of no known map.")
+        write_whole(label, json.dumps({"identity": identity}) + "\n")
+        return
+    held = json.loads(label.read_text(encoding="utf-8")).get("identity")
+    if held != identity:
+        raise ValueError(
+            f"Argument `checkpoint` names {folder}, which holds the chunks of another map ({held}, not "
+            f"{identity}). Give an empty folder, or delete this one."
+        )

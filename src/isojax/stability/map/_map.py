@@ -1,0 +1,272 @@
+"""Stability over a whole plane of drive amplitude and frequency."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Complex, Float, Int
+
+from ..._results import RESULTS
+from ..._types import check_float64
+from ...models import Integrator, Isolator
+from ..orbit import Sine, ascending, is_odd
+from ._batched_newton import (
+    FOUND,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    Found,
+    Lane,
+    Method,
+    cell_solvers,
+    states_at_zero,
+)
+from ._chunks import claim_folder, fingerprint, run_chunks
+from ._map_error import sampled_error, steps_needed
+from ._starts import Candidates, find_candidates
+from ._surface import Surface, find_surface
+
+_TRIED = 64
+"""Steps a period with which a sample of the orbits shows how many it takes."""
+
+_NEAR = 1.25
+"""Times those steps up to which orbits found with them are starts good enough."""
+
+
+class StabilityMap(eqx.Module):
+    """Periodic orbits and their multipliers over drive amplitude and frequency.
+
+    With `coexisting` every array of a cell has an axis `orbit` in front, by rising displacement; places that
+    a cell does not fill are NaN.
+
+    Attributes:
+        model: the isolator.
+        amplitudes: drive amplitudes [N, or m/s^2 for base excitation].
+        frequencies: [Hz].
+        spectral_radius: largest modulus of the multipliers; stable below one.
+        multipliers: Floquet multipliers over one drive period.
+        start: state of each orbit at the phase at which it is largest.
+        direction: drive over its amplitude, sine and cosine part, with the phase counted from there.
+        phases: where each orbit passes kinks, counted from there.
+        sides: signs of the kinks on the pieces between, alike for all orbits that are split.
+        split: whether an orbit was split there; else it was integrated with four times the steps.
+        response: half the peak-to-peak displacement [m].
+        count: orbits found in each cell.
+        result: how the search ended in each cell; beside NaN, why.
+        error: largest integration error of a multiplier in a sample of cells, against steps four times finer.
+        symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
+        integrator: steps a period that were taken.
+    """
+
+    model: Isolator
+    amplitudes: Float[Array, " amplitude"]
+    frequencies: Float[Array, " frequency"]
+    spectral_radius: Float[Array, "*orbit amplitude frequency"]
+    multipliers: Complex[Array, "*orbit amplitude frequency multiplier"]
+    start: Float[Array, "*orbit amplitude frequency state"]
+    direction: Float[Array, "*orbit amplitude frequency 2"]
+    phases: Float[Array, "*orbit amplitude frequency crossing"]
+    sides: Float[Array, "piece kink"]
+    split: Bool[Array, "*orbit amplitude frequency"]
+    response: Float[Array, "*orbit amplitude frequency"]
+    count: Int[Array, "amplitude frequency"]
+    result: RESULTS
+    error: float
+    symmetric: bool = eqx.field(static=True)
+    integrator: Integrator
+
+    @property
+    def stable(self) -> Array:
+        """Whether each orbit is stable; False where there is none."""
+        return self.spectral_radius < 1.0
+
+    @property
+    def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
+        """State of each orbit at t = 0 of the recorded drive, by integration from `start`."""
+        force = jnp.broadcast_to(self.amplitudes[:, None], self.spectral_radius.shape).ravel()
+        frequency = jnp.broadcast_to(self.frequencies, self.spectral_radius.shape).ravel()
+        state = tuple(self.start.reshape(force.size, -1).T)
+        sine, cosine = self.direction.reshape(force.size, 2).T * force[None]
+        lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel())
+        steps = jnp.asarray(self.integrator.steps_a_period(self.model))
+        method = Method(self.integrator, self.symmetric, None, steps)
+        return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)
+
+
+def stability_map(
+    model: Isolator,
+    amplitudes: Any,
+    frequencies: Any,
+    *,
+    coexisting: bool = False,
+    reach: float = 3.0,
+    integrator: Integrator | None = None,
+    chunk: int = 32768,
+    checkpoint: str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+    devices: Any = None,
+) -> StabilityMap:
+    """Find the periodic orbits over a grid of drive amplitude and frequency, and their Floquet multipliers.
+
+    The orbits are found first on a coarse grid of displacement amplitude and frequency, over which they do
+    not fold; from there each cell gets a start so good that one step of Newton's method on the period map,
+    with its derivative by `jax.jacfwd` under `vmap`, finishes nearly all. Odd models use the half-period map.
+    Orbits are split at kinks.
+
+    Args:
+        model: the isolator.
+        amplitudes: drive amplitudes, ascending and positive [N, or m/s^2 for base excitation].
+        frequencies: ascending and positive [Hz].
+        coexisting: whether to give every orbit of a cell; else the one of the smallest motion, to which rest
+            leads as the drive grows.
+        reach: displacement up to which orbits are sought, over the largest that grows from rest without a
+            jump anywhere in the window.
+        integrator: steps a period; RK4 with as many as a sample of orbits needs if omitted.
+        chunk: orbits computed at once by each core; bounds the memory.
+        checkpoint: folder in which finished chunks are kept; a run that was killed goes on from there and
+            gives the same numbers.
+        progress: called with a line now and then.
+        devices: devices to spread each chunk over; all of this process if omitted.
+
+    Returns:
+        The map. Where nothing converged the numbers are NaN and `result` says why.
+
+    Raises:
+        ValueError: if a grid is empty, not positive or not ascending, `reach` is below one, `chunk` is no
+            positive count, or the checkpoint belongs to another map.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
+    """
+    check_float64()
+    forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
+    if not 1.0 <= reach < math.inf:
+        raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
+    if chunk < 1:
+        raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
+    half = is_odd(model)
+    asked, integrator = integrator, Integrator().with_steps(_TRIED) if integrator is None else integrator
+    sought = _seek(model, integrator, half, forces, band, reach, coexisting)
+    if asked is None:
+        trial = cell_solvers(model, integrator, half, sought.surface, forces, devices)
+        own, first = sought.group(0), trial[0]
+        if not own.force.size:
+            own, first = sought.group(1), trial[1]
+        integrator = integrator.with_steps(steps_needed(first, own, forces, band))
+        if integrator.steps_per_period > _NEAR * _TRIED:
+            # Starts integrated much coarser than the map would cost each cell a second pass.
+            sought = _seek(model, integrator, half, forces, band, reach, coexisting)
+    if progress is not None:
+        progress("orbits over displacement and frequency found")
+    surface, candidates = sought.surface, sought.candidates
+    folder = None if checkpoint is None else Path(checkpoint)
+    if folder is not None:
+        claim_folder(folder, fingerprint(model, integrator, forces, band, coexisting, reach, chunk))
+    parts, errors = [], []
+    solvers = cell_solvers(model, integrator, half, surface, forces, devices)
+    for place, (name, solver) in enumerate(zip(("split", "whole"), solvers, strict=True)):
+        own = sought.group(place)
+        if own.force.size:
+            parts.append(run_chunks(solver, own, chunk, folder, name, progress))
+            errors.append(sampled_error(solver, own, parts[-1], forces, band))
+    found = Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    error = max((value for value in errors if not math.isnan(value)), default=math.nan)
+    split = np.arange(candidates.force.size) < sought.split
+    arrays = _gridded(candidates, found, split, len(forces), len(band), coexisting)
+    code = arrays.pop("code")
+    ending = _ending
+    for _ in range(code.ndim):
+        ending = jax.vmap(ending)
+    result = ending(jnp.asarray(code))
+    return StabilityMap(
+        model=model,
+        amplitudes=jnp.asarray(forces),
+        frequencies=jnp.asarray(band),
+        result=result,
+        error=error,
+        sides=jnp.asarray(surface.sides),
+        symmetric=half,
+        integrator=integrator,
+        **{name: jnp.asarray(values) for name, values in arrays.items()},
+    )
+
+
+class _Sought(NamedTuple):
+    """What is to be found.
+
+    Attributes:
+        surface: from which the starts are read off.
+        candidates: the orbits, first those that share the order of kinks.
+        split: how many these are; the others are not split and take finer steps.
+    """
+
+    surface: Surface
+    candidates: Candidates
+    split: int
+
+    def group(self, place: int) -> Candidates:
+        """Give the orbits that are split (0) or the others (1)."""
+        part = slice(self.split) if place == 0 else slice(self.split, None)
+        return Candidates(*(values[part] for values in self.candidates))
+
+
+def _seek(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    forces: np.ndarray,
+    band: np.ndarray,
+    reach: float,
+    coexisting: bool,
+) -> _Sought:
+    surface = find_surface(model, integrator, half, forces, band, reach)
+    candidates = find_candidates(surface, forces)
+    if not coexisting and candidates.order.any():
+        candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
+    if not candidates.force.size:
+        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
+    shared = surface.shared[candidates.frequency, candidates.interval]
+    if not shared.all():
+        candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
+    return _Sought(surface, candidates, int(shared.sum()))
+
+
+def _ending(code: Array) -> RESULTS:
+    """Give the outcome that a code of the search stands for."""
+    failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
+    return RESULTS.where(code == FOUND, RESULTS.promote(diffrax.RESULTS.successful), failed)
+
+
+def _gridded(
+    candidates: Candidates, found: Found, split: np.ndarray, rows: int, columns: int, coexisting: bool
+) -> dict[str, np.ndarray]:
+    """Put the orbits into their cells; a cell in which none was found says that nothing converged."""
+    orbits = int(candidates.order.max()) + 1 if candidates.order.size else 1
+    place = np.ravel_multi_index(
+        (candidates.order, candidates.force, candidates.frequency), (orbits, rows, columns)
+    )
+    # The common case, one orbit in every cell and in the order of the cells, takes no copying.
+    whole = place.size == orbits * rows * columns and bool((np.diff(place) == 1).all())
+    arrays: dict[str, np.ndarray] = {}
+    names = {"states": "start", "radius": "spectral_radius", "swing": "response"}
+    names |= {name: name for name in ("direction", "phases", "multipliers")}
+
+    def onto_grid(values: np.ndarray, missing: float | int | bool) -> np.ndarray:
+        grid = values
+        if not whole:
+            grid = np.full((orbits * rows * columns, *values.shape[1:]), missing, dtype=values.dtype)
+            grid[place] = values
+        grid = grid.reshape(orbits, rows, columns, *values.shape[1:])
+        return grid if coexisting else grid[0]
+
+    for name, public in names.items():
+        arrays[public] = onto_grid(getattr(found, name), np.nan)
+    arrays["split"] = onto_grid(split, False)
+    arrays["code"] = onto_grid(found.code, NOT_CONVERGED)
+    arrays["count"] = (arrays["code"] == FOUND).reshape(orbits, rows, columns).sum(axis=0)
+    return arrays

@@ -1,0 +1,176 @@
+"""One harmonic in closed form: the sine that holds a given amplitude at a given frequency."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..._types import Lanes, Scalar, as_float64
+from ...models import Isolator
+from ._drive import Sine
+
+_SAMPLES = 64
+"""Samples a cycle; the first harmonic of |x|x is then good to 1e-5, so good that only the others matter."""
+
+_CYCLES = 3
+"""Cycles of imposed motion after which internal states count as settled."""
+
+_GRID = np.logspace(-3.0, 3.0, 600)
+"""Displacement amplitudes tried for one drive, over that of the linear answer."""
+
+
+def rest_displacement(model: Isolator) -> Float[Array, ""]:
+    """Give the displacement at which the isolator rests without a drive [m].
+
+    Args:
+        model: the isolator, whose offsets and preloads move it.
+
+    Returns:
+        Root of the static balance next to zero, by Newton's method; zero for an odd model.
+    """
+
+    def balance(x: Array) -> Array:
+        state = (x, 0.0 * x, *(0.0 * x,) * model.internal_states)
+        return model.acceleration(state, jnp.zeros_like(x))
+
+    def improve(_: Array | int, x: Array) -> Array:
+        value, slope = jax.jvp(balance, (x,), (jnp.ones_like(x),))
+        moved = x - value / jnp.where(slope == 0.0, 1.0, slope)
+        return jnp.where(jnp.isfinite(moved) & (slope != 0.0), moved, x)
+
+    return jax.lax.fori_loop(0, 20, improve, jnp.zeros(()))
+
+
+def imposed_internal(
+    model: Isolator, displacement: Lanes, velocity: Lanes, frequency: Lanes
+) -> tuple[Lanes, ...]:
+    """Give the internal states along an imposed cycle, once they repeat as far as a few cycles bring them.
+
+    Args:
+        model: the isolator.
+        displacement: one cycle [m], time first.
+        velocity: the same cycle [m/s].
+        frequency: [Hz].
+
+    Returns:
+        Each internal state along the cycle.
+    """
+    if not model.internal_states:
+        return ()
+    count = displacement.shape[0]
+    step = 1.0 / (count * frequency)
+    places = np.arange(count)
+    zero = 0.0 * displacement[0]
+
+    def rates(internal: tuple[Lanes, ...], x: Lanes, v: Lanes) -> tuple[Lanes, ...]:
+        return model.rates((x, v, *internal), zero, 0.0)[2:]
+
+    def body(internal: tuple[Lanes, ...], place: Array) -> tuple[tuple[Lanes, ...], tuple[Lanes, ...]]:
+        following = (place + 1) % count
+        ends = [(displacement[place], velocity[place]), (displacement[following], velocity[following])]
+        middle = tuple(0.5 * (a + b) for a, b in zip(*ends, strict=True))
+        k1 = rates(internal, *ends[0])
+        half = tuple(s + 0.5 * step * k for s, k in zip(internal, k1, strict=True))
+        k2 = rates(half, *middle)
+        moved = tuple(s + step * k for s, k in zip(internal, k2, strict=True))
+        return moved, internal
+
+    start = (zero,) * model.internal_states
+    _, along = jax.lax.scan(body, start, jnp.asarray(np.tile(places, _CYCLES)))
+    return tuple(values[-count:] for values in along)
+
+
+def imposed_balance(
+    model: Isolator, amplitude: Lanes, frequency: Lanes, rest: Lanes | float = 0.0
+) -> tuple[Sine, tuple[Lanes, ...]]:
+    """Give the sine that, to one harmonic, holds the motion `rest + amplitude cos(tau)`.
+
+    The balance of the first harmonic, `F = (K_eq - m omega^2) a cos(tau) - C_eq omega a sin(tau)`, with K_eq
+    and C_eq of whatever elements there are, by the trapezoid rule over one cycle.
+
+    Args:
+        model: the isolator.
+        amplitude: a [m], positive.
+        frequency: [Hz], same shape.
+        rest: centre of the motion [m].
+
+    Returns:
+        The drive, and the internal states along the cycle from tau = 0, time first.
+
+    Source: the paper, eqs. (7) and (8).
+    """
+    size, omega = jnp.asarray(amplitude)[None], 2.0 * math.pi * jnp.asarray(frequency)[None]
+    phase = (2.0 * np.pi / _SAMPLES * np.arange(_SAMPLES)).reshape(
+        -1, *(1,) * jnp.ndim(amplitude * frequency)
+    )
+    cosine, sine = np.cos(phase), np.sin(phase)
+    x, v = rest + size * cosine, -size * omega * sine
+    internal = imposed_internal(model, x, v, frequency)
+    # Without a drive the acceleration is -force / inertia; what is missing for the imposed one is the drive.
+    missing = -size * omega**2 * cosine - model.acceleration((x, v, *internal), 0.0 * x)
+    unit = model.acceleration((x, v, *internal), 0.0 * x + 1.0) - model.acceleration(
+        (x, v, *internal), 0.0 * x
+    )
+    wanted = missing / unit
+    in_phase, in_quadrature = 2.0 * jnp.mean(wanted * cosine, axis=0), 2.0 * jnp.mean(wanted * sine, axis=0)
+    return Sine(in_quadrature, in_phase, frequency), internal
+
+
+def response_amplitudes(
+    model: Isolator,
+    frequency: Lanes,
+    amplitudes: Float[Array, " amplitude"],
+    rest: Lanes | float = 0.0,
+) -> Lanes:
+    """Give the drive amplitude that each displacement amplitude needs, to one harmonic.
+
+    Args:
+        model: the isolator.
+        frequency: [Hz], any shape.
+        amplitudes: displacement amplitudes [m].
+        rest: centre of the motion [m].
+
+    Returns:
+        Drive amplitude [N, or m/s^2 for base excitation], amplitude first.
+    """
+
+    def needed(amplitude: Array) -> Array:
+        drive, _ = imposed_balance(model, amplitude + 0.0 * frequency, frequency, rest)
+        return jnp.hypot(drive.sine, jnp.asarray(drive.cosine))
+
+    return jax.vmap(needed)(amplitudes)
+
+
+def response_start(model: Isolator, amplitude: Scalar, frequency: Scalar) -> Float[Array, " state"]:
+    """Give the one-harmonic answer to a drive: the state at its phase zero.
+
+    Of several answers the one of the smallest motion, which rest leads to as the drive grows.
+
+    Args:
+        model: the isolator.
+        amplitude: F0 [N, or m/s^2 for base excitation].
+        frequency: [Hz].
+
+    Returns:
+        Displacement, velocity, internal states at t = 0.
+    """
+    amplitude, frequency = as_float64(amplitude), as_float64(frequency)
+    rest = rest_displacement(model)
+    tiny = 1e-9
+    stiffness = response_amplitudes(model, frequency, jnp.array([tiny]), rest)[0] / tiny
+    grid = jnp.abs(amplitude) / stiffness * jnp.asarray(_GRID)
+    needed = response_amplitudes(model, frequency, grid, rest)
+    rises = (needed[:-1] <= jnp.abs(amplitude)) & (needed[1:] > jnp.abs(amplitude))
+    place = jnp.where(jnp.any(rises), jnp.argmax(rises), jnp.argmin(jnp.abs(needed[:-1] - amplitude)))
+    span = needed[place + 1] - needed[place]
+    share = jnp.where(jnp.any(rises), (jnp.abs(amplitude) - needed[place]) / span, 0.0)
+    motion = grid[place] + share * (grid[place + 1] - grid[place])
+    drive, internal = imposed_balance(model, motion, frequency, rest)
+    # The motion is `rest + a cos(tau)`; the recorded drive passes zero upwards at this tau.
+    lead = jnp.where(amplitude < 0, math.pi, 0.0) + 2.0 * math.pi * frequency * model.shift()
+    phase = -jnp.arctan2(drive.cosine, drive.sine) - lead
+    x, v = rest + motion * jnp.cos(phase), -motion * drive.angular_frequency * jnp.sin(phase)
+    sample = jnp.round(phase / (2.0 * math.pi) * _SAMPLES).astype(int) % _SAMPLES
+    return jnp.stack([x, v, *(values[sample] for values in internal)])

@@ -1,0 +1,223 @@
+"""One periodic orbit of the forced isolator."""
+
+import math
+from collections.abc import Sequence
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import optimistix as optx
+from jax.core import Tracer
+from jaxtyping import Array, Bool, Float
+
+from ..._parameters import list_parameters
+from ..._results import RESULTS, is_successful
+from ..._types import Lanes, as_float64, check_float64
+from ...excitations import Harmonic
+from ...models import Integrator, Isolator
+from ._describing_function import response_start
+from ._drive import recorded_sine
+from ._floquet import Floquet, multipliers
+from ._harmonic_balance import harmonic_balance
+from ._period_map import trajectory
+from ._shooting import Closed, close_motion
+from ._symmetry import is_odd
+
+_CROSSINGS = 4
+"""Crossings of each kink in a period to make room for first."""
+
+
+class Orbit(eqx.Module):
+    """A periodic orbit of the forced isolator.
+
+    Attributes:
+        model: the isolator.
+        excitation: the drive.
+        periods: drive periods after which the motion repeats.
+        y0: displacement [m], velocity [m/s], internal states at t = 0; NaN where none was found.
+        floquet: multipliers over `periods` drive periods.
+        symmetric: whether the second half of the motion is minus the first.
+        time: over one period of the motion [s].
+        states: along `time`.
+        error: integration error of the multipliers, by halving the steps.
+        result: whether the orbit was found, or why not.
+    """
+
+    model: Isolator
+    excitation: Harmonic
+    periods: int = eqx.field(static=True)
+    y0: Float[Array, " state"]
+    floquet: Floquet
+    symmetric: Bool[Array, ""]
+    time: Float[Array, " time"]
+    states: Float[Array, "time state"]
+    error: Float[Array, ""]
+    result: RESULTS
+
+    @property
+    def displacement(self) -> Float[Array, " time"]:
+        """[m]."""
+        return self.states[:, 0]
+
+    @property
+    def velocity(self) -> Float[Array, " time"]:
+        """[m/s]."""
+        return self.states[:, 1]
+
+    @property
+    def amplitude(self) -> Float[Array, ""]:
+        """Half the peak-to-peak displacement [m], each peak by a parabola through its sample."""
+        drive = recorded_sine(self.model, self.excitation.amplitude, self.excitation.frequency)
+        phase = drive.angular_frequency * self.time
+
+        def peak(sign: float) -> Array:
+            place = jnp.argmax(sign * self.displacement)
+            state = tuple(self.states[place])
+            u, u_rate = drive.at(jnp.sin(phase[place]), jnp.cos(phase[place]))
+            bend = self.model.acceleration(state, u, u_rate)
+            return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
+
+        return 0.5 * (peak(1.0) - peak(-1.0))
+
+    @property
+    def harmonics(self) -> Array:
+        """Complex amplitudes of the displacement [m]: mean, then each harmonic of the motion's own period.
+
+        The k-th is X of `X exp(i k omega t)`, with the modulus of the amplitude.
+        """
+        spectrum = jnp.fft.rfft(self.displacement[:-1]) / (self.time.size - 1)
+        return jnp.concatenate([spectrum[:1], 2.0 * spectrum[1:]])
+
+
+def find_periodic_orbit(
+    model: Isolator,
+    excitation: Harmonic,
+    *,
+    start: Sequence[Lanes | float] | Float[Array, " state"] | None = None,
+    periods: int = 1,
+    symmetric: bool | None = None,
+    integrator: Integrator | None = None,
+    solver: optx.AbstractRootFinder | None = None,
+) -> Orbit:
+    """Find a periodic orbit and its Floquet multipliers.
+
+    Newton's method on the period map, with its derivative by forward mode; the motion is split at the kinks
+    of |x| and |v|, and the steps are refined until the multipliers are good to 1e-9 or better. Works
+    under `jax.jit`, `jax.vmap` and `jax.jacfwd` (by the implicit function theorem).
+
+    Args:
+        model: the isolator.
+        excitation: the drive.
+        start: state at t = 0 to start from; the one-harmonic balance with the smallest motion if omitted, and
+            where this leads nowhere (and is not inside `jax.jit` or `jax.vmap`) the balance of several.
+        periods: drive periods after which the motion repeats (2 for an orbit of doubled period).
+        symmetric: whether to close half a period on minus itself, at which only symmetric orbits of odd
+            models close; if omitted, so for an odd model without a `start`.
+        integrator: solver of the equation of motion and its steps.
+        solver: root finder; `optimistix.Newton` if omitted.
+
+    Returns:
+        The orbit. Where none was found, its numbers are NaN and `result` says why.
+
+    Raises:
+        ValueError: if the frequency is not positive, `start` has the wrong length, `periods` is no positive
+            count, or `symmetric` is asked of a model that is not odd.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Aprille & Trick 1972, Proc. IEEE 60:108 (shooting); Nayfeh & Balachandran 1995, ch. 3 and 5.
+    """
+    check_float64()
+    integrator = Integrator() if integrator is None else integrator
+    tolerance = integrator.orbit_tolerance
+    solver = optx.Newton(rtol=tolerance, atol=tolerance) if solver is None else solver
+    size = 2 + model.internal_states
+    if start is not None and len(start) != size:
+        raise ValueError(f"Argument `start` must hold {size} states, but holds {len(start)}.")
+    if periods < 1:
+        raise ValueError(f"Argument `periods` must be a positive count, but is {periods}.")
+    frequency = jax.lax.stop_gradient(excitation.frequency)
+    if not isinstance(frequency, Tracer) and not 0.0 < float(frequency) < math.inf:
+        raise ValueError(f"Argument `excitation` must have a positive frequency, but it is {frequency} Hz.")
+    odd = periods == 1 and (symmetric or (symmetric is None and start is None))
+    frozen = jax.lax.stop_gradient(model)
+    # Of a model that is being traced nothing can be said; whoever asks for symmetric orbits then knows.
+    traced = any(isinstance(entry.value, Tracer) for entry in list_parameters(frozen))
+    half = odd and (bool(symmetric) if traced else is_odd(frozen))
+    if symmetric and not half:
+        raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
+    begin = None if start is None else jnp.stack([as_float64(value) for value in start])
+    turns = 0.5 if half else float(periods)
+    kinks = len(model.kinks((jnp.zeros(()),) * size))
+    places = math.ceil(_CROSSINGS * kinks * turns)
+    closed = _solve(model, excitation, begin, integrator, solver, turns, places)
+    while not isinstance(closed[0].split, Tracer) and not closed[0].split and places < 64 * kinks:
+        places *= 2
+        closed = _solve(model, excitation, begin, integrator, solver, turns, places)
+    if begin is None and not isinstance(closed[0].found, Tracer) and not closed[0].found:
+        balance = harmonic_balance(*jax.lax.stop_gradient((model, excitation)), integrator=integrator)
+        if is_successful(balance.result):
+            closed = _solve(model, excitation, balance.y0, integrator, solver, turns, places)
+    return _orbit(model, excitation, periods, half, integrator, *closed)
+
+
+@eqx.filter_jit
+def _solve(
+    model: Isolator,
+    excitation: Harmonic,
+    start: Float[Array, " state"] | None,
+    integrator: Integrator,
+    solver: optx.AbstractRootFinder,
+    turns: float,
+    places: int,
+) -> tuple[Closed, Float[Array, "time state"]]:
+    if start is None:
+        frozen, held = jax.lax.stop_gradient((model, excitation))
+        start = response_start(frozen, held.amplitude, held.frequency)
+    drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
+    closed = close_motion(model, integrator, solver, drive, jax.lax.stop_gradient(start), turns, places)
+    path = trajectory(model, integrator, drive, tuple(closed.state), turns=max(turns, 1.0))
+    return closed, jnp.stack(path, axis=-1)
+
+
+@eqx.filter_jit
+def _orbit(
+    model: Isolator,
+    excitation: Harmonic,
+    periods: int,
+    half: bool,
+    integrator: Integrator,
+    closed: Closed,
+    path: Float[Array, "time state"],
+) -> Orbit:
+    found = closed.found & jnp.all(jnp.isfinite(closed.matrix))
+    blank = jnp.where(found, 1.0, jnp.nan)
+    matrix = closed.matrix * blank
+    if half:
+        roots = multipliers(matrix)
+        floquet = Floquet(roots * roots, roots, matrix @ matrix)
+    else:
+        floquet = Floquet(multipliers(matrix), jnp.full(matrix.shape[0], jnp.nan + 0j), matrix)
+    finite = jnp.all(jnp.isfinite(path))
+    result = RESULTS.where(
+        found,
+        RESULTS.promote(diffrax.RESULTS.successful),
+        RESULTS.where(finite, RESULTS.not_converged, RESULTS.not_finite),
+    )
+    middle = (path.shape[0] - 1) // 2
+    size = jnp.max(jnp.abs(path), axis=0)
+    # The path is sampled with the steps of maps, whose error at a kink is a few times 1e-5.
+    mirrored = jnp.array(True) if half else jnp.all(jnp.abs(path[middle] + path[0]) <= 1e-4 * size)
+    time = jnp.linspace(0.0, 1.0, path.shape[0]) * periods / excitation.frequency
+    return Orbit(
+        model,
+        excitation,
+        periods,
+        closed.state * blank,
+        floquet,
+        found & (mirrored if periods == 1 else False),
+        time,
+        path * blank,
+        closed.error * blank,
+        result,
+    )

@@ -1,0 +1,156 @@
+"""Backbone curves: how the frequency of free vibration and of phase resonance moves with the amplitude."""
+
+import math
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..._results import RESULTS
+from ..._types import check_float64
+from ...models import Integrator, Isolator, State
+from ..map import Lane, Method, states_at_zero
+from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory
+from ._free_vibration import natural_frequencies
+from ._frequency_response import drive_amplitude, fundamental
+
+_BALANCE = 30
+"""Steps towards the resonance of the one-harmonic balance."""
+
+_NEWTON = 12
+"""Steps of Newton's method on the orbit with its drive and frequency."""
+
+_STEP = 0.3
+"""Largest change of an unknown in one step, as a share of its size: beyond, the basin may be left."""
+
+
+class BackboneCurve(eqx.Module):
+    """Resonance over amplitude, with and without damping.
+
+    Attributes:
+        displacements: largest displacement over rest [m].
+        natural_frequency: of free vibration without damping [Hz]; NaN where the spring does not hold it.
+        frequency: of phase resonance, the fundamental of the displacement a quarter of a period behind the
+            drive that acts [Hz].
+        force: amplitude of the recorded drive there [N, or m/s^2 for base excitation].
+        y0: state there at t = 0 of the recorded drive: displacement, velocity, internal states.
+        result: whether phase resonance was found; its numbers are NaN where not.
+    """
+
+    displacements: Float[Array, " point"]
+    natural_frequency: Float[Array, " point"]
+    frequency: Float[Array, " point"]
+    force: Float[Array, " point"]
+    y0: Float[Array, "point state"]
+    result: RESULTS
+
+
+def backbone_curve(
+    model: Isolator, displacements: Any, *, integrator: Integrator | None = None
+) -> BackboneCurve:
+    """Give the backbone curve, free and forced.
+
+    Args:
+        model: the isolator.
+        displacements: largest displacement over rest, ascending and positive [m].
+        integrator: solver and steps; 256 a period if omitted.
+
+    Returns:
+        The curve.
+
+    Raises:
+        ValueError: if the displacements do not ascend or are not positive.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 2.1 (free vibration); Peeters et al. 2011, J.
+    Sound Vib. 330:486 (phase resonance).
+    """
+    check_float64()
+    amplitudes = jnp.asarray(ascending("displacements", displacements))
+    integrator = Integrator(steps_per_period=256) if integrator is None else integrator
+    natural = natural_frequencies(model, amplitudes)
+    return _resonance(model, amplitudes, natural, integrator)
+
+
+@eqx.filter_jit
+def _resonance(
+    model: Isolator,
+    amplitudes: Float[Array, " point"],
+    natural: Float[Array, " point"],
+    integrator: Integrator,
+) -> BackboneCurve:
+    rest = rest_displacement(model)
+
+    def point(amplitude: Array) -> tuple[Lane, Array]:
+        start, cycle = _balanced(model, amplitude, rest)
+        push = jnp.hypot(start.sine, jnp.asarray(start.cosine))
+        internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
+        inner = jnp.where(internal == 0.0, amplitude, jnp.abs(internal))
+
+        def unpack(unknown: Array) -> tuple[Sine, State]:
+            drive = Sine(unknown[0] * push, unknown[1] * push, unknown[2] * start.frequency)
+            return drive, (rest + amplitude, 0.0 * amplitude, *(unknown[3:] * inner))
+
+        def gap(unknown: Array) -> Array:
+            drive, state = unpack(unknown)
+            path = trajectory(model, integrator, drive, state)
+            scale = (amplitude, amplitude * drive.angular_frequency, *inner)
+            open_end = [(along[-1] - along[0]) / c for along, c in zip(path, scale, strict=True)]
+            turned = fundamental(path[0]) * jnp.conj(drive_amplitude(drive))
+            return jnp.stack([*open_end, jnp.real(turned) / (amplitude * push)])
+
+        def improve(_: Array, unknown: Array) -> Array:
+            step = jnp.linalg.solve(jax.jacfwd(gap)(unknown), gap(unknown))
+            return unknown - step * jnp.minimum(1.0, _STEP / jnp.max(jnp.abs(step)))
+
+        begin = jnp.concatenate(
+            [jnp.stack([start.sine, jnp.asarray(start.cosine)]) / push, jnp.ones(1), internal / inner]
+        )
+        found = jax.lax.fori_loop(0, _NEWTON, improve, begin)
+        drive, state = unpack(found)
+        good = jnp.max(jnp.abs(gap(found))) < integrator.orbit_tolerance
+        return Lane(state, drive, (), amplitude), good & (drive.frequency > 0.0)
+
+    lanes, good = jax.vmap(point)(amplitudes)
+    blank = jnp.where(good, 1.0, jnp.nan)
+    force = jnp.hypot(lanes.drive.sine, jnp.asarray(lanes.drive.cosine))
+    method = Method(integrator, False, None, jnp.asarray(integrator.steps_a_period(model)))
+    begin = jnp.stack(states_at_zero(model, method, lanes), axis=-1)
+
+    def ending(well: Array) -> RESULTS:
+        return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
+
+    return BackboneCurve(
+        amplitudes,
+        natural,
+        lanes.drive.frequency * blank,
+        force * blank,
+        begin * blank[:, None],
+        jax.vmap(ending)(good),
+    )
+
+
+def _balanced(
+    model: Isolator, amplitude: Float[Array, ""], rest: Float[Array, ""]
+) -> tuple[Sine, tuple[Array, ...]]:
+    """Give the one-harmonic drive at which its part in phase with the displacement is zero."""
+    # What of the drive a unit of in-phase acceleration needs: inertia, or minus one under base excitation.
+    zero = jnp.zeros_like(amplitude)
+    internal = (zero,) * model.internal_states
+    unit = model.acceleration((rest, zero, *internal), zero + 1.0) - model.acceleration(
+        (rest, zero, *internal), zero
+    )
+
+    def approach(step: Array, square: Array) -> Array:
+        frequency = jnp.sqrt(square) / (2.0 * math.pi)
+        drive, _ = imposed_balance(model, amplitude, frequency, rest)
+        moved = square + jnp.asarray(drive.cosine) * unit / amplitude
+        return jnp.where(moved > 0.0, moved, 0.5 * square)
+
+    pull = jnp.abs(model.acceleration((rest + amplitude, zero, *internal), zero)) / amplitude
+    begin = jnp.where(pull > 0.0, pull, 1.0)
+    square = jax.lax.fori_loop(0, _BALANCE, approach, begin)
+    return imposed_balance(model, amplitude, jnp.sqrt(square) / (2.0 * math.pi), rest)

@@ -1,0 +1,159 @@
+"""What passes through the isolator: force to the ground, or motion from it."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Complex, Float
+
+from ..._results import RESULTS
+from ..._types import Lanes, Scalar, as_float64, check_float64
+from ...models import Integrator, Isolator, State
+from ..map import StabilityMap, stability_map
+from ..orbit import Sine, ascending, period_map, trajectory
+from ._frequency_response import fundamental
+
+
+class Transmissibility(eqx.Module):
+    """Force on the ground over the force on the mass; under base excitation absolute motion over the base's.
+
+    Where coexisting orbits were asked for, an axis `orbit` stands in front, by rising displacement.
+
+    Attributes:
+        amplitude: of the recorded drive [N, or m/s^2 for base excitation].
+        frequencies: [Hz].
+        ratio: of the complex amplitudes of the fundamentals.
+        peak: of half the peak-to-peak values, the harmonics included: of the forces, or of the displacements.
+        spectral_radius: of each orbit.
+        result: whether the orbit was found; beside NaN, why not.
+    """
+
+    amplitude: Float[Array, ""]
+    frequencies: Float[Array, " frequency"]
+    ratio: Complex[Array, "*orbit frequency"]
+    peak: Float[Array, "*orbit frequency"]
+    spectral_radius: Float[Array, "*orbit frequency"]
+    result: RESULTS
+
+    @property
+    def magnitude(self) -> Float[Array, "*orbit frequency"]:
+        """Modulus of the ratio."""
+        return jnp.abs(self.ratio)
+
+    @property
+    def phase(self) -> Float[Array, "*orbit frequency"]:
+        """Of what passes after what drives, in (-pi, pi] [rad]."""
+        return jnp.angle(self.ratio)
+
+    @property
+    def stable(self) -> Bool[Array, "*orbit frequency"]:
+        """Whether each orbit is stable."""
+        return self.spectral_radius < 1.0
+
+
+def transmissibility(
+    model: Isolator,
+    amplitude: Scalar | float,
+    frequencies: Any,
+    *,
+    coexisting: bool = False,
+    integrator: Integrator | None = None,
+) -> Transmissibility:
+    """Give the transmissibility over frequency at one drive amplitude.
+
+    The force on the ground is the sum of all element forces, `restoring_force`.
+
+    Args:
+        model: the isolator.
+        amplitude: of the recorded drive [N, or m/s^2 for base excitation].
+        frequencies: ascending [Hz].
+        coexisting: whether to give every orbit; else the one of the smallest motion.
+        integrator: solver and steps; 256 a period if omitted.
+
+    Returns:
+        The transmissibility.
+
+    Raises:
+        ValueError: if the amplitude or a frequency is not positive, or the frequencies do not ascend.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Carrella et al. 2012, Int. J. Mech. Sci. 55:22 (force and displacement, nonlinear isolators).
+    """
+    check_float64()
+    integrator = Integrator(steps_per_period=256) if integrator is None else integrator
+    band = ascending("frequencies", frequencies)
+    force = as_float64(amplitude)
+    held = np.asarray(jax.lax.stop_gradient(force))
+    if held.ndim or not np.isfinite(held) or not held > 0.0:
+        raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
+    frozen = jax.lax.stop_gradient(model)
+    orbits = stability_map(frozen, held[None], band, coexisting=coexisting, integrator=integrator)
+    ratio, peak = _passed(model, frozen, force, orbits)
+    result = jax.tree.map(lambda values: values[..., 0, :], orbits.result)
+    radius = orbits.spectral_radius[..., 0, :]
+    return Transmissibility(force, jnp.asarray(band), ratio, peak, radius, result)
+
+
+@eqx.filter_jit
+def _passed(
+    model: Isolator, frozen: Isolator, amplitude: Float[Array, ""], orbits: StabilityMap
+) -> tuple[Complex[Array, "*orbit frequency"], Float[Array, "*orbit frequency"]]:
+    shape = orbits.spectral_radius[..., 0, :].shape
+    frequency = jnp.broadcast_to(orbits.frequencies, shape).ravel()
+    sine, cosine = jnp.moveaxis(orbits.direction[..., 0, :, :].reshape(-1, 2), -1, 0)
+    drive = Sine(sine * amplitude, cosine * amplitude, frequency)
+    states = orbits.start.shape[-1]
+    start = orbits.start[..., 0, :, :].reshape(-1, states)
+    state = _closed(model, frozen, orbits, drive, start)
+    path = trajectory(model, orbits.integrator, drive, tuple(state.T))
+    turn = 2.0 * np.pi / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
+    recorded, rate = jax.vmap(drive.at)(jnp.asarray(np.sin(turn)), jnp.asarray(np.cos(turn)))
+    acted = model.drive(recorded, rate)
+    if model.excitation == "base_acceleration":
+        absolute = model.motion(path, recorded, rate, "acceleration")
+        # A sine's displacement is minus its acceleration over omega^2.
+        base = -(acted - jnp.mean(acted[:-1], axis=0)[None]) / drive.angular_frequency[None] ** 2
+        ratio = fundamental(absolute) / fundamental(acted)
+        peak = _half_range(path[0] + base) / _half_range(base)
+    else:
+        passed = model.restoring_force(path)
+        ratio = fundamental(passed) / fundamental(acted)
+        peak = _half_range(passed) / _half_range(acted)
+    return ratio.reshape(shape), peak.reshape(shape)
+
+
+def _closed(
+    model: Isolator, frozen: Isolator, orbits: StabilityMap, drive: Sine, start: Float[Array, "lane state"]
+) -> Float[Array, "lane state"]:
+    """Close each orbit by one step, whose derivative is that of the orbit itself."""
+    turns = 0.5 if orbits.symmetric else 1.0
+
+    def lane(sine: Array, cosine: Array, frequency: Array, state: Array) -> Array:
+        push = Sine(sine, cosine, frequency)
+        still = jax.lax.stop_gradient(push)
+
+        def moved(isolator: Isolator, force: Sine, here: Array) -> Array:
+            end: State = period_map(isolator, orbits.integrator, force, tuple(here), turns=turns)
+            return jnp.stack(end)
+
+        slope = jax.jacfwd(lambda here: moved(frozen, still, here))(state)
+        return state + jnp.linalg.solve(jnp.eye(state.size) - slope, moved(model, push, state) - state)
+
+    return jax.vmap(lane)(drive.sine, jnp.asarray(drive.cosine), drive.frequency, start)
+
+
+def _half_range(path: Float[Array, "time lane"]) -> Lanes:
+    """Give half the peak-to-peak value, each peak by the parabola through its sample and its neighbours."""
+    signal = path[:-1]
+
+    def peak(values: Array) -> Array:
+        place = jnp.argmax(values, axis=0)[None]
+        before, here, after = (
+            jnp.take_along_axis(values, (place + shift) % values.shape[0], axis=0)[0] for shift in (-1, 0, 1)
+        )
+        bend = 2.0 * here - before - after
+        return here + (after - before) ** 2 / (8.0 * jnp.where(bend == 0.0, 1.0, bend))
+
+    return 0.5 * (peak(signal) + peak(-signal))
