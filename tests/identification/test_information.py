@@ -32,8 +32,8 @@ from isojax.elements import (
     SensorOffset,
 )
 from isojax.excitations import Sampled
-from isojax.identification import _batch
 from isojax.identification.fitting._problem import one_hot
+from isojax.identification.jacobian import _batch
 from isojax.identification.jacobian._batch import Prepared, prepare
 from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT, Unknowns, information, readings
 from isojax.identification.jacobian._score_columns import score_information

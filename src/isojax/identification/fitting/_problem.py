@@ -120,7 +120,7 @@ class Simulator:
         Args:
             problem: the records.
             at_rest: whether internal states start at zero and are no nuisances.
-            like: simulator whose shapes are taken where they are large enough, so that the compiled code serves
+            like: simulator whose shapes are taken where they are large enough, so that compiled code serves
                 both.
         """
         self._segments = problem.segments if like is None else like._segments
