@@ -18,7 +18,7 @@ from isojax._parameters import (
     to_physical,
 )
 from isojax.elements import CoulombFriction, LinearStiffness, MaxwellBranch
-from isojax.models import Isolator
+from isojax.models import Instant, Isolator
 
 FREE = ParameterSpec("k", "N/m", -np.inf, np.inf, True)
 BELOW = ParameterSpec("k", "N/m", 2.0, np.inf, True)
@@ -147,7 +147,7 @@ def test_replacing_is_differentiable():
 
     def acceleration(values):
         state = (jnp.asarray(1e-3), jnp.asarray(0.0))
-        return replace_parameters(model, values).acceleration(state, jnp.asarray(100.0))
+        return replace_parameters(model, values).acceleration(state, Instant(jnp.asarray(100.0)))
 
     slopes = jax.jacfwd(acceleration)(jnp.asarray([800.0, 1e6]))
     np.testing.assert_allclose(slopes, [(1e3 - 100.0) / 800.0**2, -1e-3 / 800.0], rtol=1e-13)

@@ -15,7 +15,7 @@ from isojax._parameters import list_parameters, own_parameters, replace_paramete
 from isojax._results import is_successful
 from isojax.elements import CATALOGUE, AbstractElement, Scales
 from isojax.excitations import Harmonic
-from isojax.models import Integrator, Isolator, load_model, save_model, simulate
+from isojax.models import Instant, Integrator, Isolator, load_model, save_model, simulate
 from isojax.stability.orbit._describing_function import response_start
 from isojax.stability.orbit._drive import recorded_sine
 from isojax.stability.orbit._floquet import multipliers
@@ -266,7 +266,7 @@ def test_the_linearised_isolator_is_finite_at_rest(kind):
     model = paper.y_direction().with_elements(with_strength(kind.guess(SCALES), 0.1))
     size = 2 + model.internal_states
     rest, zero = tuple(jnp.asarray(0.0) for _ in range(size)), jnp.asarray(0.0)
-    matrix = np.asarray(jax.jacfwd(lambda y: model.rates(y, zero, zero))(rest))
+    matrix = np.asarray(jax.jacfwd(lambda y: model.rates(y, Instant(zero, zero)))(rest))
     assert matrix.shape == (size, size)
     assert np.all(np.isfinite(matrix))
     assert np.all(np.linalg.eigvals(matrix).real < 1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from isojax.elements import FloorMotion, LinearDamping, LinearStiffness, SecondMode
-from isojax.models import Isolator
+from isojax.models import Instant, Isolator
 
 MASS, K, C = 800.0, 1.08e6, 1.03e4
 
@@ -18,8 +18,8 @@ def steady(model: Isolator, frequency: float, quantity: str) -> complex:
     def both(state, floor):
         channels = {"floor": floor}
         states = tuple(state)
-        rates = model.rates(states, zero, zero, channels=channels)
-        return jnp.stack([*rates, model.reading(states, zero, zero, quantity, channels)])
+        rates = model.rates(states, Instant(zero, zero, channels))
+        return jnp.stack([*rates, model.reading(states, Instant(zero, zero, channels), quantity)])
 
     by_state, by_floor = jax.jacfwd(both, argnums=(0, 1))(jnp.zeros(size), zero)
     turning = 2j * np.pi * frequency * np.eye(size)
@@ -56,5 +56,8 @@ def test_a_mass_that_the_isolator_carries_feels_the_floor_too():
 def test_without_a_record_the_floor_stands_still():
     model = Isolator(MASS, (LinearStiffness(K), FloorMotion(1.0)))
     state = (jnp.asarray(1e-3), jnp.asarray(0.0))
-    assert model.base(jnp.asarray(5.0), 0.0) is None
-    assert float(model.acceleration(state, jnp.asarray(5.0))) == pytest.approx((5.0 - K * 1e-3) / MASS)
+    at = Instant(jnp.asarray(5.0))
+    assert model.base(at) is None
+    assert float(model.acceleration(state, at)) == pytest.approx(
+        (5.0 - K * 1e-3) / MASS
+    )

@@ -17,7 +17,7 @@ from isojax.elements import (
     SensorOffset,
 )
 from isojax.excitations import Harmonic
-from isojax.models import Isolator, simulate
+from isojax.models import Instant, Isolator, simulate
 
 M, K, C = 800.0, 1.08e6, 1.0e4
 DRIVE = Harmonic(150.0, 4.3)
@@ -34,9 +34,11 @@ def test_added_mass_is_mass(excitation):
         linear(AddedMass(35.0), excitation=excitation),
         linear(mass=M + 35.0, excitation=excitation),
     )
-    np.testing.assert_allclose(added.acceleration(state, u), heavier.acceleration(state, u), rtol=1e-14)
-    reading = heavier.reading(state, u, 0.0, "acceleration")
-    np.testing.assert_allclose(added.reading(state, u, 0.0, "acceleration"), reading, rtol=1e-14)
+    np.testing.assert_allclose(
+        added.acceleration(state, Instant(u)), heavier.acceleration(state, Instant(u)), rtol=1e-14
+    )
+    reading = heavier.reading(state, Instant(u), "acceleration")
+    np.testing.assert_allclose(added.reading(state, Instant(u), "acceleration"), reading, rtol=1e-14)
 
 
 @pytest.mark.parametrize("delay", [2.3e-3, -1.7e-3])
@@ -84,12 +86,16 @@ def test_instruments_act_in_the_order_given():
     state, zero, u = (jnp.asarray(1e-3), jnp.asarray(0.02)), jnp.asarray(0.0), jnp.asarray(40.0)
 
     def reading(*elements):
-        return linear(*elements).reading(state, u, zero, "velocity")
+        return linear(*elements).reading(state, Instant(u, zero), "velocity")
 
     np.testing.assert_allclose(reading(SensorOffset(0.3), SensorGain(1.0)), 2.0 * (0.02 + 0.3), rtol=1e-14)
     np.testing.assert_allclose(reading(SensorGain(1.0), SensorOffset(0.3)), 2.0 * 0.02 + 0.3, rtol=1e-14)
-    np.testing.assert_allclose(linear(InputOffset(3.0), InputGain(1.0)).drive(u, zero), 86.0, rtol=1e-14)
-    np.testing.assert_allclose(linear(InputGain(1.0), InputOffset(3.0)).drive(u, zero), 83.0, rtol=1e-14)
+    np.testing.assert_allclose(
+        linear(InputOffset(3.0), InputGain(1.0)).drive(Instant(u, zero))[0], 86.0, rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        linear(InputGain(1.0), InputOffset(3.0)).drive(Instant(u, zero))[0], 83.0, rtol=1e-14
+    )
 
 
 def test_an_input_gain_of_a_linear_system_is_a_mass_stiffness_and_damping_error():

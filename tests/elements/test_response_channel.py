@@ -8,7 +8,7 @@ from scipy import signal
 
 from isojax.elements import AcCoupling, Clipping, LinearDamping, LinearStiffness, SensorGain
 from isojax.excitations import Harmonic
-from isojax.models import Isolator, simulate
+from isojax.models import Instant, Isolator, simulate
 
 PLANT = (LinearStiffness(1.08e6), LinearDamping(1.0e4))
 DRIVE = Harmonic(150.0, 4.3)
@@ -45,10 +45,10 @@ def test_instruments_before_the_coupling_act_on_what_it_follows():
     before = Isolator(800.0, (*PLANT, SensorGain(1.0), AcCoupling(0.3, 0.0)))
     after = Isolator(800.0, (*PLANT, AcCoupling(0.3, 0.0), SensorGain(1.0)))
     wc = 2.0 * np.pi * 0.3
-    np.testing.assert_allclose(before.rates(state, u, 0.0, "velocity")[2], 0.04 - wc * 0.004, rtol=1e-12)
-    np.testing.assert_allclose(after.rates(state, u, 0.0, "velocity")[2], 0.02 - wc * 0.004, rtol=1e-12)
+    np.testing.assert_allclose(before.rates(state, Instant(u), "velocity")[2], 0.04 - wc * 0.004, rtol=1e-12)
+    np.testing.assert_allclose(after.rates(state, Instant(u), "velocity")[2], 0.02 - wc * 0.004, rtol=1e-12)
     np.testing.assert_allclose(
-        after.reading(state, u, 0.0, "velocity"), 2.0 * (0.02 - wc * 0.004), rtol=1e-12
+        after.reading(state, Instant(u), "velocity"), 2.0 * (0.02 - wc * 0.004), rtol=1e-12
     )
 
 

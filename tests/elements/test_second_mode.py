@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from isojax.elements import LinearDamping, LinearStiffness, SecondMode
-from isojax.models import Isolator
+from isojax.models import Instant, Isolator
 
 M, K, C = 800.0, 1.08e6, 1.0e4
 M2, W2, ZETA = 60.0, 34.0, 0.04
@@ -20,7 +20,9 @@ def response(model, quantity):
 
     def moved(state, u):
         state = tuple(state)
-        return jnp.stack([*model.rates(state, u, 0.0, quantity), model.reading(state, u, 0.0, quantity)])
+        return jnp.stack(
+            [*model.rates(state, Instant(u), quantity), model.reading(state, Instant(u), quantity)]
+        )
 
     by_state, by_drive = (np.array(part) for part in jax.jacfwd(moved, (0, 1))(rest, zero))
     own, inward = by_state[:-1], by_drive[:-1]

@@ -6,7 +6,7 @@ import pytest
 
 from isojax.elements import LinearDamping, LinearStiffness
 from isojax.excitations import Harmonic
-from isojax.models import Isolator, simulate
+from isojax.models import Instant, Isolator, simulate
 
 M, K, C = 800.0, 1.08e6, 1.0e4
 
@@ -40,8 +40,8 @@ def test_base_excitation_has_the_closed_form_transmissibility(frequency):
 def test_displacement_and_velocity_readings_are_relative_to_the_base():
     model = Isolator(M, (LinearStiffness(K), LinearDamping(C)), "base_acceleration")
     state, u = (jnp.asarray(1e-3), jnp.asarray(0.02)), jnp.asarray(0.3)
-    assert float(model.reading(state, u, 0.0, "displacement")) == 1e-3
-    assert float(model.reading(state, u, 0.0, "velocity")) == 0.02
+    assert float(model.reading(state, Instant(u), "displacement")) == 1e-3
+    assert float(model.reading(state, Instant(u), "velocity")) == 0.02
     np.testing.assert_allclose(
-        model.reading(state, u, 0.0, "acceleration"), -(K * 1e-3 + C * 0.02) / M, rtol=1e-13
+        model.reading(state, Instant(u), "acceleration"), -(K * 1e-3 + C * 0.02) / M, rtol=1e-13
     )

@@ -10,7 +10,7 @@ import pytest
 from isojax import paper
 from isojax._parameters import parameter
 from isojax.elements import AbstractElement, CubicStiffness, LinearDamping, LinearStiffness, SensorGain
-from isojax.models import Isolator
+from isojax.models import Instant, Isolator
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_a_model_is_built_inside_a_traced_function():
     @jax.jit
     def force(mass):
         model = Isolator(mass, (LinearStiffness(1e6),))
-        return model.acceleration((jnp.asarray(1e-3), jnp.asarray(0.0)), jnp.asarray(0.0))
+        return model.acceleration((jnp.asarray(1e-3), jnp.asarray(0.0)), Instant(jnp.asarray(0.0)))
 
     np.testing.assert_allclose(force(500.0), -2.0, rtol=1e-14)
     np.testing.assert_allclose(jax.grad(force)(500.0), 2.0 / 500.0, rtol=1e-14)
@@ -100,9 +100,9 @@ def test_a_model_is_built_inside_a_traced_function():
 def test_lanes_of_states_give_lanes_of_rates():
     model = paper.y_direction()
     state = (jnp.asarray([1e-3, -2e-3, 0.0]), jnp.asarray([0.0, 0.05, 0.1]))
-    together = model.rates(state, jnp.asarray([1.0, 2.0, 3.0]), 0.0)
+    together = model.rates(state, Instant(jnp.asarray([1.0, 2.0, 3.0])))
     for lane in range(3):
-        alone = model.rates(tuple(value[lane] for value in state), jnp.asarray(lane + 1.0), 0.0)
+        alone = model.rates(tuple(value[lane] for value in state), Instant(jnp.asarray(lane + 1.0)))
         np.testing.assert_allclose([value[lane] for value in together], alone, rtol=1e-14)
 
 
@@ -133,10 +133,10 @@ def test_a_sensor_with_memory_follows_the_reading_of_the_instruments_before_it()
     before = Isolator(800.0, (SensorGain(1.0), Follower(0.1)))
     after = Isolator(800.0, (Follower(0.1), SensorGain(1.0)))
     np.testing.assert_allclose(
-        before.rates(state, zero, 0.0, "displacement")[2], (2e-3 - 2e-3) / 0.1, atol=1e-15
+        before.rates(state, Instant(zero), "displacement")[2], (2e-3 - 2e-3) / 0.1, atol=1e-15
     )
     np.testing.assert_allclose(
-        after.rates(state, zero, 0.0, "displacement")[2], (1e-3 - 2e-3) / 0.1, rtol=1e-14
+        after.rates(state, Instant(zero), "displacement")[2], (1e-3 - 2e-3) / 0.1, rtol=1e-14
     )
-    np.testing.assert_allclose(before.reading(state, zero, 0.0, "displacement"), 2e-3, rtol=1e-14)
-    np.testing.assert_allclose(after.reading(state, zero, 0.0, "displacement"), 4e-3, rtol=1e-14)
+    np.testing.assert_allclose(before.reading(state, Instant(zero), "displacement"), 2e-3, rtol=1e-14)
+    np.testing.assert_allclose(after.reading(state, Instant(zero), "displacement"), 4e-3, rtol=1e-14)

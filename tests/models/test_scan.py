@@ -8,7 +8,7 @@ import pytest
 from isojax import paper
 from isojax.elements import MaxwellBranch
 from isojax.excitations import Sampled, tabulate
-from isojax.models import RK4, Integrator, scan_records, simulate
+from isojax.models import RK4, Instant, Integrator, scan_records, simulate
 
 RATE, COUNT, SUBSTEPS = 1000.0, 1500, 4
 
@@ -25,12 +25,13 @@ def test_records_side_by_side_are_the_single_simulations(hold):
     tables = [tabulate(column, RATE, hold, SUBSTEPS)[0] for column in drives().T]
     start = tuple(jnp.asarray([value, -value]) for value in (1e-3, 0.01, 2e-4))
 
-    def observe(state, u, du):
-        return state[0], model.reading(state, u, du, "acceleration")
+    def observe(state, at):
+        return state[0], model.reading(state, at, "acceleration")
 
+    drive = jnp.asarray(np.stack(tables, axis=-1))
     end, (displacement, reading), ringing = jax.jit(
-        lambda drive: scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, drive, None, observe)
-    )(jnp.asarray(np.stack(tables, axis=-1)))
+        lambda record: scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, record, observe)
+    )(Instant(drive, jnp.zeros_like(drive)))
     for lane in range(2):
         record = simulate(
             model,
@@ -56,9 +57,8 @@ def test_the_drive_rate_reaches_the_instruments():
         "acceleration",
         1.0 / RATE,
         (jnp.zeros(1), jnp.zeros(1)),
-        jnp.asarray(values)[..., None],
-        jnp.asarray(slopes)[..., None],
-        lambda state, u, du: du,
+        Instant(jnp.asarray(values)[..., None], jnp.asarray(slopes)[..., None]),
+        lambda state, at: at.drive_rate,
     )
     t = np.arange(COUNT) / RATE
     expected = 150.0 * 2 * np.pi * 4.3 * np.cos(2 * np.pi * 4.3 * t)

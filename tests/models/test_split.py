@@ -23,6 +23,7 @@ from isojax.elements import (
 from isojax.excitations import tabulate
 from isojax.models import (
     RK4,
+    Instant,
     Integrator,
     Isolator,
     State,
@@ -32,6 +33,7 @@ from isojax.models import (
     find_regime,
     read_record,
     scan_records,
+    split_stages,
 )
 from isojax.rig._sampling import anti_alias_taps, decimated, oversampling
 
@@ -92,24 +94,30 @@ def table(piece: rig.Tones, substeps: int, count: int = COUNT) -> jax.Array:
     return jnp.asarray(piece.forces(times.ravel()).reshape(times.shape))[..., None]
 
 
+def still(drive: jax.Array) -> Instant:
+    """A drive whose rate nothing asks for."""
+    return Instant(drive, jnp.zeros_like(drive))
+
+
 @eqx.filter_jit
 def split(model: Isolator, drive: jax.Array, start: State) -> tuple[State, jax.Array]:
     """States and readings at the samples."""
 
-    def observe(state, u, du):
-        return state, read_record(model, state, u, du, "acceleration")
+    def observe(state, at):
+        return state, read_record(model, state, at, "acceleration")
 
-    return scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, drive, None, observe)[1]
+    return scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, still(drive), observe)[1]
 
 
 @eqx.filter_jit
 def as_recorded(model: Isolator, drive: jax.Array, start: State) -> tuple[jax.Array, jax.Array]:
     """Readings of the motion at the samples, and as they are in a band-limited record."""
 
-    def observe(state, u, du):
-        return read_record(model, state, u, du, "acceleration")
+    def observe(state, at):
+        return read_record(model, state, at, "acceleration")
 
-    _, sharp, ringing = scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, drive, None, observe)
+    record = still(drive)
+    _, sharp, ringing = scan_records(model, RK4(), "acceleration", 1.0 / RATE, start, record, observe)
     assert ringing is not None
     return sharp, add_ringing(sharp, ringing)
 
@@ -117,14 +125,13 @@ def as_recorded(model: Isolator, drive: jax.Array, start: State) -> tuple[jax.Ar
 @eqx.filter_jit
 def rounded(model: Isolator, drive: jax.Array, start: State) -> jax.Array:
     """Readings of the laws as they are rounded over their widths."""
-    stages = drive.shape[1]
 
-    def body(state, values):
-        u = tuple(values[stage] for stage in range(stages))
-        reading = model.reading(state, u[0], 0.0, "acceleration")
-        return advance(model, RK4(), "acceleration", 1.0 / RATE, state, u, (0.0,) * stages), reading
+    def body(state, record):
+        stages = split_stages(record)
+        reading = model.reading(state, stages[0], "acceleration")
+        return advance(model, RK4(), "acceleration", 1.0 / RATE, state, stages), reading
 
-    return jax.lax.scan(body, start, drive)[1]
+    return jax.lax.scan(body, start, still(drive))[1]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -246,7 +253,7 @@ def test_what_friction_holds_knows_nothing_of_its_velocity_before():
 def test_a_mass_at_rest_is_held_until_the_drive_exceeds_friction():
     model = Isolator(MASS, (SPRING, CoulombFriction(60.0, WIDTH), AsymmetricFriction(20.0, WIDTH)))
     rest = (jnp.zeros(4), jnp.zeros(4))
-    regime = find_regime(model, rest, jnp.asarray([79.0, 81.0, -39.0, -41.0]), 0.0)
+    regime = find_regime(model, rest, Instant(jnp.asarray([79.0, 81.0, -39.0, -41.0])))
     np.testing.assert_array_equal(regime.direction, [0.0, 1.0, 0.0, -1.0])
 
 
@@ -282,8 +289,8 @@ def test_many_steps_a_sample_are_split_one_by_one():
     @jax.jit
     def last(rows):
         def body(state, row):
-            u, still = tuple(row), (0.0,) * row.size
-            return advance_record(model, RK4(), "acceleration", 1.0 / RATE, state, u, still)
+            stages = split_stages(still(row))
+            return advance_record(model, RK4(), "acceleration", 1.0 / RATE, state, stages)
 
         return jax.lax.scan(body, start, rows)[0][1]
 

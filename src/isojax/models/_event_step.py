@@ -9,9 +9,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from .._types import Lanes
-from ..elements import Channels
-from ._element_states import Regime
-from ._isolator import NO_CHANNELS, Isolator, Quantity, State
+from ._instant import Instant
+from ._isolator import Isolator, Quantity
+from ._laws import Regime, State
 
 _ROUNDS = 6
 """Safeguarded Newton steps to an event: two make a crossing exact, the others are for near tangents."""
@@ -20,25 +20,19 @@ _ROUNDING = 1e-9
 """By how much a share of a step may be off."""
 
 
-class Table(NamedTuple):
-    """What acts at the beginning, the middle and the end of a step.
+class Step(NamedTuple):
+    """An integration step: its length, and what acts during it.
 
     Attributes:
-        drive: recorded drive.
-        drive_rate: its time derivative.
-        channels: signals of the record, by name.
-        push: further rates of the states while they are free to move, none if omitted: what a column of
-            derivatives is driven by.
+        length: [s].
+        stages: what acts at its start, middle and end.
+        push: further rates of the states at the same instants while they are free to move, none if omitted:
+            what drives a column of derivatives.
     """
 
-    drive: tuple[Lanes, ...]
-    drive_rate: tuple[Lanes | float, ...]
-    channels: tuple[Channels, ...]
+    length: Lanes | float
+    stages: tuple[Instant, ...]
     push: tuple[State, ...] = ()
-
-    def acting(self, stage: int) -> tuple[Lanes, Lanes | float, Channels]:
-        """Give drive, its rate and the channels at the beginning (0), middle (1) or end (2)."""
-        return self.drive[stage], self.drive_rate[stage], self.channels[stage]
 
 
 class Jump(NamedTuple):
@@ -105,17 +99,13 @@ def add_ringing(reading: Array, ringing: Ringing | None) -> Array:
     return reading + ringing.before + jnp.concatenate([jnp.zeros_like(ringing.after[:1]), ringing.after[:-1]])
 
 
-def find_regime(
-    model: Isolator, state: State, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS
-) -> Regime:
+def find_regime(model: Isolator, state: State, at: Instant) -> Regime:
     """Find the piece of each law on which a motion goes on.
 
     Args:
         model: the isolator.
         state: displacement, velocity and internal states.
-        u: recorded drive, already shifted.
-        u_rate: its time derivative.
-        channels: signals of the record, by name.
+        at: what acts at the instant.
 
     Returns:
         The regime. A mass at rest slides forward if forward friction lets it accelerate forward, backward
@@ -123,23 +113,21 @@ def find_regime(
 
     Source: Filippov 1988, Differential Equations with Discontinuous Righthand Sides, sec. 15.
     """
-    model, state, u, u_rate, channels = _frozen((model, state, u, u_rate, channels))
+    model, state, at = _frozen((model, state, at))
     corners = tuple(jnp.where(corner < 0.0, -1.0, 1.0) for corner in model.corners(state))
     v = state[1]
     if not model.slides:
         return Regime(jnp.ones_like(v), corners)
 
     def from_rest() -> Lanes:
-        forward, backward = _pushed(model, state, corners, u, u_rate, channels)
+        forward, backward = _pushed(model, state, corners, at)
         leaves = jnp.where(forward > 0.0, 1.0, jnp.where(backward < 0.0, -1.0, 0.0))
         return jnp.where(v == 0.0, leaves, jnp.sign(v))
 
     return Regime(jax.lax.cond(jnp.any(v == 0.0), from_rest, lambda: jnp.sign(v)), corners)
 
 
-def split_step(
-    model: Isolator, quantity: Quantity, step_time: Lanes | float, state: State, at: Table
-) -> tuple[State, Jump]:
+def split_step(model: Isolator, quantity: Quantity, state: State, step: Step) -> tuple[State, Jump]:
     """Advance one step; where a law jumps or bends on the way, two steps that meet there.
 
     Dense output of the step tells when, and carries the derivative of that instant, so that derivatives of
@@ -149,9 +137,8 @@ def split_step(
     Args:
         model: the isolator.
         quantity: what the sensor measures.
-        step_time: length of the step [s].
-        state: state at its beginning.
-        at: what acts at its beginning, middle and end.
+        state: state at the start of the step.
+        step: the step.
 
     Returns:
         State at its end; what the reading does at once on the way.
@@ -159,10 +146,10 @@ def split_step(
     Source: Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6, for the
     dense output; Aizerman & Gantmakher 1958 for the derivatives.
     """
-    regime = find_regime(model, state, *at.acting(0))
+    regime = find_regime(model, state, step.stages[0])
     # Where it is held nothing is left of a velocity, nor of its derivative.
     state = (state[0], jnp.where(regime.is_held, 0.0, state[1]), *state[2:])
-    powers = _dense(_stages(model, quantity, step_time, state, regime, at))
+    powers = _dense(_increments(model, quantity, state, step, regime))
     end = _place(state, powers, 1.0)
     sides = (regime.direction, *regime.corners)
 
@@ -172,7 +159,7 @@ def split_step(
         return tuple(side * value for side, value in zip(sides, values, strict=True))
 
     # The search has no derivative: the Newton step after it carries that of the root.
-    still = _frozen((model, state, powers, end, at))
+    still = _frozen((model, state, powers, end, step))
     passed = [value < 0.0 for value in ahead(still[0], still[3])]
     if model.slides:
         freed, free_at = _freed(regime, *still[:2], *still[3:])
@@ -182,10 +169,10 @@ def split_step(
     split = functools.reduce(jnp.logical_or, passed) | (freed != 0.0)
 
     def find() -> tuple[Lanes, tuple[Lanes, ...], list[Array], Lanes]:
-        still_model, begin, still_powers, _, still_at = still
+        still_model, start, still_powers, _, still_step = still
 
         def along(share: Lanes) -> tuple[Lanes, ...]:
-            return ahead(still_model, _place(begin, still_powers, share))
+            return ahead(still_model, _place(start, still_powers, share))
 
         found, hit = free_at, [jnp.zeros_like(one) for one in passed]
         for place, one in enumerate(passed):
@@ -195,8 +182,8 @@ def split_step(
             hit = [other & ~sooner for other in hit]
             hit[place] = sooner
         slopes = jax.jvp(along, (found,), (jnp.ones_like(found),))[1]
-        met = _at_rest(_place(begin, still_powers, found), hit[0])
-        turned = find_regime(still_model, met, *_inside(still_at, found).acting(0)).direction
+        met = _at_rest(_place(start, still_powers, found), hit[0])
+        turned = find_regime(still_model, met, _rest(still_step, found).stages[0]).direction
         direction = jnp.where(hit[0], turned, jnp.where(freed != 0.0, freed, regime.direction))
         return found, slopes, hit, direction
 
@@ -215,18 +202,15 @@ def split_step(
             share = jnp.where(one, share - value / jnp.where(one & (slope != 0.0), slope, 1.0), share)
         met = _at_rest(_place(state, powers, share), hit[0])
         flipped = tuple(jnp.where(one, -side, side) for one, side in zip(hit[1:], sides[1:], strict=True))
-        after, rest = Regime(direction, flipped), (1.0 - share) * step_time
-        left = _inside(at, share)
-        second = _place(met, _dense(_stages(model, quantity, rest, met, after, left)), 1.0)
+        after, rest = Regime(direction, flipped), _rest(step, share)
+        second = _place(met, _dense(_increments(model, quantity, met, rest, after)), 1.0)
         size = nothing
         if quantity == "acceleration":
             # Displacement and velocity never jump; breaking loose begins without acceleration.
-            u, u_rate, channels = left.acting(0)
-
             def read(side: Regime) -> Lanes:
-                seen = model.reading(met, u, u_rate, quantity, channels, side)
+                seen = model.reading(met, rest.stages[0], quantity, side)
                 # What pushes a mass that moves is seen by the accelerometer.
-                return seen + jnp.where(side.is_held, 0.0, left.push[0][1]) if left.push else seen
+                return seen + jnp.where(side.is_held, 0.0, rest.push[0][1]) if rest.push else seen
 
             size = jnp.where(functools.reduce(jnp.logical_or, hit), read(after) - read(regime), 0.0)
         moved = tuple(jnp.where(split, two, one) for two, one in zip(second, end, strict=True))
@@ -244,7 +228,7 @@ def _at_rest(state: State, reversal: Array) -> State:
     return (state[0], jnp.where(reversal, 0.0, state[1]), *state[2:])
 
 
-def _freed(regime: Regime, model: Isolator, begin: State, end: State, at: Table) -> tuple[Lanes, Lanes]:
+def _freed(regime: Regime, model: Isolator, start: State, end: State, step: Step) -> tuple[Lanes, Lanes]:
     """Find where friction that holds the mass gives way.
 
     While it holds, what drives the mass beyond it runs nearly straight over a step; one secant step takes
@@ -257,16 +241,15 @@ def _freed(regime: Regime, model: Isolator, begin: State, end: State, at: Table)
     none = jnp.zeros_like(end[1]), jnp.ones_like(end[1])
 
     def look() -> tuple[Lanes, Lanes]:
-        before = _pushed(model, begin, regime.corners, *at.acting(0))
-        later = _pushed(model, end, regime.corners, *at.acting(2))
+        before = _pushed(model, start, regime.corners, step.stages[0])
+        later = _pushed(model, end, regime.corners, step.stages[2])
         ahead, back = regime.is_held & (later[0] > 0.0), regime.is_held & (later[1] < 0.0)
         freed = jnp.where(ahead, 1.0, jnp.where(back, -1.0, 0.0))
         one, two = (jnp.where(ahead, *pair) for pair in (before, later))
         rise = jnp.where(freed != 0.0, two - one, 1.0)
         share = jnp.clip(-one / rise, 0.0, 1.0)
-        between = tuple(a + share * (b - a) for a, b in zip(begin, end, strict=True))
-        u, u_rate, channels = _inside(at, share).acting(0)
-        left = model.acceleration(between, u, u_rate, Regime(freed, regime.corners), channels)
+        between = tuple(a + share * (b - a) for a, b in zip(start, end, strict=True))
+        left = model.acceleration(between, _rest(step, share).stages[0], Regime(freed, regime.corners))
         return freed, jnp.where(freed != 0.0, jnp.clip(share - left / rise, 0.0, 1.0), 1.0)
 
     return jax.lax.cond(jnp.any(regime.is_held), look, lambda: none)
@@ -286,35 +269,25 @@ def _root(value: Callable[[Lanes], Lanes], like: Lanes) -> Lanes:
     return share
 
 
-def _pushed(
-    model: Isolator,
-    state: State,
-    corners: tuple[Lanes, ...],
-    u: Lanes,
-    u_rate: Lanes | float,
-    channels: Channels,
-) -> tuple[Lanes, Lanes]:
+def _pushed(model: Isolator, state: State, corners: tuple[Lanes, ...], at: Instant) -> tuple[Lanes, Lanes]:
     """Give the accelerations with friction against forward and against backward motion."""
     one = jnp.ones_like(state[1])
-    forward, backward = (
-        model.acceleration(state, u, u_rate, Regime(sign * one, corners), channels) for sign in (1.0, -1.0)
-    )
+    forward, backward = (model.acceleration(state, at, Regime(sign * one, corners)) for sign in (1.0, -1.0))
     return forward, backward
 
 
-def _stages(
-    model: Isolator, quantity: Quantity, step_time: Lanes | float, state: State, regime: Regime, at: Table
+def _increments(
+    model: Isolator, quantity: Quantity, state: State, step: Step, regime: Regime
 ) -> tuple[State, ...]:
     """Give the four increments of a Runge-Kutta step on given sides."""
 
-    def field(place: int, there: State) -> State:
-        u, du, channels = at.acting(place)
-        rates = model.rates(there, u, du, quantity, regime, channels)
-        if at.push:
+    def field(stage: int, there: State) -> State:
+        rates = model.rates(there, step.stages[stage], quantity, regime)
+        if step.push:
             held = (regime.is_held, regime.is_held, *(False,) * model.internal_states)
-            pushes = zip(rates, held, at.push[place], strict=True)
+            pushes = zip(rates, held, step.push[stage], strict=True)
             rates = tuple(rate + jnp.where(stays, 0.0, push) for rate, stays, push in pushes)
-        return tuple(step_time * rate for rate in rates)
+        return tuple(step.length * rate for rate in rates)
 
     def moved(share: float, increment: State) -> State:
         return tuple(one + share * other for one, other in zip(state, increment, strict=True))
@@ -341,24 +314,22 @@ def _place(state: State, powers: tuple[State, ...], share: Any) -> State:
     )
 
 
-def _inside(at: Table, share: Lanes) -> Table:
-    """Give what acts at the beginning, middle and end of the rest of a step.
+def _rest(step: Step, share: Lanes) -> Step:
+    """Give the rest of a step that is left at a share of it.
 
-    A parabola through the three values of the step: these are the limits from inside, so that a drive that
-    jumps from step to step is none the worse for it.
+    What acts follows a parabola through the three values of the step: these are the limits from inside, so
+    that a drive that jumps from step to step is none the worse for it.
     """
 
-    def curve(values: tuple[Any, ...], place: Lanes) -> Lanes:
-        begin, middle, end = values
-        return begin + place * (4.0 * middle - 3.0 * begin - end + place * 2.0 * (begin - 2.0 * middle + end))
+    def along(during: tuple[Any, ...]) -> tuple[Any, ...]:
+        def at(place: Lanes) -> Any:
+            def curve(start: Lanes, middle: Lanes, end: Lanes) -> Lanes:
+                bend = 2.0 * (start - 2.0 * middle + end)
+                return start + place * (4.0 * middle - 3.0 * start - end + place * bend)
 
-    places = (share, 0.5 * (1.0 + share))
+            return jax.tree_util.tree_map(curve, *during)
 
-    def along(values: tuple[Any, ...]) -> tuple[Any, ...]:
-        return (*(curve(values, place) for place in places), values[2])
+        return at(share), at(0.5 * (1.0 + share)), during[2]
 
-    names = at.channels[0]
-    known = {name: along(tuple(stage[name] for stage in at.channels)) for name in names}
-    channels = tuple({name: known[name][stage] for name in names} for stage in range(3))
-    push = tuple(zip(*(along(rates) for rates in zip(*at.push, strict=True)), strict=True))
-    return Table(along(at.drive), along(at.drive_rate), channels, push)
+    push = along(step.push) if step.push else ()
+    return Step((1.0 - share) * step.length, along(step.stages), push)

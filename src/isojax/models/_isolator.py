@@ -11,12 +11,10 @@ from jaxtyping import Array, Float
 from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
 from .._types import Lanes, Scalar
 from ..elements import AbstractElement, Channels
-from ._element_states import Regime, State, gather, share_internal, share_sides, sum_forces
+from ._instant import Instant
+from ._laws import ROUNDED, AbstractLaw, State, evaluate_switches, share_internal
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
-
-NO_CHANNELS: Channels = {}
-"""No record, no signals of a record: the effects that follow them are absent."""
 
 
 class Isolator(eqx.Module):
@@ -150,53 +148,34 @@ class Isolator(eqx.Module):
         """Give the time by which the recorded drive leads the one that acted [s]."""
         return sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
 
-    def drive(self, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS) -> Lanes:
-        """Give the drive that acted.
-
-        Args:
-            u: recorded drive, already shifted [N, or m/s^2 for base excitation].
-            u_rate: its time derivative.
-            channels: signals of the record, by name; none where there is no record.
-
-        Returns:
-            The drive that acted, in the same unit.
-        """
-        return self.acting(u, u_rate, channels)[0]
-
-    def acting(
-        self, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS
-    ) -> tuple[Lanes, Lanes]:
+    def drive(self, at: Instant) -> tuple[Lanes, Lanes]:
         """Give the drive that acted, and its rate.
 
         Args:
-            u: recorded drive, already shifted [N, or m/s^2 for base excitation].
-            u_rate: its time derivative.
-            channels: see `drive`.
+            at: what was recorded at the instant.
 
         Returns:
-            The drive that acted and its time derivative, in the same unit.
+            The drive that acted [N, or m/s^2 for base excitation] and its time derivative.
         """
-        rate = jnp.asarray(u_rate, dtype=float)
-        for element in self._following(channels):
-            u = u + element.channel_drive(channels)
+        u, rate = at.drive, jnp.asarray(at.drive_rate, dtype=float)
+        for element in self._following(at.channels):
+            u = u + element.channel_drive(at.channels)
         for element in self.elements:
             u, rate = element.drive(u, rate)
         return u, rate
 
-    def base(self, u: Lanes, u_rate: Lanes | float, channels: Channels = NO_CHANNELS) -> Lanes | None:
+    def base(self, at: Instant) -> Lanes | None:
         """Give the acceleration of what the coordinate moves with.
 
         Args:
-            u: recorded drive, already shifted [N, or m/s^2 for base excitation].
-            u_rate: its time derivative.
-            channels: see `drive`.
+            at: what acts at the instant.
 
         Returns:
             Acceleration of the base, or of the floor [m/s^2]; None where it stands still.
         """
-        total = self.drive(u, u_rate, channels) if self.excitation == "base_acceleration" else None
-        for element in self._following(channels):
-            moved = element.channel_base(channels)
+        total = self.drive(at)[0] if self.excitation == "base_acceleration" else None
+        for element in self._following(at.channels):
+            moved = element.channel_base(at.channels)
             if moved is not None:
                 total = moved if total is None else total + moved
         return total
@@ -210,7 +189,7 @@ class Isolator(eqx.Module):
         Returns:
             One value a kink, those of each element in turn.
         """
-        return gather(self.elements, state, "kinks")
+        return self._switches(state, "kinks")
 
     def corners(self, state: State) -> State:
         """Give the functions at whose zeros some law, unrounded, has a corner.
@@ -221,37 +200,31 @@ class Isolator(eqx.Module):
         Returns:
             One value a corner, those of each element in turn.
         """
-        return gather(self.elements, state, "corners")
+        return self._switches(state, "corners")
 
-    def restoring_force(self, state: State, sides: State | Regime | None = None) -> Lanes:
-        """Give the sum of element forces [N].
+    def _switches(self, state: State, which: Literal["kinks", "corners"]) -> State:
+        return tuple(one for own in evaluate_switches(self.elements, state, which) for one in own)
+
+    def restoring_force(self, state: State, law: AbstractLaw = ROUNDED) -> Lanes:
+        """Give the sum of element forces.
 
         Args:
             state: displacement, velocity and internal states.
-            sides: sign of each of `kinks` whose side is meant, or the regime in which the laws are sharp; the
-                rounded laws on the sides of the state itself if omitted.
+            law: which law is meant where one jumps or bends: `RoundedLaw`, the smooth `ContinuedLaw` of given
+                sides, or the sharp one of a `Regime`.
 
         Returns:
             Force on the left-hand side of the balance [N].
         """
-        return sum_forces(self.elements, state, sides)
+        return sum(law.forces(self.elements, state), start=0.0 * state[0])
 
-    def acceleration(
-        self,
-        state: State,
-        u: Lanes,
-        u_rate: Lanes | float = 0.0,
-        sides: State | Regime | None = None,
-        channels: Channels = NO_CHANNELS,
-    ) -> Lanes:
+    def acceleration(self, state: State, at: Instant, law: AbstractLaw = ROUNDED) -> Lanes:
         """Give the acceleration of the coordinate.
 
         Args:
             state: displacement, velocity and internal states.
-            u: recorded drive, already shifted.
-            u_rate: its time derivative.
-            sides: see `restoring_force`.
-            channels: see `drive`.
+            at: what acts at the instant.
+            law: see `restoring_force`.
 
         Returns:
             Acceleration [m/s^2]; relative to a base or floor that moves.
@@ -259,33 +232,22 @@ class Isolator(eqx.Module):
         inertia = self.mass
         for element in self.elements:
             inertia = inertia + element.inertia()
-        force = self.restoring_force(state, sides)
-        for element in self._following(channels):
-            force = force + element.channel_force(state[0], state[1], channels)
-        drive = 0.0 if self.excitation == "base_acceleration" else self.drive(u, u_rate, channels)
-        base = self.base(u, u_rate, channels)
+        force = self.restoring_force(state, law)
+        for element in self._following(at.channels):
+            force = force + element.channel_force(state[0], state[1], at.channels)
+        drive = 0.0 if self.excitation == "base_acceleration" else self.drive(at)[0]
+        base = self.base(at)
         absolute = (drive - force) / inertia
-        relative = absolute if base is None else absolute - base
-        return jnp.where(sides.is_held, 0.0, relative) if isinstance(sides, Regime) else relative
+        return law.acceleration(absolute if base is None else absolute - base)
 
-    def motion(
-        self,
-        state: State,
-        u: Lanes,
-        u_rate: Lanes | float,
-        quantity: Quantity,
-        channels: Channels = NO_CHANNELS,
-        sides: Regime | None = None,
-    ) -> Lanes:
+    def motion(self, state: State, at: Instant, quantity: Quantity, law: AbstractLaw = ROUNDED) -> Lanes:
         """Give the motion at the sensor.
 
         Args:
             state: displacement, velocity and internal states.
-            u: recorded drive, already shifted.
-            u_rate: its time derivative.
+            at: what acts at the instant.
             quantity: what the sensor measures.
-            channels: see `drive`.
-            sides: see `restoring_force`.
+            law: see `restoring_force`.
 
         Returns:
             Acceleration [m/s^2], absolute; velocity [m/s] or displacement [m], relative to a base or floor
@@ -295,105 +257,58 @@ class Isolator(eqx.Module):
             return state[0]
         if quantity == "velocity":
             return state[1]
-        acceleration = self.acceleration(state, u, u_rate, sides, channels)
-        base = self.base(u, u_rate, channels)
+        acceleration, base = self.acceleration(state, at, law), self.base(at)
         return acceleration if base is None else acceleration + base
 
-    def reading(
-        self,
-        state: State,
-        u: Lanes,
-        u_rate: Lanes | float,
-        quantity: Quantity,
-        channels: Channels = NO_CHANNELS,
-        sides: Regime | None = None,
-    ) -> Lanes:
-        """Give what the sensor chain records.
-
-        Args:
-            state: displacement, velocity and internal states.
-            u: recorded drive, already shifted.
-            u_rate: its time derivative.
-            quantity: what the sensor measures.
-            channels: see `drive`.
-            sides: see `restoring_force`.
-
-        Returns:
-            The reading [SI unit of the quantity].
-        """
-        y = self.sensed(state, u, u_rate, quantity, channels, sides)
-        for element in self._following(channels):
-            y = y + element.channel_reading(channels)
-        return y
-
-    def sensed(
-        self,
-        state: State,
-        u: Lanes,
-        u_rate: Lanes | float,
-        quantity: Quantity,
-        channels: Channels = NO_CHANNELS,
-        sides: Regime | None = None,
-    ) -> Lanes:
-        """Give the reading before what signals of the record add to it.
-
-        Args:
-            state: displacement, velocity and internal states.
-            u: recorded drive, already shifted.
-            u_rate: its time derivative.
-            quantity: what the sensor measures.
-            channels: see `drive`.
-            sides: see `restoring_force`.
-
-        Returns:
-            The reading [SI unit of the quantity].
-        """
-        y = self.motion(state, u, u_rate, quantity, channels, sides)
+    def sensed(self, state: State, at: Instant, quantity: Quantity, law: AbstractLaw = ROUNDED) -> Lanes:
+        """Give the reading before what signals of the record add to it: see `reading`."""
+        y = self.motion(state, at, quantity, law)
         for element, internal in zip(self.elements, share_internal(self.elements, state), strict=True):
             y = element.reading(y, internal)
         return y
 
+    def reading(self, state: State, at: Instant, quantity: Quantity, law: AbstractLaw = ROUNDED) -> Lanes:
+        """Give what the sensor chain records.
+
+        Args:
+            state: displacement, velocity and internal states.
+            at: what acts at the instant.
+            quantity: what the sensor measures.
+            law: see `restoring_force`.
+
+        Returns:
+            The reading [SI unit of the quantity].
+        """
+        y = self.sensed(state, at, quantity, law)
+        for element in self._following(at.channels):
+            y = y + element.channel_reading(at.channels)
+        return y
+
     def rates(
-        self,
-        state: State,
-        u: Lanes,
-        u_rate: Lanes | float,
-        quantity: Quantity = "acceleration",
-        sides: State | Regime | None = None,
-        channels: Channels = NO_CHANNELS,
+        self, state: State, at: Instant, quantity: Quantity = "acceleration", law: AbstractLaw = ROUNDED
     ) -> State:
         """Give the time derivative of the state.
 
         Args:
             state: displacement, velocity and internal states.
-            u: recorded drive, already shifted.
-            u_rate: its time derivative.
-            quantity: what the sensor measures; an instrument with memory follows it, as changed by the
-                instruments before.
-            sides: see `restoring_force`.
-            channels: see `drive`.
+            at: what acts at the instant.
+            quantity: what the sensor measures; an instrument with internal states follows it, as changed by
+                the instruments before.
+            law: see `restoring_force`.
 
         Returns:
             One rate a state.
         """
-        x, v = state[:2]
         internal_rates: list[Lanes] = []
         if self.internal_states:
-            regime = sides if isinstance(sides, Regime) else None
-            y = self.motion(state, u, u_rate, quantity, channels, regime)
-            base = self.base(u, u_rate, channels)
-            kinked = None if sides is None or regime is not None else share_sides(self.elements, state, sides)
-            beside = [None] * len(self.elements) if kinked is None else kinked
+            y, base = self.motion(state, at, quantity, law), self.base(at)
             shares = share_internal(self.elements, state)
-            for element, internal, own in zip(self.elements, shares, beside, strict=True):
-                if own is None:
-                    law = element.state_rate(x, v, internal)
-                else:
-                    law = element.state_rate_beside(x, v, internal, own)
+            own_rates = law.state_rates(self.elements, state)
+            for element, internal, rates in zip(self.elements, shares, own_rates, strict=True):
                 if base is not None:
                     moved = element.base_rate(base, internal)
-                    law = tuple(a + b for a, b in zip(law, moved, strict=True))
+                    rates = tuple(a + b for a, b in zip(rates, moved, strict=True))
                 sensed = element.reading_rate(y, internal)
-                internal_rates.extend(a + b for a, b in zip(law, sensed, strict=True))
+                internal_rates.extend(a + b for a, b in zip(rates, sensed, strict=True))
                 y = element.reading(y, internal)
-        return (v, self.acceleration(state, u, u_rate, sides, channels), *internal_rates)
+        return (state[1], self.acceleration(state, at, law), *internal_rates)

@@ -13,8 +13,10 @@ from jaxtyping import Array, Float
 from .._results import RESULTS
 from .._types import Lanes, as_float64, check_float64
 from ..excitations import AbstractExcitation
+from ._instant import Instant
 from ._integrator import Integrator
-from ._isolator import Isolator, Quantity, State
+from ._isolator import Isolator, Quantity
+from ._laws import State
 
 
 class Simulation(eqx.Module):
@@ -52,19 +54,19 @@ def _solve(
     rate: float,
 ) -> tuple[State, diffrax.RESULTS]:
     shift = model.shift()
-    parts = integrator.steps_per_sample(model)
+    substeps = integrator.steps_per_sample(model)
     # Counted, not summed up: the steps of a zero-order hold must not drift against its samples.
-    steps = jnp.arange((time.size - 1) * parts + 1, dtype=float) / (rate * parts)
+    steps = jnp.arange((time.size - 1) * substeps + 1, dtype=float) / (rate * substeps)
 
     def field(t: Lanes, y: State, args: None) -> State:
-        return model.rates(y, excitation(t - shift), excitation.rate(t - shift), quantity)
+        return model.rates(y, Instant(excitation(t - shift), excitation.rate(t - shift)), quantity)
 
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),  # pyright: ignore[reportArgumentType]
         integrator.solver,
         t0=steps[0],
         t1=steps[-1],
-        dt0=None if integrator.rtol is None else 1.0 / (rate * parts),
+        dt0=None if integrator.rtol is None else 1.0 / (rate * substeps),
         y0=state,
         saveat=diffrax.SaveAt(ts=time),
         stepsize_controller=integrator.controller(steps),
@@ -126,7 +128,7 @@ def simulate(
     time = jnp.arange(count + 1, dtype=float) / rate
     states, ended = _solve(model, excitation, time, state, integrator, quantity, rate)
     shift = model.shift()
-    u, u_rate = jax.vmap(excitation)(time - shift), jax.vmap(excitation.rate)(time - shift)
+    at = Instant(jax.vmap(excitation)(time - shift), jax.vmap(excitation.rate)(time - shift))
     ran = ended == diffrax.RESULTS.successful
     finite = jnp.all(jnp.isfinite(jnp.stack(states)))
     result = RESULTS.where(ran & ~finite, RESULTS.not_finite, RESULTS.promote(ended))
@@ -134,11 +136,11 @@ def simulate(
     states = tuple(jnp.where(good, value, jnp.nan) for value in states)
     return Simulation(
         time,
-        model.drive(u, u_rate),
+        model.drive(at)[0],
         states[0],
         states[1],
-        model.acceleration(states, u, u_rate),
-        model.reading(states, u, u_rate, quantity),
+        model.acceleration(states, at),
+        model.reading(states, at, quantity),
         states[2:],
         result,
     )

@@ -1,6 +1,7 @@
 """A planned experiment carried out on a model: the records that it would give."""
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...excitations import Hold
-from ...models import RK4, Isolator, Quantity, State, add_ringing, read_record, scan_records
+from ...models import RK4, Instant, Isolator, Quantity, State, add_ringing, read_record, scan_records
 from ...records import Dwell, Record
 from ..jacobian import carries, channel_table, drive_table
 from ._candidate_experiments import DWELLS, Experiment
@@ -38,19 +39,16 @@ class TrialRun(NamedTuple):
 @eqx.filter_jit
 def _run(
     model: Isolator,
-    drive: Float[Array, "time stage lanes"],
-    drive_rate: Float[Array, "time stage lanes"],
-    channels: dict[str, Float[Array, "time stage lanes"]],
+    record: Instant,
     start: State,
     quantity: Quantity,
     sample_time: float,
 ) -> tuple[State, Array]:
-    """Give states and readings at the samples."""
+    """Give states and readings at the samples; the record is over time, stage and lanes."""
     _, path, ringing = scan_records(
-        model, RK4(), quantity, sample_time, start, drive, drive_rate, lambda state, u, du: state, channels
+        model, RK4(), quantity, sample_time, start, record, lambda state, at: state
     )
-    beside = {name: table[:, 0] for name, table in channels.items()}
-    reading = read_record(model, path, drive[:, 0], drive_rate[:, 0], quantity, beside)
+    reading = read_record(model, path, record.pick(np.s_[:, 0]), quantity)
     return path, add_ringing(reading, ringing)
 
 
@@ -139,7 +137,7 @@ def trial_run(
     length, shift = total // DWELLS, float(model.shift())
     window = (np.arange(2 * length)[:, None] + (np.arange(DWELLS) - 1) * length) % total
 
-    def side_by_side(tables: list[Float[np.ndarray, "time stage"]]) -> Array:
+    def side_by_side(tables: Iterable[Float[np.ndarray, "time stage"]]) -> Array:
         lanes = [np.moveaxis(table[window], 2, 1) for table in tables]
         return jnp.asarray(np.concatenate(lanes, axis=2))
 
@@ -152,9 +150,7 @@ def trial_run(
     start = (jnp.full(lanes, rest), *(jnp.zeros(lanes),) * (1 + model.internal_states))
     path, reading = _run(
         model,
-        side_by_side([table for table, _ in tables]),
-        side_by_side([slopes for _, slopes in tables]),
-        channels,
+        Instant(*(side_by_side(values) for values in zip(*tables, strict=True)), channels=channels),
         start,
         quantity,
         1.0 / experiment.rate,

@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 
 from ..._parameters import own_parameters
 from ...elements import AbstractElement
-from ...models import Isolator
+from ...models import Instant, Isolator
 from ._motion import Motion
 
 BalanceProjection = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, " row"]]
@@ -56,7 +56,7 @@ def _balance(model: Isolator, motion: Motion) -> Float[np.ndarray, " time"]:
     """Give inertia plus restoring force minus drive [N]; zero where the model is right."""
     x, v = jnp.asarray(motion.displacement), jnp.asarray(motion.velocity)
     state = (x, v, *(jnp.zeros_like(x),) * model.internal_states)
-    drive = model.drive(jnp.asarray(motion.drive), 0.0)
+    drive, _ = model.drive(Instant(jnp.asarray(motion.drive)))
     inertia = sum((element.inertia() for element in model.elements), start=model.mass)
     total = inertia * jnp.asarray(motion.acceleration) + model.restoring_force(state)
     total = total + inertia * drive if model.excitation == "base_acceleration" else total - drive

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, Int
 
 from ..._cores import usable_cores
 from ...excitations import Hold, tabulate
-from ...models import Isolator, Quantity
+from ...models import Instant, Isolator, Quantity
 from ...records import Record, measured_state
 from ._channels import channel_table
 from ._segments import Segment
@@ -35,6 +35,11 @@ class Batch(eqx.Module):
     measured: Float[Array, "time lanes"]
     weight: Float[Array, "time lanes"]
     channels: dict[str, Float[Array, "time stage lanes"]] = eqx.field(default_factory=dict)
+
+    @property
+    def acting(self) -> Instant:
+        """What acts, over time, stages and lanes."""
+        return Instant(self.drive, self.drive_rate, self.channels)
 
     def following(self, model: Isolator) -> "Batch":
         """Give the batch with the channels that a model follows and no others: each is carried in the scan.

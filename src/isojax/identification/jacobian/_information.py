@@ -11,8 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters, replace_parameters
-from ...elements import Channels
-from ...models import RK4, Isolator, Quantity, State, advance_record, at_stages, read_record
+from ...models import RK4, Instant, Isolator, Quantity, State, advance_record, read_record, split_stages
 from ._batch import Batch, Prepared, workers
 
 
@@ -86,17 +85,15 @@ def _sampler(
         values: tuple[Array, ...],
         scale: Array,
         state: State,
-        u: tuple[Array, ...],
-        du: tuple[Array, ...],
-        channels: tuple[Channels, ...],
+        stages: tuple[Instant, ...],
     ) -> tuple[Array, State, Array | None]:
         current = scaled_model(model, values, scale)
         # The table already holds the delayed drive; only the derivative with respect to the delay is still to
         # come.
         late = current.shift() - jax.lax.stop_gradient(current.shift())
-        u = tuple(value - late * slope for value, slope in zip(u, du, strict=True))
-        reading = read_record(current, state, u[0], du[0], quantity, channels[0])
-        ahead, ringing = advance_record(current, solver, quantity, sample_time, state, u, du, channels)
+        stages = tuple(at.delayed(late) for at in stages)
+        reading = read_record(current, state, stages[0], quantity)
+        ahead, ringing = advance_record(current, solver, quantity, sample_time, state, stages)
         return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)
 
     return sample
@@ -121,7 +118,6 @@ def _lane_information(
     lanes = scale.shape[0]
     has_scale = _stiffness_place(model) is not None
     total = columns + int(has_scale) + len(states)
-    stages = batch.drive.shape[1]
 
     seeds = tuple(jnp.concatenate([seed, jnp.zeros(total - columns)]) for seed in directions)
     scale_seed = jnp.zeros((total, lanes))
@@ -141,14 +137,12 @@ def _lane_information(
 
     def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
         state, tangent, gram, pending = carry
-        drive, rate, known, measured, weight = table
-        u = tuple(drive[stage] for stage in range(stages))
-        du = tuple(rate[stage] for stage in range(stages))
-        channels = at_stages(known, stages)
+        acting, measured, weight = table
+        stages = split_stages(acting)
 
         def along(seed: tuple[Array, ...], scale_seed: Array, tangent: State) -> tuple:
             primal, change = jax.jvp(
-                lambda moved, scale, state: sample(with_moved(moved), scale, state, u, du, channels),
+                lambda moved, scale, state: sample(with_moved(moved), scale, state, stages),
                 (tuple(values[place] for place in moving), scale, state),
                 (seed, scale_seed, tangent),
             )
@@ -163,7 +157,7 @@ def _lane_information(
 
     silent = jnp.zeros((total + 1, lanes)) if model.splits else None
     start = (states, tangents, jnp.zeros((total + 1, total + 1, lanes)), silent)
-    tables = (batch.drive, batch.drive_rate, batch.channels, batch.measured, batch.weight)
+    tables = (batch.acting, batch.measured, batch.weight)
     carry, _ = jax.lax.scan(body, start, tables)
     return carry[2]
 
@@ -228,16 +222,14 @@ def _lane_readings(
 ) -> Float[Array, "time lanes"]:
     values = tuple(entry.value for entry in list_parameters(model))
     sample = _sampler(model, quantity, sample_time)
-    stages = batch.drive.shape[1]
 
-    def body(carry: tuple[State, Array | None], table: tuple) -> tuple[tuple[State, Array | None], Array]:
-        (state, pending), (drive, rate, known) = carry, table
-        u, du = tuple(drive[i] for i in range(stages)), tuple(rate[i] for i in range(stages))
-        reading, state, after = sample(values, scale, state, u, du, at_stages(known, stages))
+    def body(carry: tuple[State, Array | None], table: Instant) -> tuple[tuple[State, Array | None], Array]:
+        state, pending = carry
+        reading, state, after = sample(values, scale, state, split_stages(table))
         return (state, after), reading if pending is None else reading + pending
 
     start = (states, jnp.zeros_like(scale) if model.splits else None)
-    return jax.lax.scan(body, start, (batch.drive, batch.drive_rate, batch.channels))[1]
+    return jax.lax.scan(body, start, batch.acting)[1]
 
 
 def readings(

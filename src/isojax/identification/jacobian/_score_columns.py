@@ -141,8 +141,7 @@ def _block(
 
     exact = None
     if model.splits:
-        tables = own.drive, own.drive_rate, own.channels
-        exact = transitions_along(model, layout.moving, scale, path, tables, prepared.quantity, step)
+        exact = transitions_along(model, layout.moving, scale, path, own.acting, prepared.quantity, step)
     group = _Group(slopes.states, exact, batch.weight, step)
     for source in _sources(layout, prepared, batch, slopes, exact, states[size:], columns, part):
         group.add(*source)

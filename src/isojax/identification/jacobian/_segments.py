@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...models import Isolator
+from ...models import Instant, Isolator
 from ...records import Record
 
 MEMORIES_A_WINDOW = 25.0
@@ -54,7 +54,7 @@ def slowest_decay(model: Isolator) -> float:
 def _rates_about_rest(model: Isolator) -> Float[Array, "state state"]:
     """Give the derivative of the states' rates by the states, at rest."""
     rest = jnp.zeros(2 + model.internal_states)
-    return jax.jacfwd(lambda z: jnp.stack(model.rates(tuple(z), jnp.zeros(()), 0.0)))(rest)
+    return jax.jacfwd(lambda z: jnp.stack(model.rates(tuple(z), Instant(jnp.zeros(())))))(rest)
 
 
 def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment, ...]:

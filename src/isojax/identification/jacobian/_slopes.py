@@ -9,22 +9,25 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
 from ...models import (
     RK4,
+    ROUNDED,
+    Instant,
     Isolator,
     Quantity,
     Ringing,
     State,
-    Table,
+    Step,
     add_ringing,
     advance,
-    at_stages,
     find_regime,
     find_ringing,
     read_record,
+    split_stages,
     split_step,
 )
 from ._batch import Batch
@@ -98,23 +101,21 @@ def follow_path(
     """Simulate; give the states at the start of each integration step, and the ringing of jumps."""
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
-    drive, rate = steps_of(batch.drive), steps_of(batch.drive_rate)
-    channels = {name: steps_of(values) for name, values in batch.channels.items()}
+    acting = jax.tree_util.tree_map(steps_of, batch.acting)
     time = batch.drive.shape[0]
-    steps = drive.shape[0] // time
+    steps = acting.drive.shape[0] // time
     step_time = sample_time / steps
     solver = RK4()
 
     def body(state: State, table: tuple) -> tuple[State, tuple[State, Ringing | None]]:
-        number, u, du, known = table
-        stages = tuple(u[i] for i in range(3)), tuple(du[i] for i in range(3)), at_stages(known, 3)
+        number, stages = table[0], split_stages(table[1])
         if not model.splits:
-            return advance(current, solver, quantity, step_time, state, *stages), (state, None)
-        ahead, jump = split_step(current, quantity, step_time, state, Table(*stages))
+            return advance(current, solver, quantity, step_time, state, stages), (state, None)
+        ahead, jump = split_step(current, quantity, state, Step(step_time, stages))
         return ahead, (state, find_ringing(jump, number, steps))
 
     numbers = jnp.tile(jnp.arange(steps), time)
-    path, ringing = jax.lax.scan(body, states, (numbers, drive, rate, channels))[1]
+    path, ringing = jax.lax.scan(body, states, (numbers, acting))[1]
     return path, jax.tree_util.tree_map(lambda one: one.reshape(time, steps, -1).sum(axis=1), ringing)
 
 
@@ -161,26 +162,23 @@ def slopes_along(
     to changes of states and parameters is in `transitions_along`.
     """
     values = tuple(entry.value for entry in list_parameters(model))
-    tables = {name: steps_of(table) for name, table in batch.channels.items()}
-    drives, drive_rates = steps_of(batch.drive), steps_of(batch.drive_rate)
-    channels = {name: table[:, 0] for name, table in tables.items()}
-    u, du = drives[:, 0], drive_rates[:, 0]
-    scale = jnp.broadcast_to(scale, u.shape)
-    steps = u.shape[0] // batch.measured.shape[0]
+    at = jax.tree_util.tree_map(steps_of, batch.acting).pick(np.s_[:, 0])
+    scale = jnp.broadcast_to(scale, at.drive.shape)
+    steps = at.drive.shape[0] // batch.measured.shape[0]
     present = scaled_model(model, values, scale)
-    regime = find_regime(present, path, u, du, channels) if model.splits else None
+    law = find_regime(present, path, at) if model.splits else ROUNDED
 
     def along(values: tuple[Array, ...], scale: Array, state: State, inlet: dict[str, Array]) -> Change:
         current = scaled_model(model, values, scale)
         late = current.shift() - jax.lax.stop_gradient(current.shift())
-        acted = u - late * du
+        now = at.delayed(late)
         if inlet:
-            acted = acted + inlet["recorded"]
             small = Perturbation(inlet["acted"], inlet["force"], inlet["mass"], inlet["base"], inlet["read"])
             current = Isolator(current.mass, (*current.elements, small), current.excitation)
-        followed = {**channels, "perturbation": inlet["base"]} if inlet else channels
-        rates = current.rates(state, acted, du, quantity, channels=followed)[1 : len(state)]
-        return Change(rates, current.reading(state, acted, du, quantity, followed, regime))
+            followed = {**at.channels, "perturbation": inlet["base"]}
+            now = Instant(now.drive + inlet["recorded"], at.drive_rate, followed)
+        rates = current.rates(state, now, quantity)[1 : len(state)]
+        return Change(rates, current.reading(state, now, quantity, law))
 
     def by_parameter(place: int) -> Change:
         def with_number(number: Array) -> Change:
@@ -215,26 +213,23 @@ def slopes_along(
     befores = tuple(jnp.concatenate([state[:1], state[:-1]]) for state in own)
     afters = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in ends)
     middles = tuple(map(cubic_middle, befores, own, ends, afters))
-    coarse = sample_stages(batch.drive), sample_stages(batch.drive_rate)
-    beside = {name: sample_stages(table) for name, table in batch.channels.items()}
+    coarse = jax.tree_util.tree_map(sample_stages, batch.acting)
     seen = []
     for stage, state in enumerate((own, middles, ends)):
-        at = {name: table[:, stage] for name, table in beside.items()}
-        now, rate = (table[:, stage] for table in coarse)
-        base = present.base(now, rate, at)
-        y = read_record(present, state, now, rate, quantity, at)
+        now = coarse.pick(np.s_[:, stage])
+        base = present.base(now)
+        y = read_record(present, state, now, quantity)
         if stage == 0:
             y = add_ringing(y, ringing)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
-    now, rate = (table[:, 0] for table in coarse)
-    at = {name: table[:, 0] for name, table in beside.items()}
-    held = find_regime(present, own, now, rate, at) if model.splits else None
-    acted, acted_rate = present.acting(now, rate, at)
-    sensed = present.sensed(own, now, rate, quantity, at, held)
+    now = coarse.pick(np.s_[:, 0])
+    sharp = find_regime(present, own, now) if model.splits else ROUNDED
+    acted, acted_rate = present.drive(now)
+    sensed = present.sensed(own, now, quantity, sharp)
     motion = PathMotion(
         own[0],
         own[1],
-        rate,
+        now.drive_rate,
         acted,
         jnp.broadcast_to(acted_rate, acted.shape),
         add_ringing(sensed, ringing),

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
-from ...models import Isolator, Quantity, State, Table, find_ringing, split_step
+from ...models import Instant, Isolator, Quantity, State, Step, find_ringing, split_step
 from ._information import scaled_model
 from ._propagation import Matrix, Propagation, product
 from ._slopes import steps_of
@@ -38,7 +39,7 @@ def transitions_along(
     moving: tuple[int, ...],
     scale: Float[Array, " lanes"],
     path: State,
-    tables: tuple[Array, Array, dict[str, Array]],
+    acting: Instant,
     quantity: Quantity,
     sample_time: float,
 ) -> Transitions:
@@ -49,7 +50,7 @@ def transitions_along(
         moving: its parameters that move.
         scale: factor on the linear stiffness, a lane each.
         path: states at the beginnings of the steps.
-        tables: drive, its rate and channels at the stages of each sample.
+        acting: what acts at the stages of each sample.
         quantity: what the sensor measures.
         sample_time: time between samples [s].
 
@@ -59,13 +60,12 @@ def transitions_along(
     values = tuple(entry.value for entry in list_parameters(model))
     size, like = len(path), path[0]
     scale = jnp.broadcast_to(scale, like.shape)
-    time = tables[0].shape[0]
+    time = acting.drive.shape[0]
     steps = like.shape[0] // time
     step_of_sample = jnp.tile(jnp.arange(steps), time)[:, None]
     step_time = sample_time / steps
-    tables = jax.tree_util.tree_map(steps_of, tables)
-    drive, rate = (tuple(table[:, stage] for stage in range(3)) for table in tables[:2])
-    channels = tuple({name: table[:, stage] for name, table in tables[2].items()} for stage in range(3))
+    acting = jax.tree_util.tree_map(steps_of, acting)
+    stages = tuple(acting.pick(np.s_[:, stage]) for stage in range(3))
 
     def step(moved: tuple[Array, ...], scale: Array, state: State, push: Array) -> Array:
         numbers = list(values)
@@ -73,13 +73,12 @@ def transitions_along(
             numbers[place] = number
         current = scaled_model(model, numbers, scale)
         late = current.shift() - jax.lax.stop_gradient(current.shift())
-        u = tuple(value - late * slope for value, slope in zip(drive, rate, strict=True))
         pushes = tuple(
             (jnp.zeros_like(like), *(push[stage, row] + 0.0 * like for row in range(size - 1)))
             for stage in range(3)
         )
-        at = Table(u, rate, channels, pushes)
-        ahead, jump = split_step(current, quantity, step_time, state, at)
+        pushed = Step(step_time, tuple(at.delayed(late) for at in stages), pushes)
+        ahead, jump = split_step(current, quantity, state, pushed)
         return jnp.stack([*ahead, *find_ringing(jump, step_of_sample, steps)])
 
     known = tuple(values[place] for place in moving)

@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 from ..._parameters import list_parameters
 from ...elements import Channels
 from ...excitations import Hold
-from ...models import RK4, Isolator, State, share_internal
+from ...models import RK4, Instant, Isolator, State, share_internal
 from ...records import Band, Campaign, Record, measured_state
 from ...records.spectrum import shift_order
 from ..fitting import Fit, Run
@@ -133,7 +133,7 @@ def _missing(
         for element in current.elements:
             inertia = inertia + element.inertia()
         late = current.shift() - jax.lax.stop_gradient(current.shift())
-        return inertia * (current.acceleration(motion, u - late * du, du, channels=channels) - a)
+        return inertia * (current.acceleration(motion, Instant(u, du, channels).delayed(late)) - a)
 
     chosen = tuple(values[place] for place in places)
     columns = []

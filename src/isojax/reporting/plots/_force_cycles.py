@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...models import Isolator, State
+from ...models import Instant, Isolator, State
 
 _POINTS = 256
 """Points of a cycle."""
@@ -52,7 +52,7 @@ def trace_cycles(model: Isolator, amplitudes: Float[np.ndarray, " amplitude"], f
         return (size * jnp.sin(angle), omega * size * jnp.cos(angle), *internal)
 
     def rates(angle: Array, internal: tuple[Array, ...]) -> tuple[Array, ...]:
-        return model.rates(state(angle, internal), jnp.zeros_like(size), 0.0)[2:]
+        return model.rates(state(angle, internal), Instant(jnp.zeros_like(size)))[2:]
 
     def ahead(internal: tuple[Array, ...], slope: tuple[Array, ...], share: float) -> tuple[Array, ...]:
         return tuple(s + share * step * r for s, r in zip(internal, slope, strict=True))

@@ -124,7 +124,6 @@ def _short_step(
     share: Float[Array, " phase"],
 ) -> State:
     """Give the states a share of a period later, by one step."""
-    at = [phase + 2.0 * math.pi * share * part for part in (0.0, 0.5, 1.0)]
-    drives = [drive.at(jnp.sin(angle), jnp.cos(angle)) for angle in at]
-    u, u_rate = tuple(value for value, _ in drives), tuple(rate for _, rate in drives)
-    return advance(model, integrator.solver, "acceleration", share / drive.frequency, state, u, u_rate)
+    angles = [phase + 2.0 * math.pi * share * part for part in (0.0, 0.5, 1.0)]
+    stages = tuple(drive.at(jnp.sin(angle), jnp.cos(angle)) for angle in angles)
+    return advance(model, integrator.solver, "acceleration", share / drive.frequency, state, stages)

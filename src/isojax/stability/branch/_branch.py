@@ -142,8 +142,7 @@ def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float
         place = jnp.argmax(sign * path[0])
         state = tuple(along[place] for along in path)
         phase = 2.0 * math.pi * turns * place / (samples - 1)
-        u, u_rate = drive.at(jnp.sin(phase), jnp.cos(phase))
-        bend = model.acceleration(state, u, u_rate)
+        bend = model.acceleration(state, drive.at(jnp.sin(phase), jnp.cos(phase)))
         return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
 
     return 0.5 * (peak(1.0) - peak(-1.0))

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...models import Isolator
+from ...models import ContinuedLaw, Instant, Isolator
 
 _TRIALS = 8
 """States on each kink at which the slopes of both sides are compared."""
@@ -31,8 +31,8 @@ def _jumps(model: Isolator, states: Float[Array, "trial state"]) -> Float[Array,
         signs = [jnp.where(value >= 0.0, 1.0, -1.0) for value in model.kinks(tuple(there))]
 
         def slope(side: float) -> Array:
-            sides = (*signs[:which], jnp.asarray(side), *signs[which + 1 :])
-            return jax.jacfwd(lambda s: jnp.stack(model.rates(tuple(s), 0.0 * s[0], 0.0, sides=sides)))(there)
+            law = ContinuedLaw((*signs[:which], jnp.asarray(side), *signs[which + 1 :]))
+            return jax.jacfwd(lambda s: jnp.stack(model.rates(tuple(s), Instant(0.0 * s[0]), law=law)))(there)
 
         upper, lower = slope(1.0), slope(-1.0)
         return jnp.max(jnp.abs(upper - lower) / (jnp.max(jnp.abs(upper)) + 1e-300))

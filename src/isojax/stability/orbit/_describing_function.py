@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._types import Lanes, Scalar, as_float64
-from ...models import Isolator
+from ...models import Instant, Isolator
 from ._drive import Sine
 
 _SAMPLES = 64
@@ -33,7 +33,7 @@ def rest_displacement(model: Isolator) -> Float[Array, ""]:
 
     def balance(x: Array) -> Array:
         state = (x, 0.0 * x, *(0.0 * x,) * model.internal_states)
-        return model.acceleration(state, jnp.zeros_like(x))
+        return model.acceleration(state, Instant(jnp.zeros_like(x)))
 
     def improve(_: Array | int, x: Array) -> Array:
         value, slope = jax.jvp(balance, (x,), (jnp.ones_like(x),))
@@ -65,7 +65,7 @@ def imposed_internal(
     zero = 0.0 * displacement[0]
 
     def rates(internal: tuple[Lanes, ...], x: Lanes, v: Lanes) -> tuple[Lanes, ...]:
-        return model.rates((x, v, *internal), zero, 0.0)[2:]
+        return model.rates((x, v, *internal), Instant(zero))[2:]
 
     def body(internal: tuple[Lanes, ...], place: Array) -> tuple[tuple[Lanes, ...], tuple[Lanes, ...]]:
         following = (place + 1) % count
@@ -109,10 +109,9 @@ def imposed_balance(
     x, v = rest + size * cosine, -size * omega * sine
     internal = imposed_internal(model, x, v, frequency)
     # Without a drive the acceleration is -force / inertia; what is missing for the imposed one is the drive.
-    missing = -size * omega**2 * cosine - model.acceleration((x, v, *internal), 0.0 * x)
-    unit = model.acceleration((x, v, *internal), 0.0 * x + 1.0) - model.acceleration(
-        (x, v, *internal), 0.0 * x
-    )
+    state, still = (x, v, *internal), Instant(0.0 * x)
+    missing = -size * omega**2 * cosine - model.acceleration(state, still)
+    unit = model.acceleration(state, Instant(0.0 * x + 1.0)) - model.acceleration(state, still)
     wanted = missing / unit
     in_phase, in_quadrature = 2.0 * jnp.mean(wanted * cosine, axis=0), 2.0 * jnp.mean(wanted * sine, axis=0)
     return Sine(in_quadrature, in_phase, frequency), internal

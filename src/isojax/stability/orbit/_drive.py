@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._types import Lanes, as_float64
-from ...models import Isolator
+from ...models import Instant, Isolator
 
 
 class Sine(NamedTuple):
@@ -29,18 +29,18 @@ class Sine(NamedTuple):
         """[rad/s]."""
         return 2.0 * math.pi * self.frequency
 
-    def at(self, sine: Lanes, cosine: Lanes) -> tuple[Lanes, Lanes]:
-        """Give the drive and its time derivative.
+    def at(self, sine: Lanes, cosine: Lanes) -> Instant:
+        """Give what acts at a phase.
 
         Args:
             sine: sin(tau).
             cosine: cos(tau).
 
         Returns:
-            Drive, and its rate [1/s].
+            The drive and its time derivative.
         """
         drive = self.sine * sine + self.cosine * cosine
-        return drive, self.angular_frequency * (self.sine * cosine - self.cosine * sine)
+        return Instant(drive, self.angular_frequency * (self.sine * cosine - self.cosine * sine))
 
 
 def recorded_sine(model: Isolator, amplitude: Lanes | float, frequency: Lanes | float) -> Sine:

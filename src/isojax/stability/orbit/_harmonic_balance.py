@@ -178,8 +178,8 @@ def _balance(
         row, w = rows(flat.reshape(count, -1)), 2.0 * math.pi * push.frequency
         values, slopes = wave(row), wave(1j * order * (w * row))
         drive = recorded_sine(there, push.amplitude, push.frequency)
-        u, u_rate = drive.at(jnp.sin(phase), jnp.cos(phase))
-        rates = there.rates((values[0], slopes[0], *values[1:]), u, u_rate)
+        at = drive.at(jnp.sin(phase), jnp.cos(phase))
+        rates = there.rates((values[0], slopes[0], *values[1:]), at)
         bend = wave(-(order**2) * (w**2 * row))[0]
         inner = [slope - rate for slope, rate in zip(slopes[1:], rates[2:], strict=True)]
         gaps = jnp.stack([(bend - rates[1]) / omega, *inner])

@@ -74,8 +74,8 @@ class Orbit(eqx.Module):
         def peak(sign: float) -> Array:
             place = jnp.argmax(sign * self.displacement)
             state = tuple(self.states[place])
-            u, u_rate = drive.at(jnp.sin(phase[place]), jnp.cos(phase[place]))
-            bend = self.model.acceleration(state, u, u_rate)
+            at = drive.at(jnp.sin(phase[place]), jnp.cos(phase[place]))
+            bend = self.model.acceleration(state, at)
             return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
 
         return 0.5 * (peak(1.0) - peak(-1.0))

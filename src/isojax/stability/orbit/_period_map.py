@@ -60,9 +60,8 @@ def _advance(
 
     def body(carry: State, table: tuple[Lanes, ...]) -> tuple[State, State]:
         sines, cosines = table
-        at = [drive.at(sines[stage], cosines[stage]) for stage in range(3)]
-        u, u_rate = tuple(value for value, _ in at), tuple(rate for _, rate in at)
-        moved = advance(model, integrator.solver, "acceleration", step_time, carry, u, u_rate)
+        stages = tuple(drive.at(sines[stage], cosines[stage]) for stage in range(3))
+        moved = advance(model, integrator.solver, "acceleration", step_time, carry, stages)
         return moved, carry if keep else ()
 
     return jax.lax.scan(body, state, tables)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._types import Lanes
-from ...models import Integrator, Isolator, State
+from ...models import ROUNDED, ContinuedLaw, Integrator, Isolator, State
 from ._drive import Sine
 
 
@@ -95,7 +95,7 @@ def advance_in_pieces(
         start, stop, sides = along
         length = (stop - start) / steps
         step_time = length / drive.angular_frequency
-        beside = None if sides is None else tuple(sides)
+        law = ROUNDED if sides is None else ContinuedLaw(tuple(sides))
         turn = jnp.sin(0.5 * length), jnp.cos(0.5 * length)
 
         def step(
@@ -105,11 +105,11 @@ def advance_in_pieces(
             # Turned from stage to stage: a sine a stage and lane would cost as much as the law.
             middle = _turned(begin, turn)
             finish = _turned(middle, turn)
-            at = [drive.at(*angle) for angle in (begin, middle, finish)]
+            stages = [drive.at(*angle) for angle in (begin, middle, finish)]
 
             def field(t: float, y: State, args: None) -> State:
-                u, u_rate = at[round(2.0 * t)]
-                return tuple(step_time * rate for rate in model.rates(y, u, u_rate, sides=beside))
+                rates = model.rates(y, stages[round(2.0 * t)], law=law)
+                return tuple(step_time * rate for rate in rates)
 
             term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
             moved, *_ = integrator.solver.step(term, 0.0, 1.0, state, None, None, False)

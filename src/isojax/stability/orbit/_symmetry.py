@@ -8,7 +8,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters, replace_parameters
-from ...models import Isolator
+from ...models import Instant, Isolator
 
 _SIZES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """Displacements at which oddness is tried [m]: an even term shows at one of them or nowhere that matters."""
@@ -22,7 +22,7 @@ def _defects(
 
     def rates(numbers: list[Array], sign: float) -> Array:
         there = replace_parameters(model, numbers)
-        return jnp.stack(there.rates(tuple(sign * states), sign * drive, sign * 0.3 * drive))
+        return jnp.stack(there.rates(tuple(sign * states), Instant(sign * drive, sign * 0.3 * drive)))
 
     def both(numbers: list[Array]) -> tuple[Array, Array]:
         forth = rates(numbers, 1.0)

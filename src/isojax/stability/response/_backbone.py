@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ..._results import RESULTS
 from ..._types import check_float64
-from ...models import Integrator, Isolator, State
+from ...models import Instant, Integrator, Isolator, State
 from ..map import Lane, Method, states_at_zero
 from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory
 from ._free_vibration import natural_frequencies
@@ -140,9 +140,8 @@ def _balanced(
     # What of the drive a unit of in-phase acceleration needs: inertia, or minus one under base excitation.
     zero = jnp.zeros_like(amplitude)
     internal = (zero,) * model.internal_states
-    unit = model.acceleration((rest, zero, *internal), zero + 1.0) - model.acceleration(
-        (rest, zero, *internal), zero
-    )
+    still = (rest, zero, *internal)
+    unit = model.acceleration(still, Instant(zero + 1.0)) - model.acceleration(still, Instant(zero))
 
     def approach(step: Array, square: Array) -> Array:
         frequency = jnp.sqrt(square) / (2.0 * math.pi)
@@ -150,7 +149,7 @@ def _balanced(
         moved = square + jnp.asarray(drive.cosine) * unit / amplitude
         return jnp.where(moved > 0.0, moved, 0.5 * square)
 
-    pull = jnp.abs(model.acceleration((rest + amplitude, zero, *internal), zero)) / amplitude
+    pull = jnp.abs(model.acceleration((rest + amplitude, zero, *internal), Instant(zero))) / amplitude
     begin = jnp.where(pull > 0.0, pull, 1.0)
     square = jax.lax.fori_loop(0, _BALANCE, approach, begin)
     return imposed_balance(model, amplitude, jnp.sqrt(square) / (2.0 * math.pi), rest)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...models import Isolator
+from ...models import Instant, Isolator
 from ..orbit import rest_displacement
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
@@ -52,7 +52,7 @@ def natural_frequencies(model: Isolator, amplitudes: Float[Array, " point"]) -> 
 
     def pull(x: Array) -> Array:
         still = (x, jnp.zeros_like(x), *(jnp.zeros_like(x),) * model.internal_states)
-        return -model.acceleration(still, jnp.zeros_like(x))
+        return -model.acceleration(still, Instant(jnp.zeros_like(x)))
 
     def work(near: Array, far: Array) -> Array:
         """Potential at `far` over that at `near`, without the cancellation of taking both."""

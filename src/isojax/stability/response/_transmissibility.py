@@ -109,10 +109,10 @@ def _passed(
     state = _closed(model, frozen, orbits, drive, start)
     path = trajectory(model, orbits.integrator, drive, tuple(state.T))
     turn = 2.0 * np.pi / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
-    recorded, rate = jax.vmap(drive.at)(jnp.asarray(np.sin(turn)), jnp.asarray(np.cos(turn)))
-    acted = model.drive(recorded, rate)
+    at = jax.vmap(drive.at)(jnp.asarray(np.sin(turn)), jnp.asarray(np.cos(turn)))
+    acted, _ = model.drive(at)
     if model.excitation == "base_acceleration":
-        absolute = model.motion(path, recorded, rate, "acceleration")
+        absolute = model.motion(path, at, "acceleration")
         # A sine's displacement is minus its acceleration over omega^2.
         base = -(acted - jnp.mean(acted[:-1], axis=0)[None]) / drive.angular_frequency[None] ** 2
         ratio = fundamental(absolute) / fundamental(acted)
