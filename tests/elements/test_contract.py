@@ -3,6 +3,7 @@
 import inspect
 import math
 from pathlib import Path
+from typing import get_args
 
 import equinox as eqx
 import jax
@@ -14,6 +15,7 @@ from isojax import paper
 from isojax._parameters import list_parameters, own_parameters, replace_parameters, to_free, to_physical
 from isojax._results import is_successful
 from isojax.elements import CATALOGUE, AbstractElement, Scales
+from isojax.elements._base import Group
 from isojax.excitations import Harmonic
 from isojax.models import Instant, Integrator, Isolator, load_model, save_model, simulate
 from isojax.stability.orbit._describing_function import response_start
@@ -94,6 +96,9 @@ def test_an_element_declares_what_it_is(kind):
     assert len(kind.words.split()) >= 2
     assert kind.strength in [field for field, _ in own_parameters(kind)]
     assert isinstance(kind.signed, bool)
+    assert isinstance(kind.active, bool)
+    assert kind.group in get_args(Group)
+    assert kind.proportional_to in ("", "displacement", "velocity")
     assert kind.internal_states >= 0
     assert kind.substeps >= 1
     assert kind.__subclasses__() == []
@@ -116,6 +121,16 @@ def test_an_element_says_where_its_law_comes_from(kind):
     assert "Source:" in inspect.getdoc(kind)
     for field, _ in own_parameters(kind):
         assert f"{field}: " in inspect.getdoc(kind)
+
+
+@every_element
+def test_a_law_declared_proportional_to_a_motion_is(kind):
+    element = with_strength(kind.guess(SCALES), 0.3)
+    if not kind.proportional_to:
+        return
+    x, v, *_ = motion((9,))
+    along = {"displacement": x, "velocity": v}[kind.proportional_to]
+    np.testing.assert_allclose(element.force(x, v, ()), getattr(element, kind.strength) * along, rtol=1e-14)
 
 
 @every_element
@@ -269,7 +284,7 @@ def test_the_linearised_isolator_is_finite_at_rest(kind):
     matrix = np.asarray(jax.jacfwd(lambda y: model.rates(y, Instant(zero, zero)))(rest))
     assert matrix.shape == (size, size)
     assert np.all(np.isfinite(matrix))
-    assert np.all(np.linalg.eigvals(matrix).real < 1e-9)
+    assert kind.active or np.all(np.linalg.eigvals(matrix).real < 1e-9)
 
 
 @every_element
@@ -364,25 +379,41 @@ def test_the_catalogue_holds_every_element_file():
     assert files == set(CATALOGUE)
 
 
-TWINS = [
-    (kind, twin) for kind in CATALOGUE.values() for twin in with_strength(kind.guess(SCALES), 0.3).twins()
-]
-
-
-@pytest.mark.parametrize(("kind", "twin"), TWINS, ids=[f"{kind.name}-{twin.name}" for kind, twin in TWINS])
-def test_a_twin_is_the_law_and_a_linear_spring(kind, twin):
+@every_element
+def test_look_alikes_are_effects_of_the_catalogue_and_exact_ones_are_translated(kind):
     element = with_strength(kind.guess(SCALES), 0.3)
-    assert twin.name != kind.name
+    exact = {name for alike in kind.look_alikes if alike.exact for name in alike.others}
+    assert {twin.name for twin in element.twins()} == exact
+    for alike in kind.look_alikes:
+        assert {*alike.others, *alike.beside} <= set(CATALOGUE) - {kind.name}
+        assert bool(alike.beside) <= alike.exact
+        assert len(alike.test.split()) > 5
+
+
+def left_over(law, others, corners) -> float:
+    """Share of a law's force, rounded or sharp, that no sum of others makes up along a random motion."""
     x = jnp.linspace(-2.0, 2.0, 41) * SCALES.displacement
     v = 0.3 * SCALES.velocity * jnp.cos(jnp.arange(41.0))
-    sides = tuple(
-        tuple(jnp.where(value > 0.0, 1.0, -1.0) for value in law.corners(x, v, ())) for law in (element, twin)
-    )
-    rounded = [law.force(x, v, ()) for law in (element, twin)]
-    sharp = [law.sharp_force(x, v, (), v, side) for law, side in zip((element, twin), sides, strict=True)]
-    for one, other in (rounded, sharp):
-        apart = np.asarray(other - one)
-        slope = apart[-1] / float(x[-1])
-        np.testing.assert_allclose(apart, slope * np.asarray(x), atol=1e-9 * np.max(np.abs(apart)))
-        # Were the difference all there is, the test would say nothing.
-        assert np.max(np.abs(one - one[-1] / x[-1] * x)) > 0.05 * np.max(np.abs(one))
+
+    def forces(one) -> np.ndarray:
+        sides = tuple(jnp.where(value > 0.0, 1.0, -1.0) for value in one.corners(x, v, ()))
+        return np.asarray(one.sharp_force(x, v, (), jnp.sign(v), sides) if corners else one.force(x, v, ()))
+
+    columns = np.stack([forces(other) for other in others], axis=1)
+    columns = columns / np.linalg.norm(columns, axis=0)
+    left = forces(law) - columns @ np.linalg.lstsq(columns, forces(law), rcond=None)[0]
+    return float(np.linalg.norm(left) / np.linalg.norm(forces(law)))
+
+
+@every_element
+@pytest.mark.parametrize("corners", [False, True], ids=["rounded", "sharp"])
+def test_an_exact_look_alike_is_the_law_but_for_what_it_declares_beside_it(kind, corners):
+    element = with_strength(kind.guess(SCALES), 0.3)
+    for twin in element.twins():
+        alike = next(one for one in kind.look_alikes if twin.name in one.others)
+        beside = [with_strength(CATALOGUE[name].guess(SCALES), 1.0) for name in alike.beside]
+        assert left_over(element, [twin, *beside], corners) < 1e-9
+        # Were what stands beside them all there is, the test would say nothing.
+        assert not beside or left_over(element, beside, corners) > 0.05
+        back = kind.twin_of(twin)
+        assert back is None or left_over(back, [twin, *beside], corners) < 1e-9

@@ -1,15 +1,31 @@
 """The advice on which test parts look-alikes."""
 
+import itertools
+
 import pytest
 
 from isojax.elements import CATALOGUE
-from isojax.identification.diagnosis._separating_words import CLASSES, separating_experiment
+from isojax.identification.diagnosis._separating_words import is_exact, separating_experiment
 
 
-def test_every_class_names_effects_of_the_catalogue():
-    for alike in CLASSES:
-        assert alike.names <= set(CATALOGUE)
-        assert alike.needed in {"", *alike.names}
+def test_a_pair_of_look_alikes_is_declared_once_and_of_effects_of_the_catalogue():
+    pairs = [
+        {one, other}
+        for name, kind in CATALOGUE.items()
+        for alike in kind.look_alikes
+        for one, other in itertools.combinations((name, *alike.others), 2)
+        if alike.separates(name, {one, other})
+    ]
+    assert pairs
+    assert all(len(pair) == 2 and pair <= set(CATALOGUE) for pair in pairs)
+    assert all(pairs.count(pair) == 1 for pair in pairs)
+
+
+def test_a_gap_and_a_stop_are_one_law_beside_a_free_linear_spring_alone():
+    assert is_exact("freeplay", "end_stop", {"linear_stiffness", "linear_damping"})
+    assert is_exact("end_stop", "freeplay", {"linear_stiffness"})
+    assert not is_exact("freeplay", "end_stop", {"linear_damping"})
+    assert not is_exact("coulomb_friction", "dahl_friction", {"linear_stiffness"})
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ from ._added_mass import AddedMass as AddedMass
 from ._asymmetric_friction import AsymmetricFriction as AsymmetricFriction
 from ._base import AbstractElement as AbstractElement
 from ._base import Channels as Channels
+from ._base import Group as Group
+from ._base import LookAlike as LookAlike
 from ._base import Scales as Scales
 from ._bouc_wen import BoucWen as BoucWen
 from ._clipping import Clipping as Clipping

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class AbsQuadraticDamping(AbstractElement):
@@ -24,6 +24,7 @@ class AbsQuadraticDamping(AbstractElement):
     words: ClassVar[str] = "odd quadratic damping |v|v"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "Dampers"
 
     coefficient: Scalar = parameter(symbol="c2", unit="N s^2/m^2")
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class AbsQuadraticStiffness(AbstractElement):
@@ -24,6 +24,7 @@ class AbsQuadraticStiffness(AbstractElement):
     words: ClassVar[str] = "odd quadratic spring |x|x"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "Springs"
 
     coefficient: Scalar = parameter(symbol="k2", unit="N/m^2")
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class AcCoupling(AbstractElement):
@@ -29,6 +29,14 @@ class AcCoupling(AbstractElement):
     words: ClassVar[str] = "AC coupling of the response channel"
     strength: ClassVar[str] = "corner"
     internal_states: ClassVar[int] = 1
+    group: ClassVar[Group] = "The response channel"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("input_delay",),
+            "extend the band downwards: the lead of an AC coupling grows there, the phase of a delay "
+            "vanishes",
+        ),
+    )
 
     corner: Scalar = parameter(symbol="fc", unit="Hz", lower=0.0)
     leak: Scalar = parameter(symbol="fl", unit="Hz", lower=0.0, fitted=False)

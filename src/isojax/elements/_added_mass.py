@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class AddedMass(AbstractElement):
@@ -22,6 +22,14 @@ class AddedMass(AbstractElement):
     words: ClassVar[str] = "additional moving mass"
     strength: ClassVar[str] = "mass"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "Relaxation and further masses"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("input_gain", "sensor_gain"),
+            "weigh a known extra mass onto the isolator and repeat one level: a mass error stays in "
+            "kilograms, a gain error stays in per cent",
+        ),
+    )
 
     mass: Scalar = parameter(symbol="dm", unit="kg")
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
 from . import _coulomb_friction
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class AsymmetricFriction(AbstractElement):
@@ -34,6 +34,14 @@ class AsymmetricFriction(AbstractElement):
     signed: ClassVar[bool] = True
     substeps: ClassVar[int] = 4
     slides: ClassVar[bool] = True
+    group: ClassVar[Group] = "Dry friction and hysteresis"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("input_offset",),
+            "read the force channel with the exciter uncoupled: its offset is still there, and friction is "
+            "not",
+        ),
+    )
 
     difference: Scalar = parameter(symbol="dF", unit="N")
     width: Scalar = parameter(symbol="vs", unit="m/s", lower=0.0, fitted=False)

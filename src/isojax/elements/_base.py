@@ -2,7 +2,7 @@
 
 import abc
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, Literal, NamedTuple
 
 import equinox as eqx
 
@@ -10,6 +10,50 @@ from .._types import Internal, Lanes
 
 Channels = Mapping[str, Lanes]
 """Signals made from a record beside its drive, by name."""
+
+
+Group = Literal[
+    "Springs",
+    "Dampers",
+    "Dry friction and hysteresis",
+    "Relaxation and further masses",
+    "The drive and the floor",
+    "The response channel",
+]
+"""Where the list of effects in the documentation shows one."""
+
+
+class LookAlike(NamedTuple):
+    """Effects that records can confuse with the declaring one, and the test that separates them.
+
+    A pair is declared by one of the two, and holds for both.
+
+    Attributes:
+        others: catalogue names.
+        test: what to do and why it separates them: the first half of a sentence.
+        among: whether the same test separates the others from one another.
+        exact: whether both laws leave the same trace in any record, so that `twins` translates one into the
+            other.
+        beside: catalogue names of what must be free in the model for that, such as a linear spring.
+    """
+
+    others: tuple[str, ...]
+    test: str
+    among: bool = False
+    exact: bool = False
+    beside: tuple[str, ...] = ()
+
+    def separates(self, declared_by: str, names: set[str]) -> bool:
+        """Say whether the test separates some of these effects.
+
+        Args:
+            declared_by: catalogue name of the declaring effect.
+            names: catalogue names.
+
+        Returns:
+            True if it does.
+        """
+        return len(names & {declared_by, *self.others}) > 1 and (self.among or declared_by in names)
 
 
 class Scales(eqx.Module):
@@ -59,6 +103,14 @@ class AbstractElement(eqx.Module):
         channels: signals made from the record that the effect follows, such as the clock; without a record it
             is absent.
         phased: whether those signals carry a phase of each record's own, found in the record.
+        group: where the list of effects in the documentation shows it.
+        proportional_to: the one thing that the force is proportional to: "displacement" for the linear
+            spring, whose strength may differ from record to record, "velocity" for the linear damper; empty
+            for every other law.
+        active: whether the law may feed energy in, so that no check of passivity refuses it.
+        freed_by: field of campaign.toml, as `section.field`, that puts the effect into the first model.
+        starts_at_mean: whether its strength, a zero error of the sensor, starts at the mean reading.
+        look_alikes: effects that records can confuse with this one; each pair is declared once.
     """
 
     name: ClassVar[str]
@@ -72,6 +124,12 @@ class AbstractElement(eqx.Module):
     needs: ClassVar[tuple[str, ...]] = ()
     channels: ClassVar[tuple[str, ...]] = ()
     phased: ClassVar[bool] = False
+    group: ClassVar[Group]
+    proportional_to: ClassVar[str] = ""
+    active: ClassVar[bool] = False
+    freed_by: ClassVar[str] = ""
+    starts_at_mean: ClassVar[bool] = False
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = ()
 
     @classmethod
     @abc.abstractmethod
@@ -165,14 +223,25 @@ class AbstractElement(eqx.Module):
         return None
 
     def twins(self) -> "tuple[AbstractElement, ...]":
-        """Give the laws of other kinds that leave the very same trace beside a free linear spring.
-
-        No search need find them: what is proved of the law holds whatever the records are.
+        """Give this law as its exact look-alikes of other kinds, which no search need find.
 
         Returns:
-            Elements of other kinds, with the shape and strength that make them this one.
+            One element for each of the exact `look_alikes`, with the shape and strength that make it this
+            law, but for a force of the effects beside which they are alike.
         """
         return ()
+
+    @classmethod
+    def twin_of(cls, other: "AbstractElement") -> "AbstractElement | None":
+        """Give the law of an exact look-alike as one of this kind: the way back from `twins`.
+
+        Args:
+            other: an element of any kind.
+
+        Returns:
+            The element of this kind, with one of the shapes that do; None where there is none.
+        """
+        return None
 
     def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
         """Give the functions of the state at whose zeros the law is continuous but not smooth.

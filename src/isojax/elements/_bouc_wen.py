@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class BoucWen(AbstractElement):
@@ -31,6 +31,7 @@ class BoucWen(AbstractElement):
     strength: ClassVar[str] = "stiffness"
     internal_states: ClassVar[int] = 1
     substeps: ClassVar[int] = 2
+    group: ClassVar[Group] = "Dry friction and hysteresis"
 
     stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
     beta: Scalar = parameter(symbol="beta", unit="1/m^n", lower=0.0)

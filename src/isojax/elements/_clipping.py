@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class Clipping(AbstractElement):
@@ -26,6 +26,14 @@ class Clipping(AbstractElement):
     name: ClassVar[str] = "clipping"
     words: ClassVar[str] = "saturation of the response channel"
     strength: ClassVar[str] = "share"
+    group: ClassVar[Group] = "The response channel"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("end_stop",),
+            "repeat the top level with the next larger range of the response channel: a stop stays, a "
+            "clipped top does not",
+        ),
+    )
 
     share: Scalar = parameter(symbol="share", unit="1", lower=0.0, upper=1.5)
     level: Scalar = parameter(symbol="L", unit="SI unit of the output", lower=0.0)

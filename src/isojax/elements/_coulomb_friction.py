@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class CoulombFriction(AbstractElement):
@@ -29,6 +29,15 @@ class CoulombFriction(AbstractElement):
     strength: ClassVar[str] = "force_level"
     substeps: ClassVar[int] = 4
     slides: ClassVar[bool] = True
+    group: ClassVar[Group] = "Dry friction and hysteresis"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("dahl_friction", "bouc_wen", "lugre_friction"),
+            "repeat at a third of the lowest level: presliding turns friction into stiffness there, while "
+            "dry friction keeps its force",
+            among=True,
+        ),
+    )
 
     force_level: Scalar = parameter(symbol="Fc", unit="N", lower=0.0)
     width: Scalar = parameter(symbol="vs", unit="m/s", lower=0.0, fitted=False)

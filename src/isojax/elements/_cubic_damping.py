@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class CubicDamping(AbstractElement):
@@ -22,6 +22,7 @@ class CubicDamping(AbstractElement):
     words: ClassVar[str] = "cubic damping"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "Dampers"
 
     coefficient: Scalar = parameter(symbol="c3", unit="N s^3/m^3")
 

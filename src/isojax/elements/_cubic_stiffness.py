@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class CubicStiffness(AbstractElement):
@@ -22,6 +22,7 @@ class CubicStiffness(AbstractElement):
     words: ClassVar[str] = "cubic spring"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "Springs"
 
     coefficient: Scalar = parameter(symbol="k3", unit="N/m^3")
 

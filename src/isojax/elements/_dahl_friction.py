@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class DahlFriction(AbstractElement):
@@ -27,6 +27,7 @@ class DahlFriction(AbstractElement):
     strength: ClassVar[str] = "force_level"
     internal_states: ClassVar[int] = 1
     substeps: ClassVar[int] = 2
+    group: ClassVar[Group] = "Dry friction and hysteresis"
 
     force_level: Scalar = parameter(symbol="Fd", unit="N", lower=0.0)
     presliding: Scalar = parameter(symbol="xd", unit="m", lower=0.0)

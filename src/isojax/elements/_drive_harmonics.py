@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Scales
+from ._base import AbstractElement, Channels, Group, Scales
 
 _PARTS = tuple(f"drive_{part}_{order}" for order in (2, 3) for part in ("cosine", "sine"))
 
@@ -30,6 +30,7 @@ class DriveHarmonics(AbstractElement):
     words: ClassVar[str] = "harmonics of the drive that its record lacks"
     strength: ClassVar[str] = "share"
     channels: ClassVar[tuple[str, ...]] = _PARTS
+    group: ClassVar[Group] = "The drive and the floor"
 
     share: Scalar = parameter(symbol="h", unit="1", lower=0.0)
     phase: Scalar = parameter(symbol="phi", unit="rad")

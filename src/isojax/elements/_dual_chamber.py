@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class DualChamber(AbstractElement):
@@ -34,6 +34,14 @@ class DualChamber(AbstractElement):
     strength: ClassVar[str] = "stiffness"
     internal_states: ClassVar[int] = 1
     absorbs: ClassVar[tuple[str, ...]] = ("maxwell_branch",)
+    group: ClassVar[Group] = "Relaxation and further masses"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("maxwell_branch",),
+            "repeat at a third and at three times the level: an orifice slows the relaxation down as the "
+            "flow rises, a Maxwell branch knows no level",
+        ),
+    )
 
     stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
     time_constant: Scalar = parameter(symbol="tau", unit="s", lower=0.0)

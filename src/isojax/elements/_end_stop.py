@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class EndStop(AbstractElement):
@@ -37,6 +37,7 @@ class EndStop(AbstractElement):
     words: ClassVar[str] = "end stop"
     strength: ClassVar[str] = "stiffness"
     substeps: ClassVar[int] = 4
+    group: ClassVar[Group] = "Springs"
 
     stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
     gap: Scalar = parameter(symbol="g", unit="m", lower=0.0)

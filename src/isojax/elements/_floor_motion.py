@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Scales
+from ._base import AbstractElement, Channels, Group, Scales
 
 
 class FloorMotion(AbstractElement):
@@ -25,6 +25,7 @@ class FloorMotion(AbstractElement):
     strength: ClassVar[str] = "transmission"
     signed: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = ("floor",)
+    group: ClassVar[Group] = "The drive and the floor"
 
     transmission: Scalar = parameter(symbol="T", unit="1")
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 BRANCHES = 6
 
@@ -41,6 +41,14 @@ class FractionalDamping(AbstractElement):
     words: ClassVar[str] = "fractional damping (rubber)"
     strength: ClassVar[str] = "coefficient"
     internal_states: ClassVar[int] = BRANCHES
+    group: ClassVar[Group] = "Dampers"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("maxwell_branch", "dual_chamber"),
+            "widen the band to more than a decade: rubber follows one power of frequency, a relaxation has "
+            "one time constant",
+        ),
+    )
 
     coefficient: Scalar = parameter(symbol="C", unit="N s^alpha/m", lower=0.0)
     order: Scalar = parameter(symbol="alpha", unit="1", lower=0.02, upper=0.98)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
 from . import _end_stop
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class Freeplay(AbstractElement):
@@ -37,6 +37,16 @@ class Freeplay(AbstractElement):
     strength: ClassVar[str] = "lost_stiffness"
     needs: ClassVar[tuple[str, ...]] = ("linear_stiffness",)
     substeps: ClassVar[int] = 4
+    group: ClassVar[Group] = "Springs"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("end_stop",),
+            "look at the rig, or measure the linear stiffness at motion smaller than the gap: a stiffness "
+            "added beyond a gap and one that is missing within it give the same records",
+            exact=True,
+            beside=("linear_stiffness",),
+        ),
+    )
 
     lost_stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
     gap: Scalar = parameter(symbol="g", unit="m", lower=0.0)

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class InputDelay(AbstractElement):
@@ -23,6 +23,14 @@ class InputDelay(AbstractElement):
     words: ClassVar[str] = "delay between the force and the response channel"
     strength: ClassVar[str] = "delay"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "The drive and the floor"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("maxwell_branch", "added_mass", "dual_chamber", "fractional_damping"),
+            "extend the band to twice the resonance: a delay's apparent damping changes sign at the "
+            "resonance and grows above it, that of a relaxation does not",
+        ),
+    )
 
     delay: Scalar = parameter(symbol="tau", unit="s")
 

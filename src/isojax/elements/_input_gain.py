@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class InputGain(AbstractElement):
@@ -22,6 +22,15 @@ class InputGain(AbstractElement):
     words: ClassVar[str] = "gain error of the force channel"
     strength: ClassVar[str] = "deviation"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "The drive and the floor"
+    freed_by: ClassVar[str] = "input.gain_free"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("sensor_gain",),
+            "calibrate either channel against another instrument: in no motion of the isolator do their "
+            "gains differ",
+        ),
+    )
 
     deviation: Scalar = parameter(symbol="g", unit="1", lower=-0.99)
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Scales
+from ._base import AbstractElement, Channels, Group, Scales
 
 _ORDERS = ("hold_zero_order", "hold_linear", "hold_band_limited")
 
@@ -29,6 +29,7 @@ class InputHold(AbstractElement):
     words: ClassVar[str] = "another course of the drive between its samples"
     strength: ClassVar[str] = "share"
     channels: ClassVar[tuple[str, ...]] = _ORDERS
+    group: ClassVar[Group] = "The drive and the floor"
 
     share: Scalar = parameter(symbol="s", unit="1", lower=0.0)
     order: Scalar = parameter(symbol="n", unit="1", fitted=False)

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class InputOffset(AbstractElement):
@@ -22,6 +22,8 @@ class InputOffset(AbstractElement):
     words: ClassVar[str] = "offset of the force channel"
     strength: ClassVar[str] = "offset"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "The drive and the floor"
+    freed_by: ClassVar[str] = "input.offset_free"
 
     offset: Scalar = parameter(symbol="F0", unit="SI unit of the input")
 

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class LinearDamping(AbstractElement):
@@ -22,6 +22,8 @@ class LinearDamping(AbstractElement):
     words: ClassVar[str] = "viscous damping"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = False
+    group: ClassVar[Group] = "Dampers"
+    proportional_to: ClassVar[str] = "velocity"
 
     coefficient: Scalar = parameter(symbol="c1", unit="N s/m")
 

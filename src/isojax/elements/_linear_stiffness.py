@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class LinearStiffness(AbstractElement):
@@ -22,6 +22,8 @@ class LinearStiffness(AbstractElement):
     words: ClassVar[str] = "linear spring"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = False
+    group: ClassVar[Group] = "Springs"
+    proportional_to: ClassVar[str] = "displacement"
 
     coefficient: Scalar = parameter(symbol="k1", unit="N/m")
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class LugreFriction(AbstractElement):
@@ -35,6 +35,7 @@ class LugreFriction(AbstractElement):
     internal_states: ClassVar[int] = 1
     substeps: ClassVar[int] = 4
     absorbs: ClassVar[tuple[str, ...]] = ("dahl_friction",)
+    group: ClassVar[Group] = "Dry friction and hysteresis"
 
     force_level: Scalar = parameter(symbol="Fc", unit="N", lower=0.0)
     presliding: Scalar = parameter(symbol="delta", unit="m", lower=0.0)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Scales
+from ._base import AbstractElement, Channels, Group, Scales
 
 
 class MainsHum(AbstractElement):
@@ -26,6 +26,7 @@ class MainsHum(AbstractElement):
     strength: ClassVar[str] = "amplitude"
     channels: ClassVar[tuple[str, ...]] = ("hum_50", "hum_60")
     phased: ClassVar[bool] = True
+    group: ClassVar[Group] = "The response channel"
 
     amplitude: Scalar = parameter(symbol="A", unit="SI unit of the output", lower=0.0)
     frequency: Scalar = parameter(symbol="f", unit="Hz", lower=0.0, fitted=False)

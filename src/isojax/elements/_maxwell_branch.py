@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class MaxwellBranch(AbstractElement):
@@ -24,6 +24,7 @@ class MaxwellBranch(AbstractElement):
     words: ClassVar[str] = "relaxation (Maxwell branch)"
     strength: ClassVar[str] = "stiffness"
     internal_states: ClassVar[int] = 1
+    group: ClassVar[Group] = "Relaxation and further masses"
 
     stiffness: Scalar = parameter(symbol="K", unit="N/m", lower=0.0)
     time_constant: Scalar = parameter(symbol="tau", unit="s", lower=0.0)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 SOLID = 0.1
 """Share of the gas length below which the law is carried on by its parabola: no such bellows is built."""
@@ -34,6 +34,14 @@ class PolytropicGas(AbstractElement):
     name: ClassVar[str] = "polytropic_gas"
     words: ClassVar[str] = "gas spring (polytropic)"
     strength: ClassVar[str] = "preload"
+    group: ClassVar[Group] = "Springs"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("quadratic_stiffness",),
+            "repeat at three times the top level: gas hardens with the cube of the motion, by a coefficient"
+            " tied to that of its square, while a parabola goes on as it is",
+        ),
+    )
 
     preload: Scalar = parameter(symbol="P0 A", unit="N", lower=0.0)
     gas_length: Scalar = parameter(symbol="L", unit="m", lower=0.0)

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class PositionDamping(AbstractElement):
@@ -22,6 +22,7 @@ class PositionDamping(AbstractElement):
     words: ClassVar[str] = "amplitude-dependent damping x^2 v"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = False
+    group: ClassVar[Group] = "Dampers"
 
     coefficient: Scalar = parameter(symbol="c", unit="N s/m^3")
 

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class QuadraticStiffness(AbstractElement):
@@ -22,6 +22,15 @@ class QuadraticStiffness(AbstractElement):
     words: ClassVar[str] = "even quadratic spring (asymmetry)"
     strength: ClassVar[str] = "coefficient"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "Springs"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("input_offset", "sensor_offset"),
+            "measure the mean displacement (a DC-capable sensor); a known static load separates them only "
+            "where no cubic spring shifts along with it",
+            among=True,
+        ),
+    )
 
     coefficient: Scalar = parameter(symbol="q", unit="N/m^2")
 

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, LookAlike, Scales
 
 
 class SecondMode(AbstractElement):
@@ -28,6 +28,14 @@ class SecondMode(AbstractElement):
     words: ClassVar[str] = "second mode (attached mass on a spring)"
     strength: ClassVar[str] = "mass"
     internal_states: ClassVar[int] = 2
+    group: ClassVar[Group] = "Relaxation and further masses"
+    look_alikes: ClassVar[tuple[LookAlike, ...]] = (
+        LookAlike(
+            ("added_mass",),
+            "extend the band upwards: a second mode ends in a notch, while a mass goes on with the square "
+            "of the frequency",
+        ),
+    )
 
     mass: Scalar = parameter(symbol="m2", unit="kg", lower=0.0)
     angular_frequency: Scalar = parameter(symbol="w2", unit="rad/s", lower=0.0)

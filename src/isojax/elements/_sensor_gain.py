@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class SensorGain(AbstractElement):
@@ -22,6 +22,7 @@ class SensorGain(AbstractElement):
     words: ClassVar[str] = "gain error of the response channel"
     strength: ClassVar[str] = "deviation"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "The response channel"
 
     deviation: Scalar = parameter(symbol="g", unit="1", lower=-0.99)
 

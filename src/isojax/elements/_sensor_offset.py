@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class SensorOffset(AbstractElement):
@@ -22,6 +22,9 @@ class SensorOffset(AbstractElement):
     words: ClassVar[str] = "offset of the response channel"
     strength: ClassVar[str] = "offset"
     signed: ClassVar[bool] = True
+    group: ClassVar[Group] = "The response channel"
+    freed_by: ClassVar[str] = "output.offset_free"
+    starts_at_mean: ClassVar[bool] = True
 
     offset: Scalar = parameter(symbol="y0", unit="SI unit of the output")
 

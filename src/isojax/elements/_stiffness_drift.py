@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Scales
+from ._base import AbstractElement, Channels, Group, Scales
 
 
 class StiffnessDrift(AbstractElement):
@@ -25,6 +25,7 @@ class StiffnessDrift(AbstractElement):
     signed: ClassVar[bool] = True
     needs: ClassVar[tuple[str, ...]] = ("linear_stiffness",)
     channels: ClassVar[tuple[str, ...]] = ("clock",)
+    group: ClassVar[Group] = "Springs"
 
     change: Scalar = parameter(symbol="dk", unit="N/m")
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
 from . import _coulomb_friction
-from ._base import AbstractElement, Scales
+from ._base import AbstractElement, Group, Scales
 
 
 class StribeckFriction(AbstractElement):
@@ -33,6 +33,7 @@ class StribeckFriction(AbstractElement):
     substeps: ClassVar[int] = 4
     slides: ClassVar[bool] = True
     absorbs: ClassVar[tuple[str, ...]] = ("coulomb_friction",)
+    group: ClassVar[Group] = "Dry friction and hysteresis"
 
     force_level: Scalar = parameter(symbol="F", unit="N", lower=0.0)
     excess: Scalar = parameter(symbol="r", unit="1", lower=0.0)

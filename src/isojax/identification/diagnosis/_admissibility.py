@@ -30,12 +30,17 @@ def visited_range(model: Isolator, records: tuple[Record, ...], quantity: Quanti
     )
 
 
+def _static_force(model: Isolator, x: Float[jax.Array, ""], v: Float[jax.Array, ""]) -> Float[jax.Array, ""]:
+    """Give the force of all elements with their internal states at rest [N]."""
+    return model.restoring_force((x, v, *(jnp.zeros(()),) * model.internal_states))
+
+
 def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
     """Find what is unphysical in a model over the visited motion, if anything.
 
-    The static tangent stiffness must be positive wherever the model has a spring, and the static damping
-    force must not drive the motion, wherever that passes. A force with memory must take energy over the loops
-    that it was driven around; a static law cannot say so.
+    The static tangent stiffness must be positive wherever the model has a linear spring. The static damping
+    force, but for laws that are declared active, must not drive the motion at any state that was visited. A
+    force with internal states must take energy over the loops that it was driven around.
 
     Args:
         model: the isolator.
@@ -46,15 +51,15 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
         A sentence, or None.
     """
     largest_x, largest_v = visited_range(model, records, quantity)
-    rest = tuple(jnp.zeros(()) for _ in range(model.internal_states))
-
-    def static(x: Float[jax.Array, ""], v: Float[jax.Array, ""]) -> Float[jax.Array, ""]:
-        return model.restoring_force((x, v, *rest))
-
+    passive, still = (
+        Isolator(model.mass, tuple(one for one in model.elements if not one.active)),
+        jnp.zeros(()),
+    )
     xs = jnp.linspace(-largest_x, largest_x, 101)
     vs = jnp.linspace(-largest_v, largest_v, 101)
-    tangent = jax.vmap(jax.jacfwd(static), (0, None))(xs, jnp.zeros(()))
-    if model.element("linear_stiffness") is not None and float(tangent.min()) <= 0.0:
+    tangent = jax.vmap(jax.jacfwd(lambda x: _static_force(model, x, still)))(xs)
+    sprung = any(element.proportional_to == "displacement" for element in model.elements)
+    if sprung and float(tangent.min()) <= 0.0:
         where = 1e3 * float(xs[int(jnp.argmin(tangent))])
         return f"its stiffness is lost at {where:.3g} mm, within the visited motion"
     # Over the ellipse that a sine of that size runs along, and its inside: all states that were visited.
@@ -62,7 +67,9 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
     angle, size = (each.ravel() for each in jnp.meshgrid(turns, sizes))
     places = jnp.concatenate([jnp.zeros(101), largest_x * size * jnp.cos(angle)])
     speeds = jnp.concatenate([vs, largest_v * size * jnp.sin(angle)])
-    power = jax.vmap(lambda x, v: (static(x, v) - static(x, jnp.zeros(()))) * v)(places, speeds)
+    power = jax.vmap(lambda x, v: (_static_force(passive, x, v) - _static_force(passive, x, still)) * v)(
+        places, speeds
+    )
     if float(power.min()) < -1e-9 * float(jnp.abs(power).max()):
         where = 1e3 * float(speeds[int(jnp.argmin(power))])
         return f"its damping feeds energy in at {where:.3g} mm/s, within the visited motion"

@@ -28,7 +28,7 @@ from ._refit import (
     rivals,
 )
 from ._score import Score, ScoreTest, absent_effects, score_test
-from ._separating_words import separating_experiment
+from ._separating_words import is_exact, separating_experiment
 from ._transfer import transferred_share
 
 CLEAN = 1.02
@@ -314,10 +314,18 @@ def _needed_share(fitted: Estimate) -> float:
 
 
 def _twins(best: Refit) -> tuple[AbstractElement, ...]:
-    """Give the laws that are the finding's own by another name, whether their search got there or not."""
+    """Give the laws that are the finding's own by another name, beside what is free, as they are declared."""
     found = best.estimate
     element = found.model.element(best.score.element.name)
-    return element.twins() if element is not None and "linear_stiffness.coefficient" in found.names else ()
+    if element is None:
+        return ()
+    translated = (kind.twin_of(element) for kind in CATALOGUE.values())
+    free = {name for name in CATALOGUE if f"{name}.{CATALOGUE[name].strength}" in found.names}
+    return tuple(
+        twin
+        for twin in (*element.twins(), *translated)
+        if twin is not None and is_exact(element.name, twin.name, free)
+    )
 
 
 def _found(

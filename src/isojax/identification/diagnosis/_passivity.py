@@ -96,7 +96,8 @@ def find_activity(element: AbstractElement, largest_x: float, largest_v: float) 
         largest_v: largest velocity visited [m/s].
 
     Returns:
-        A sentence, or None where every loop takes energy or the element has no memory.
+        A sentence, or None where every loop takes energy, the element is declared active, or it has no
+        internal state.
     """
     if element.internal_states == 0 or largest_x <= 0.0:
         return None
@@ -108,7 +109,7 @@ def find_activity(element: AbstractElement, largest_x: float, largest_v: float) 
     work, elastic = work_per_cycle(element, amplitude, np.full(2, largest_v / largest_x))
     if not np.all(np.isfinite(work)):
         return f"its {element.words} runs away over the visited loop"
-    if np.any(work < -TOLERANCE * elastic):
+    if not element.active and np.any(work < -TOLERANCE * elastic):
         where = 1e3 * float(amplitude[int(np.argmin(work / np.maximum(elastic, 1e-300)))])
         return f"its {element.words} feeds energy into a loop of {where:.3g} mm, within the visited motion"
     return None

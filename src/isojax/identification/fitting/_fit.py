@@ -119,7 +119,7 @@ def _linear_part(model: Isolator, places: tuple[int, ...]) -> Isolator:
     strengths = {
         f"{name}.{element.strength}"
         for name, element in zip(element_names(model), model.elements, strict=True)
-        if element.name not in ("linear_stiffness", "linear_damping")
+        if not element.proportional_to
     }
     numbers = [
         0.0 * entry.value if place in places and entry.name in strengths else entry.value

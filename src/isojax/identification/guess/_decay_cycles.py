@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...elements import CATALOGUE
 from ...models import Isolator
 from ...records import Campaign, Record, driven_samples
 from ._dwell_balance import dwell_motion, fit_all_dwells
@@ -15,8 +16,6 @@ _SMOOTH = np.array([0.25, 0.5, 0.25])
 
 _FEWEST = 1
 """Swings a coefficient that the balance needs at least; each gives a spring and a damper equation."""
-
-_LINEAR = ("linear_stiffness", "linear_damping")
 
 
 def decaying_response(campaign: Campaign, record: Record) -> MeasuredResponse:
@@ -78,7 +77,7 @@ def start_from_decays(
     responses = tuple(decaying_response(campaign, record) for record in records)
     swings, few = sum(one.frequency.size for one in responses), ()
     if swings < _FEWEST * len(names):
-        linear = tuple(name for name in names if name in _LINEAR)
+        linear = tuple(name for name in names if CATALOGUE[name].proportional_to)
         if not linear or swings < _FEWEST * len(linear):
             return None
         few = (

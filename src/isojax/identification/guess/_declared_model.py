@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
 
 from ...elements import CATALOGUE, AbstractElement
@@ -50,6 +51,11 @@ def catalogue_names(
     )
 
 
+def _is_freed(campaign: Campaign, kind: type[AbstractElement]) -> bool:
+    """Say whether a field of campaign.toml, such as `input.gain_free`, puts the effect into the model."""
+    return bool(kind.freed_by) and attrgetter(kind.freed_by)(campaign)
+
+
 def declared_names(campaign: Campaign, *, extra: bool = True) -> tuple[str, ...]:
     """List the catalogue names that a campaign declares.
 
@@ -69,12 +75,7 @@ def declared_names(campaign: Campaign, *, extra: bool = True) -> tuple[str, ...]
             campaign.file, campaign.stiffness, campaign.damping, campaign.elements if extra else ()
         )
     )
-    freed = {
-        "input_gain": campaign.input.gain_free,
-        "input_offset": campaign.input.offset_free,
-        "sensor_offset": campaign.output.offset_free,
-    }
-    declared.extend(name for name, free in freed.items() if free)
+    declared.extend(name for name, kind in CATALOGUE.items() if _is_freed(campaign, kind))
     return tuple(dict.fromkeys(declared))
 
 

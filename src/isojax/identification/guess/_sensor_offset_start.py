@@ -57,7 +57,7 @@ def with_sensor_zero(campaign: Campaign, model: Isolator) -> Isolator:
     return Isolator(
         model.mass,
         tuple(
-            with_strength(element, offset) if element.name == "sensor_offset" else element
+            with_strength(element, offset) if element.starts_at_mean else element
             for element in model.elements
         ),
         model.excitation,

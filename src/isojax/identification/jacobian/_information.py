@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..._parameters import list_parameters, replace_parameters
+from ..._parameters import find_parameter, list_parameters, replace_parameters
 from ...models import RK4, Instant, Isolator, Quantity, State, advance_record, read_record, split_stages
 from ._batch import Batch, Prepared, workers
 
@@ -38,8 +38,8 @@ STIFFNESS_SCALE_UNIT = 1e-3
 
 
 def _stiffness_place(model: Isolator) -> int | None:
-    names = [entry.name for entry in list_parameters(model)]
-    return names.index("linear_stiffness.coefficient") if "linear_stiffness.coefficient" in names else None
+    spring = next((one for one in model.elements if one.proportional_to == "displacement"), None)
+    return None if spring is None else find_parameter(model, f"{spring.name}.{spring.strength}")
 
 
 def scaled_model(model: Isolator, values: Sequence[Array], scale: Array) -> Isolator:
