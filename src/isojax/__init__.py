@@ -68,7 +68,6 @@ from .reporting import plot_backbone as plot_backbone
 from .reporting import plot_basins as plot_basins
 from .reporting import plot_bifurcation_diagram as plot_bifurcation_diagram
 from .reporting import plot_branch as plot_branch
-from .reporting import plot_ceilings as plot_ceilings
 from .reporting import plot_correlation as plot_correlation
 from .reporting import plot_cycle_residual as plot_cycle_residual
 from .reporting import plot_dwell_stability as plot_dwell_stability
@@ -84,7 +83,6 @@ from .reporting import plot_ranking as plot_ranking
 from .reporting import plot_receptance as plot_receptance
 from .reporting import plot_record as plot_record
 from .reporting import plot_remainder_map as plot_remainder_map
-from .reporting import plot_remainder_parts as plot_remainder_parts
 from .reporting import plot_residual as plot_residual
 from .reporting import plot_response_map as plot_response_map
 from .reporting import plot_restoring_force as plot_restoring_force

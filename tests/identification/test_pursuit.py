@@ -1,4 +1,4 @@
-"""Matching pursuit over free force laws, on benches that hide laws of which the catalogue knows nothing."""
+"""Matching pursuit over free force laws, on plants with hidden laws outside the catalogue."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ PLAN = rig.SteppedSine(
 
 @pytest.fixture(scope="module")
 def left_by(simulated):
-    """Gives the function that fits the declared model to a plant with hidden laws, and describes the rest."""
+    """Gives the function that fits the declared model to a plant with hidden laws, and its pursuit."""
 
     def describe(*hidden):
         campaign = simulated(rig.Plant(BASE).plus(*hidden), PLAN)
@@ -39,7 +39,7 @@ def test_a_law_outside_the_catalogue_is_pursued_with_its_coefficient(left_by, la
 
 
 @pytest.mark.slow
-def test_relaxation_is_pursued_as_a_memory_that_fades(left_by):
+def test_relaxation_is_pursued_as_a_force_that_relaxes(left_by):
     pursuit = left_by(rig.MaxwellBranch(4e4, 0.03))
     first = pursuit.laws[0]
     assert first.formula.startswith("fade(x; ")

@@ -41,9 +41,7 @@ from .guess import normalised_law as normalised_law
 from .guess import paper_table as paper_table
 from .guess import read_campaign as read_campaign
 from .guess import scales as scales
-from .remainder import Ceiling as Ceiling
 from .remainder import DwellRemainder as DwellRemainder
-from .remainder import Exponents as Exponents
 from .remainder import ForceMap as ForceMap
 from .remainder import PursuedLaw as PursuedLaw
 from .remainder import Pursuit as Pursuit

@@ -24,7 +24,6 @@ from .plots import plot_backbone as plot_backbone
 from .plots import plot_basins as plot_basins
 from .plots import plot_bifurcation_diagram as plot_bifurcation_diagram
 from .plots import plot_branch as plot_branch
-from .plots import plot_ceilings as plot_ceilings
 from .plots import plot_correlation as plot_correlation
 from .plots import plot_cycle_residual as plot_cycle_residual
 from .plots import plot_dwell_stability as plot_dwell_stability
@@ -40,7 +39,6 @@ from .plots import plot_ranking as plot_ranking
 from .plots import plot_receptance as plot_receptance
 from .plots import plot_record as plot_record
 from .plots import plot_remainder_map as plot_remainder_map
-from .plots import plot_remainder_parts as plot_remainder_parts
 from .plots import plot_residual as plot_residual
 from .plots import plot_response_map as plot_response_map
 from .plots import plot_restoring_force as plot_restoring_force

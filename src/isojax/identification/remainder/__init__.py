@@ -1,8 +1,11 @@
-"""isojax.identification.remainder."""
+"""What a fit leaves unexplained, described but not named.
 
-from ._ceiling import Ceiling as Ceiling
+In comes a fit; out comes a `Remainder`. Read `_remainder` first. `_matching_pursuit` selects force laws from
+`_free_laws` that would explain it. `_force_residual` gives the force missing from the balance, sample by
+sample, and `_dwell_remainder` its harmonics in each dwell.
+"""
+
 from ._dwell_remainder import DwellRemainder as DwellRemainder
-from ._exponents import Exponents as Exponents
 from ._matching_pursuit import PursuedLaw as PursuedLaw
 from ._matching_pursuit import Pursuit as Pursuit
 from ._remainder import ForceMap as ForceMap

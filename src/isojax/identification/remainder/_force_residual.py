@@ -1,4 +1,4 @@
-"""The latent force: what is missing in the balance of measured forces, sample by sample."""
+"""The force residual: what is missing in the balance of measured forces, sample by sample."""
 
 import dataclasses
 from typing import NamedTuple
@@ -22,16 +22,16 @@ from ..guess import Motion, is_absolute, measured_motion
 from ..jacobian import channel_table, drive_table, follow_motion, scaled_model
 
 _STEPS = 2
-"""Integration steps a sample where memories follow the measured motion."""
+"""Integration steps per sample for internal states that follow the measured motion."""
 
 _STEEP = 6
 """Order of the filter below the band."""
 
 _ORDERS = 8.0
-"""Multiples of the drive's frequency that the latent force of a dwell keeps."""
+"""Multiples of the drive's frequency that the force residual of a dwell keeps."""
 
 _DRAWS = 4
-"""Times that the noise is drawn."""
+"""Draws of the noise."""
 
 _TURNS = 3
 """Corrections by which the readings of instruments are undone."""
@@ -44,35 +44,26 @@ class ForceResidual(NamedTuple):
         record: the record.
         displacement: measured or integrated, of the model's coordinate [m].
         velocity: [m/s].
-        quiet: displacement [m] and velocity [m/s] of the fitted model's own motion, segments restarted, on
-            which there is no noise of the output.
-        force: missing on the left-hand side of the balance, without what lies outside the band [N].
-        columns: its derivatives by the free coefficients [N over their units].
-        quiet_columns: the same along `quiet`.
-        noise: what the noise of the output makes by itself of that force, drawn a few times [N].
-        lowest: frequency from which on it is kept [Hz]; None where the mean is.
-        highest: frequency up to which it is kept [Hz].
-        trusted: samples whose integrals are to be trusted.
+        force: missing on the left-hand side of the balance, inside the band [N].
+        noise: what the noise of the output alone contributes to it, drawn a few times [N].
+        highest: upper end of the band [Hz].
+        trusted: samples whose integrals are reliable.
     """
 
     record: Record
     displacement: Float[np.ndarray, " time"]
     velocity: Float[np.ndarray, " time"]
-    quiet: Float[np.ndarray, "2 time"]
     force: Float[np.ndarray, " time"]
-    columns: Float[np.ndarray, "time coefficient"]
-    quiet_columns: Float[np.ndarray, "time coefficient"]
     noise: Float[np.ndarray, "draw time"]
-    lowest: float | None
     highest: float
     trusted: slice
 
 
 @eqx.filter_jit
-def follow_memories(
+def follow_internal_states(
     model: Isolator, x: Array, v: Array, y: Array, u: Array, sample_time: float
 ) -> tuple[Array, ...]:
-    """Let the memories of a model's elements follow a given motion, from rest.
+    """Integrate the internal states of a model's elements along a given motion, from rest.
 
     Args:
         model: the isolator; its force balance takes no part.
@@ -83,7 +74,7 @@ def follow_memories(
         sample_time: [s].
 
     Returns:
-        One history an internal state.
+        One history per internal state.
     """
     solver, based = RK4(), model.excitation == "base_acceleration"
 
@@ -111,40 +102,18 @@ def follow_memories(
 
 
 @eqx.filter_jit
-def _missing(
-    model: Isolator,
-    scale: Array,
-    places: tuple[int, ...],
-    motion: State,
-    a: Array,
-    u: Array,
-    du: Array,
-    channels: Channels,
-) -> tuple[Array, Array]:
-    """Give the missing force, and its derivatives by the free coefficients."""
-    values = tuple(entry.value for entry in list_parameters(model))
-
-    def force(chosen: tuple[Array, ...]) -> Array:
-        numbers = list(values)
-        for place, number in zip(places, chosen, strict=True):
-            numbers[place] = number
-        current = scaled_model(model, numbers, scale)
-        inertia = current.mass
-        for element in current.elements:
-            inertia = inertia + element.inertia()
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        return inertia * (current.acceleration(motion, Instant(u, du, channels).delayed(late)) - a)
-
-    chosen = tuple(values[place] for place in places)
-    columns = []
-    for index in range(len(places)):
-        seeds = tuple(jnp.ones(()) if place == index else jnp.zeros(()) for place in range(len(places)))
-        columns.append(jax.jvp(force, (chosen,), (seeds,))[1])
-    return force(chosen), jnp.stack(columns, axis=1)
+def _missing_force(
+    model: Isolator, motion: State, a: Array, u: Array, du: Array, channels: Channels
+) -> Array:
+    """Give the force missing in the balance."""
+    inertia = model.mass
+    for element in model.elements:
+        inertia = inertia + element.inertia()
+    return inertia * (model.acceleration(motion, Instant(u, du, channels)) - a)
 
 
 def _undo_instruments(model: Isolator, record: Record, channels: Channels) -> Record:
-    """Give the record as the sensor would have shown it without the model's instruments; memories at rest."""
+    """Give the record without the effect of the model's instruments, their internal states at rest."""
     measured = jnp.asarray(record.output)
 
     def reading(y: Array) -> Array:
@@ -168,26 +137,26 @@ def _undo_instruments(model: Isolator, record: Record, channels: Channels) -> Re
 def force_residuals(fit: Fit) -> tuple[ForceResidual, ...]:
     """Give the force that a fitted model would need beside its own, for every record of its campaign.
 
-    `g = F - m a - f(x, v, s)` along the measured motion; what was measured is integrated or differentiated
-    to the rest. An integrated displacement lacks its mean, so that a force that is not odd shows with an
-    error in its own mean.
+    `g = F - m a - f(x, v, s)` along the measured motion; the measured quantity is integrated or
+    differentiated to the others. An integrated displacement has no mean, so the mean of a force that is not
+    odd is wrong.
 
     Args:
-        fit: the fit; how far the linear stiffness of each record and segment deviates is taken over from it.
+        fit: the fit; it gives the deviation of the linear stiffness of each record and segment, too.
 
     Returns:
-        One a record, held-out ones included.
+        One per record, held-out ones included.
 
     Source: Masri & Caughey 1979; Hooker 2009 (forcing functions as diagnostics).
     """
     restarts = fit.restarts
-    # One band for all: what one record lacks of a law and another has would look like another law.
+    # One band for all records, so that they show the same harmonics of a law.
     common = max(measured_motion(fit.campaign, record).band.highest for record in fit.campaign.records)
-    found = {
+    residuals = {
         id(run.record): _force_residual(fit, run, 1.0 + deviation, place, common)
         for place, (run, deviation) in enumerate(zip(restarts.runs, restarts.deviations, strict=True))
     }
-    return tuple(found[id(record)] for record in fit.campaign.records)
+    return tuple(residuals[id(record)] for record in fit.campaign.records)
 
 
 def _force_residual(
@@ -205,71 +174,59 @@ def _force_residual(
     motion = measured_motion(campaign, seen)
     motion = dataclasses.replace(motion, band=Band(motion.band.lowest, common))
     if campaign.output.quantity != "acceleration":
-        x, v, a = _moved(campaign, seen, motion)
+        x, v, a = _motion_in_band(campaign, seen, motion.band)
         motion = dataclasses.replace(motion, displacement=x, velocity=v, acceleration=a)
     x, v, a = (jnp.asarray(s) for s in (motion.displacement, motion.velocity, motion.acceleration))
     internal = ()
     if model.internal_states:
-        internal = follow_memories(model, x, v, jnp.asarray(seen.output), u, 1.0 / record.rate)
-    factor, places = jnp.asarray(scale), fit.estimate.places
+        internal = follow_internal_states(model, x, v, jnp.asarray(seen.output), u, 1.0 / record.rate)
+    values = tuple(entry.value for entry in list_parameters(model))
+    scaled = scaled_model(model, values, jnp.asarray(scale))
 
-    def missing(x: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        return _missing(model, factor, places, (x, v, *internal), a, u, du, channels)
+    def missing(x: Array, v: Array, a: Array) -> Array:
+        return _missing_force(scaled, (x, v, *internal), a, u, du, channels)
 
-    # An integrated displacement holds nothing below the band but noise, which a spring makes a force.
+    # An integrated displacement holds nothing below the band but noise, which a spring turns into a force.
     lowest = None if campaign.output.quantity == "displacement" else motion.band.lowest
-    # What was differentiated ends with the band, and a balance needs all of its parts.
+    # A differentiated signal ends with the band, and a balance needs all of its terms.
     integrated = campaign.output.quantity == "acceleration"
-    band = lowest, _highest(record, motion) if integrated else motion.band.highest
-    force, columns = missing(x, v, a)
-    quiet = _moved(campaign, _undo_instruments(model, _simulated(run), channels), motion)
+    highest = _highest(record, motion) if integrated else motion.band.highest
+    force = missing(x, v, a)
 
-    def kept(values: Array) -> np.ndarray:
-        return np.stack([_inside(column, record.rate, *band) for column in np.asarray(values).T], axis=1)
-
-    # What the noise of the output alone makes of it: the same road with noise of the same density on top.
+    # The share of the noise: the same computation with noise of the same density added to the motion.
     noise = []
     for draw in range(_DRAWS):
-        stray = _stray_motion(campaign, record, motion, fit.noise.white, (seed, draw))
-        shaken = missing(x + stray[0], v + stray[1], a + stray[2])[0] - force
-        noise.append(_inside(np.asarray(shaken), record.rate, *band))
+        stray = _noise_motion(campaign, record, motion, fit.noise.white, (seed, draw))
+        shaken = missing(x + stray[0], v + stray[1], a + stray[2]) - force
+        noise.append(_band_limited(np.asarray(shaken), record.rate, lowest, highest))
     return ForceResidual(
         record,
         motion.displacement,
         motion.velocity,
-        np.stack(quiet[:2]),
-        _inside(np.asarray(force), record.rate, *band),
-        kept(columns),
-        kept(missing(*(jnp.asarray(values) for values in quiet))[1]),
+        _band_limited(np.asarray(force), record.rate, lowest, highest),
         np.stack(noise),
-        *band,
+        highest,
         motion.trusted,
     )
 
 
-def _simulated(run: Run) -> Record:
-    """Give a record as the fitted model would have made it, measured where it was not simulated."""
-    known = np.isfinite(run.simulated)
-    return dataclasses.replace(run.record, output=np.where(known, run.simulated, run.record.output))
-
-
-def _moved(campaign: Campaign, record: Record, motion: Motion) -> tuple[Float[np.ndarray, " time"], ...]:
-    """Give displacement, velocity and acceleration of a record, integrated in the band of another."""
+def _motion_in_band(campaign: Campaign, record: Record, band: Band) -> tuple[Float[np.ndarray, " time"], ...]:
+    """Give displacement, velocity and acceleration of a record, integrated or differentiated in a band."""
     if is_absolute(campaign):
         record = dataclasses.replace(record, output=record.output - record.input)
-    return measured_state(record, campaign.output.quantity, motion.band.lowest, motion.band.highest)
+    return measured_state(record, campaign.output.quantity, band.lowest, band.highest)
 
 
 def _highest(record: Record, motion: Motion) -> float:
-    """Give the frequency up to which the latent force is kept."""
+    """Give the frequency up to which the force residual is kept."""
     orders = _ORDERS * max((dwell.frequency for dwell in record.dwells), default=0.0)
     return float(min(max(motion.band.highest, orders), 0.39 * record.rate))
 
 
-def _inside(
+def _band_limited(
     signal: Float[np.ndarray, " time"], rate: float, lowest: float | None, highest: float
 ) -> Float[np.ndarray, " time"]:
-    """Take off what lies outside a band, without a phase; the mean stays where the band has no lower end."""
+    """Filter a signal to a band with zero phase; without a lower end the mean stays."""
     mean = float(np.mean(signal))
     low = mean + shift_order(signal - mean, rate, 0, None, highest)
     if lowest is None:
@@ -277,10 +234,10 @@ def _inside(
     return sosfiltfilt(butter(_STEEP, lowest, "highpass", fs=rate, output="sos"), low)
 
 
-def _stray_motion(
+def _noise_motion(
     campaign: Campaign, record: Record, motion: Motion, noise: float, seed: tuple[int, int]
 ) -> tuple[Array, ...]:
-    """Give displacement, velocity and acceleration that noise of the output passes for."""
+    """Give displacement, velocity and acceleration of simulated noise of the output alone."""
     values = noise * np.random.default_rng(seed).standard_normal(record.output.size)
     alone = dataclasses.replace(record, output=values)
     band = motion.band

@@ -1,7 +1,7 @@
-"""Force laws that no catalogue names: powers of motion, waves, memories; they describe what is left.
+"""Force laws outside the catalogue: powers of the motion, waves along the path, laws with an internal state.
 
-They are elements, so that the score machinery carries them like any other, but the catalogue does not know
-them: a diagnosis cannot name one.
+They are elements, so that they are scored like any other, but the catalogue does not list them: a diagnosis
+cannot name one.
 """
 
 import abc
@@ -29,14 +29,14 @@ def _rounded(value: Lanes, width: Lanes | float) -> Lanes:
 
 
 class Wording(NamedTuple):
-    """How a free law is told.
+    """How a free law is reported.
 
     Attributes:
         formula: such as "|x| v".
         words: what kind of force that is.
         factor: of the strength in newtons that gives the coefficient before the formula.
         unit: of that coefficient.
-        rank: how odd a law it is; of laws that look alike the lowest is named.
+        rank: how complex a law it is; of laws that look alike the one of the lowest rank is named.
     """
 
     formula: str
@@ -47,7 +47,7 @@ class Wording(NamedTuple):
 
 
 class AbstractFreeForce(AbstractElement):
-    """A force law without a place in the catalogue."""
+    """A force law outside the catalogue."""
 
     @abc.abstractmethod
     def wording(self) -> Wording:
@@ -80,7 +80,7 @@ def _power_unit(power: float, speed_power: float) -> str:
 _KINDS = {
     (True, False): "a spring-like force (odd in x)",
     (False, True): "a damping-like force (odd in v)",
-    (True, True): "a force that turns with the sides of x and of v: work on one side, none over a cycle",
+    (True, True): "a force odd in x and in v: it does work on either side of the centre, none over a cycle",
     (False, False): "a one-sided force (the same both ways)",
 }
 
@@ -149,16 +149,16 @@ class PowerForce(AbstractFreeForce):
         """See `AbstractFreeForce.wording`."""
         p, q = float(self.power), float(self.speed_power)
         odd, speed_odd = bool(self.odd > 0.5), bool(self.speed_odd > 0.5)
-        parts = [part for part in (_factor("x", p, odd), _factor("v", q, speed_odd)) if part]
-        formula = " ".join(parts) or "1"
+        factors = [one for one in (_factor("x", p, odd), _factor("v", q, speed_odd)) if one]
+        formula = " ".join(factors) or "1"
         factor = 1.0 / float(self.displacement**p * self.velocity**q)
         halves = 10.0 * ((p % 1.0 > 0.0) + (q % 1.0 > 0.0))
-        words = _power_words(p, q, odd, speed_odd) if parts else "a constant force"
+        words = _power_words(p, q, odd, speed_odd) if factors else "a constant force"
         return Wording(formula, words, factor, _power_unit(p, q), p + q + halves)
 
 
 class WaveForce(AbstractFreeForce):
-    """A force that waves along the path.
+    """A force that is periodic along the path.
 
     `A sin(x/l)` or `A cos(x/l)`.
 
@@ -169,7 +169,7 @@ class WaveForce(AbstractFreeForce):
     """
 
     name: ClassVar[str] = "wave_force"
-    words: ClassVar[str] = "a force that waves along the path"
+    words: ClassVar[str] = "a force that is periodic along the path"
     strength: ClassVar[str] = "size"
     signed: ClassVar[bool] = True
 
@@ -195,11 +195,11 @@ class WaveForce(AbstractFreeForce):
         """See `AbstractFreeForce.wording`."""
         law = "sin" if float(self.phase) == 0.0 else "cos"
         formula = f"{law}(x / {1e3 * float(self.length):.3g} mm)"
-        return Wording(formula, "a force that waves along the path", 1.0, "N", 20.0)
+        return Wording(formula, "a force that is periodic along the path", 1.0, "N", 20.0)
 
 
 class SlipForce(AbstractFreeForce):
-    """A spring that slips: a memory that knows no time.
+    """A spring that slips: a rate-independent internal state.
 
     `A z/r`, `z' = v (1 - (z/r)^2)` while v drives z on, `z' = v` on the way back; sums of several r are the
     Prandtl-Ishlinskii operator.
@@ -237,7 +237,7 @@ class SlipForce(AbstractFreeForce):
     def wording(self) -> Wording:
         """See `AbstractFreeForce.wording`."""
         formula = f"slip(x; {1e3 * float(self.reach):.3g} mm)"
-        return Wording(formula, "a spring that slips (memory without time)", 1.0, "N", 30.0)
+        return Wording(formula, "a spring that slips (internal state, rate-independent)", 1.0, "N", 30.0)
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
         """See `AbstractElement.state_rate`."""
@@ -246,7 +246,7 @@ class SlipForce(AbstractFreeForce):
 
 
 class FadingForce(AbstractFreeForce):
-    """A memory of the displacement, or of a power of it, that fades.
+    """A fading internal state that follows the displacement, or a power of it.
 
     `A p`, `p' = d(sgn(x) |x/X|^n)/dt - p/tau`.
 
@@ -260,7 +260,7 @@ class FadingForce(AbstractFreeForce):
     """
 
     name: ClassVar[str] = "fading_force"
-    words: ClassVar[str] = "a memory that fades"
+    words: ClassVar[str] = "a force that relaxes"
     strength: ClassVar[str] = "size"
     signed: ClassVar[bool] = True
     internal_states: ClassVar[int] = 1
@@ -289,7 +289,7 @@ class FadingForce(AbstractFreeForce):
         power = float(self.power)
         formula = f"fade({_factor('x', power, True)}; {1e3 * float(self.time_constant):.3g} ms)"
         factor = float(self.displacement) ** -power
-        return Wording(formula, "a memory that fades", factor, _power_unit(power, 0.0), 30.0 + power)
+        return Wording(formula, "a force that relaxes", factor, _power_unit(power, 0.0), 30.0 + power)
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
         """See `AbstractElement.state_rate`."""
@@ -313,7 +313,7 @@ def free_laws(scales: Scales) -> tuple[AbstractFreeForce, ...]:
 
     Returns:
         Powers p and q of |x| and |v| up to p + q = 4 (5 alone), some with halves, each in the four parities;
-        waves of several lengths; slipping springs of several reaches; fading memories of several times.
+        waves of several lengths; slipping springs of several reaches; relaxing forces of several times.
     """
     whole = [(float(p), float(q)) for p in range(5) for q in range(5) if p + q <= _ORDER]
     pairs = [*whole, (5.0, 0.0), (0.0, 5.0), *_MIXED, *((q, p) for p, q in _MIXED)]

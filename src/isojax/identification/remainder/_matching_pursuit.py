@@ -1,4 +1,4 @@
-"""Matching pursuit: what force laws, named nowhere, would make up what a fitted model leaves."""
+"""Matching pursuit: which force laws outside the catalogue would explain what a fitted model leaves."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -18,31 +18,31 @@ from ..fitting import Estimate
 from ._free_laws import AbstractFreeForce, free_laws
 
 MOST_LAWS = 4
-"""Laws that are pursued at most."""
+"""Largest number of laws."""
 
 _CHANCE = 0.01
-"""Family-wise chance above which a law is not taken."""
+"""Family-wise p-value above which a law is not selected."""
 
 _SHARE = 0.02
-"""Share of the excess below which a law is not taken."""
+"""Share of the excess below which a law is not selected."""
 
 _TIE = 0.03
-"""Share of the best law's gain that a plainer one may lack and still be the one that is given."""
+"""Share of the best law's gain that a plainer one may lack and still be selected."""
 
 
 class PursuedLaw(NamedTuple):
-    """One law of the pursuit.
+    """One selected law.
 
     Attributes:
         formula: such as "|x| v".
         words: what kind of force it is.
-        coefficient: what stands before the formula, all pursued laws together [unit].
+        coefficient: factor before the formula, estimated together with the other laws [unit].
         error: its standard error, times sqrt(chi2/dof) where that exceeds one [unit].
         unit: unit of the coefficient.
         force: its size at the largest motion [N].
-        z: score when it was taken, in standard deviations of the noise.
+        z: score when it was selected, in standard deviations of the noise.
         share: share of the excess that the laws up to this one remove, by the linear step; 1 at most.
-        alike: formulas of laws whose traces are more than 0.95 alike, nearest first.
+        alike: formulas of laws whose score columns correlate by more than 0.95, nearest first.
     """
 
     formula: str
@@ -57,14 +57,14 @@ class PursuedLaw(NamedTuple):
 
 
 class Pursuit(NamedTuple):
-    """What force laws would make up what a fitted model leaves.
+    """Force laws that would explain what a fitted model leaves.
 
     Attributes:
-        laws: largest first; empty where nothing stands out of the noise.
-        tried: how many laws were held against the remainder.
+        laws: in the order of their selection; empty where none is significant.
+        tried: how many laws were tested.
         chi2_per_dof: of the fit.
         linear: the same with the laws, by the linear step.
-        refitted: the same with everything fitted again; NaN where that was not asked for or failed.
+        refitted: the same after a refit of all coefficients; NaN where none was asked for or it failed.
     """
 
     laws: tuple[PursuedLaw, ...]
@@ -74,7 +74,7 @@ class Pursuit(NamedTuple):
     refitted: float
 
 
-class _Taken(NamedTuple):
+class _Selection(NamedTuple):
     place: int
     z: float
     gain: float
@@ -83,16 +83,16 @@ class _Taken(NamedTuple):
 
 def _pursue(
     traces: Projection, ranks: Float[np.ndarray, " law"], chi2: float, dof: float
-) -> tuple[_Taken, ...]:
-    """Take the laws one after the other, each projected out of what is left."""
+) -> tuple[_Selection, ...]:
+    """Select laws one after the other, each projected out of the residual and of the other laws."""
     information, score = traces.information.copy(), traces.score.copy()
     whole = np.diag(traces.information).copy()
     free = traces.seen.copy()
     excess, tests = max(chi2 - dof, 1.0), max(1, int(traces.seen.sum()))
-    taken: list[_Taken] = []
-    while len(taken) < MOST_LAWS and np.any(free):
+    selected: list[_Selection] = []
+    while len(selected) < MOST_LAWS and np.any(free):
         own = np.diag(information)
-        # What the laws taken before leave of a trace, as what the coefficients leave.
+        # A law that the selected ones imitate counts as unseen, like one that the coefficients imitate.
         free &= own > 1e-3 * whole
         if not np.any(free):
             break
@@ -109,13 +109,13 @@ def _pursue(
         size = np.sqrt(np.where(free, own, np.inf))
         likeness = np.abs(information[place]) / (size * size[place])
         alike = tuple(int(k) for k in np.argsort(-likeness) if likeness[k] > CLOSE_LIKENESS and k != place)
-        taken.append(_Taken(place, float(score[place] / size[place]), gain, alike))
+        selected.append(_Selection(place, float(score[place] / size[place]), gain, alike))
         column = information[:, place].copy()
         score = score - column * score[place] / column[place]
         information = information - np.outer(column, column) / column[place]
         free[place] = False
         chi2 -= gain
-    return tuple(taken)
+    return tuple(selected)
 
 
 def pursue_laws(
@@ -126,18 +126,18 @@ def pursue_laws(
     solver: Any,
     progress: Callable[[str], None],
 ) -> Pursuit:
-    """Make up what a fit leaves from free force laws: orthogonal matching pursuit on exact columns.
+    """Select free force laws that explain what a fit leaves: orthogonal matching pursuit on exact columns.
 
-    The law of the largest score is taken and projected out of the residual and of all other laws, as the
-    fitted coefficients were, until nothing stands out. Of laws that the data do not tell apart the plainest
-    is taken.
+    The law of the largest score is selected and projected out of the residual and of all other laws, as the
+    fitted coefficients were, until none is significant. Of laws that the data do not distinguish the plainest
+    is selected.
 
     Args:
         fitted: the estimate.
         scales: magnitudes of the records.
-        refit: whether to fit everything again with the laws, to say what the linear step is worth.
-        solver: an optimistix least-squares solver for that.
-        progress: told a line a step.
+        refit: whether to refit all coefficients with the laws, which checks the linear step.
+        solver: an optimistix least-squares solver for the refit.
+        progress: called with one line per step.
 
     Returns:
         The laws.
@@ -149,21 +149,20 @@ def pursue_laws(
     units = np.array([1e-3 * law.typical_strength(scales) for law in laws])
     traces = project(fitted, laws, units)
     wordings = [law.wording() for law in laws]
-    taken = _pursue(traces, np.array([one.rank for one in wordings]), fitted.chi2, fitted.dof)
+    selected = _pursue(traces, np.array([one.rank for one in wordings]), fitted.chi2, fitted.dof)
     chi2_per_dof = fitted.chi2 / fitted.dof
-    if not taken:
+    if not selected:
         return Pursuit((), len(laws), chi2_per_dof, chi2_per_dof, float("nan"))
-    places = [one.place for one in taken]
+    places = [one.place for one in selected]
     inverse = np.linalg.inv(traces.information[np.ix_(places, places)])
     amount = inverse @ traces.score[places]
-    left = fitted.chi2 - sum(one.gain for one in taken)
-    linear = left / (fitted.dof - len(taken))
+    linear = (fitted.chi2 - sum(one.gain for one in selected)) / (fitted.dof - len(selected))
     error = np.sqrt(np.diag(inverse) * max(1.0, linear))
-    found, gone = [], 0.0
-    for one, strength, spread in zip(taken, amount, error, strict=True):
-        gone += one.gain
+    pursued, removed = [], 0.0
+    for one, strength, spread in zip(selected, amount, error, strict=True):
+        removed += one.gain
         words, unit = wordings[one.place], float(units[one.place])
-        found.append(
+        pursued.append(
             PursuedLaw(
                 words.formula,
                 words.words,
@@ -172,30 +171,30 @@ def pursue_laws(
                 words.unit,
                 float(strength * unit),
                 one.z,
-                min(1.0, float(gone / max(fitted.excess, 1.0))),
+                min(1.0, float(removed / max(fitted.excess, 1.0))),
                 tuple(wordings[place].formula for place in one.alike),
             )
         )
-    again = float("nan")
+    refitted = float("nan")
     if refit:
-        progress("refit with " + ", ".join(law.formula for law in found))
+        progress("refit with " + ", ".join(law.formula for law in pursued))
         chosen = [
             eqx.tree_at(lambda e: getattr(e, e.strength), laws[place], jnp.asarray(float(strength)))
             for place, strength in zip(places, amount * units[places], strict=True)
         ]
         step = traces.step[:, -1] - traces.step[:, places] @ amount
-        again = _refitted(fitted, scales, chosen, step, solver)
-    return Pursuit(tuple(found), len(laws), chi2_per_dof, float(linear), again)
+        refitted = _refitted_goodness(fitted, scales, chosen, step, solver)
+    return Pursuit(tuple(pursued), len(laws), chi2_per_dof, float(linear), refitted)
 
 
-def _refitted(
+def _refitted_goodness(
     fitted: Estimate,
     scales: Scales,
     laws: list[AbstractFreeForce],
     step: Float[np.ndarray, " coefficient"],
     solver: Any,
 ) -> float:
-    """Give chi2/dof with the laws, everything free, from a step of the coefficients."""
+    """Give chi2/dof of a refit with the laws, started from the linear step of the coefficients."""
     model = Isolator(fitted.model.mass, (*fitted.model.elements, *laws), fitted.model.excitation)
     listed = list_parameters(model)
     numbers = [entry.value for entry in listed]

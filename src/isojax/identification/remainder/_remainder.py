@@ -1,4 +1,4 @@
-"""What is left when no known effect explains the records: a description, never a finding."""
+"""Description of what a fitted model leaves unexplained; it names no effect."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -11,9 +11,7 @@ from ..._results import is_successful
 from ..diagnosis import Loop
 from ..fitting import DEFAULT_SOLVER, Evaluation, Fit, silent
 from ..guess import scales as campaign_scales
-from ._ceiling import Ceiling, find_ceilings
-from ._dwell_remainder import PARTS, DwellRemainder, share_parts, split_dwells
-from ._exponents import Exponents, find_exponents
+from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 from ._matching_pursuit import Pursuit, pursue_laws
 
@@ -21,11 +19,11 @@ _CELLS = 20
 """Cells of the force map along each axis."""
 
 _FEWEST = 4
-"""Samples without which a cell of the force map stays empty."""
+"""Fewest samples of a cell of the force map; a cell with fewer stays empty."""
 
 
 class ForceMap(NamedTuple):
-    """Mean latent force over the plane of displacement and velocity.
+    """Mean force residual over the plane of displacement and velocity.
 
     Attributes:
         displacement: edges of the cells [m].
@@ -39,25 +37,16 @@ class ForceMap(NamedTuple):
 
 
 class Remainder(NamedTuple):
-    """What a fitted model leaves, described.
+    """What a fitted model leaves unexplained.
 
     Attributes:
-        pursuit: force laws, of no catalogue, that would make it up.
-        dwells: what is left of each dwell; empty without dwells.
-        parts: share of each harmonic in the power of the latent force beyond the noise, over all dwells;
-            empty where nothing stands out.
-        exponents: how it grows with amplitude and frequency; None where that cannot be told.
-        static: how much any law of displacement and velocity alone could explain.
-        black_box: how much any law with memories could.
-        force_map: mean latent force over displacement and velocity.
+        pursuit: force laws outside the catalogue that would explain it.
+        dwells: force residual of each dwell; empty without dwells.
+        force_map: mean force residual over displacement and velocity.
     """
 
     pursuit: Pursuit
     dwells: tuple[DwellRemainder, ...]
-    parts: dict[str, float]
-    exponents: Exponents | None
-    static: Ceiling
-    black_box: Ceiling
     force_map: ForceMap
 
 
@@ -70,40 +59,27 @@ def explain_remainder(
 ) -> Remainder:
     """Describe what a fitted model leaves of its records, where no known effect explains it.
 
-    Nothing of it is a finding: no effect is named and no model extended.
+    It names no effect and extends no model.
 
     Args:
         fit: the fit.
-        refit: whether to fit the pursued laws, to say what their linear step is worth.
-        solver: an optimistix least-squares solver for that.
-        progress: told a line a step.
+        refit: whether to refit with the pursued laws, which checks their linear step.
+        solver: an optimistix least-squares solver for the refit.
+        progress: called with one line per step.
 
     Returns:
         The description.
 
     Raises:
-        ValueError: if the fit failed, so that what it leaves means nothing.
+        ValueError: if the fit failed, so that its residual means nothing.
     """
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
     scales = campaign_scales(fit.campaign)
     pursuit = pursue_laws(fit.estimate, scales, refit=refit, solver=solver, progress=progress)
-    progress("the force that the balance lacks")
-    latent = force_residuals(fit)
-    dwells = split_dwells(fit, latent)
-    parts = share_parts(dwells)
-    # What is not locked to the drive leaks into harmonics and is none.
-    locked = parts.get(PARTS[-1], 0.0) < 0.5
-    static, black_box = find_ceilings(latent, scales)
-    return Remainder(
-        pursuit,
-        dwells,
-        parts,
-        find_exponents(dwells) if locked else None,
-        static,
-        black_box,
-        _force_map(latent),
-    )
+    progress("force residual")
+    residuals = force_residuals(fit)
+    return Remainder(pursuit, dwell_remainders(fit, residuals), _force_map(residuals))
 
 
 _KNOWN: WeakKeyDictionary[Evaluation, Remainder] = WeakKeyDictionary()
@@ -111,7 +87,7 @@ _KNOWN: WeakKeyDictionary[Evaluation, Remainder] = WeakKeyDictionary()
 
 
 def loop_remainder(loop: Loop) -> Remainder | None:
-    """Describe what a closed loop leaves, where it leaves something; worked out once.
+    """Describe what a closed loop leaves unexplained; worked out once.
 
     Args:
         loop: the closed loop.
@@ -128,9 +104,9 @@ def loop_remainder(loop: Loop) -> Remainder | None:
     return _KNOWN[after.evaluation]
 
 
-def _force_map(latent: tuple[ForceResidual, ...]) -> ForceMap:
-    """Average the latent force of the fitted records over cells of displacement and velocity."""
-    used = [one for one in latent if one.record.role == "fit"]
+def _force_map(residuals: tuple[ForceResidual, ...]) -> ForceMap:
+    """Average the force residual of the fitted records over cells of displacement and velocity."""
+    used = [one for one in residuals if one.record.role == "fit"]
     x, v, force = (
         np.concatenate([getattr(one, name)[one.trusted] for one in used])
         for name in ("displacement", "velocity", "force")

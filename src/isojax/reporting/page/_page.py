@@ -21,7 +21,7 @@ from ..words import (
     health_words,
     law_rows,
     mains_words,
-    remainder_words,
+    pursuit_words,
     typeset_goodness,
     typeset_number,
     typeset_p_value,
@@ -102,7 +102,7 @@ def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
             )
             for effect, (upper, unit) in loop.bounds.items()
         ],
-        "remainder_lines": () if remainder is None else remainder_words(remainder),
+        "remainder": "" if remainder is None else pursuit_words(remainder.pursuit),
         "remainder_laws": [] if remainder is None else law_rows(remainder.pursuit),
         "facts": _facts(loop),
         "health": (

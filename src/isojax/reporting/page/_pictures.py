@@ -17,7 +17,6 @@ from ..plots import (
     effect_on_its_own,
     measured_forces,
     pair,
-    plot_ceilings,
     plot_correlation,
     plot_cycle_residual,
     plot_dwell_stability,
@@ -29,7 +28,6 @@ from ..plots import (
     plot_ranking,
     plot_receptance,
     plot_remainder_map,
-    plot_remainder_parts,
     plot_residual,
     plot_restoring_force,
     plot_stiffness_scatter,
@@ -150,29 +148,21 @@ def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tup
 
 
 def _remainder_pictures(loop: Loop) -> tuple[Picture, ...]:
-    """Draw what is left, where something is."""
+    """Draw the unexplained residual, where there is one."""
     remainder = loop_remainder(loop)
     if remainder is None:
         return ()
-    pictures = _draw(
-        "how much could be explained",
-        "Free laws one after the other, and what any law could do on samples that it has not seen.",
-        plot_ceilings,
-        remainder,
-    )
-    if remainder.parts:
-        caption = "Power beyond the noise over all dwells; what the fitted coefficients absorb is gone."
-        pictures += _draw("parts of the missing force", caption, plot_remainder_parts, remainder.parts)
+    pictures: tuple[Picture, ...] = ()
     if remainder.dwells:
-        caption = "One is the noise. Level and frequency where the model errs."
-        pictures += _draw("map of what is left", caption, plot_remainder_map, remainder.dwells)
-    caption = "Drive less inertia less model, averaged; one value a place if it is a law of x and v."
-    pictures += _draw("missing force over the plane", caption, plot_force_residual_map, remainder.force_map)
+        caption = "One is the noise. Level and frequency at which the model errs."
+        pictures += _draw("map of the residual", caption, plot_remainder_map, remainder.dwells)
+    caption = "Drive less inertia less model, averaged; a law of x and v has one value at each point."
+    pictures += _draw("force residual over the plane", caption, plot_force_residual_map, remainder.force_map)
     if remainder.dwells:
-        caption = "The worst dwell of the lowest, middle and highest level; grey: noise, ±2σ a harmonic."
+        caption = "The worst dwell of the lowest, middle and highest level; grey: noise, ±2σ per harmonic."
         for against in ("displacement", "velocity"):
             pictures += _draw(
-                f"missing force against {against}",
+                f"force residual against {against}",
                 caption,
                 plot_force_residual_loops,
                 remainder.dwells,

@@ -188,7 +188,7 @@ def loop_summary(loop: Loop) -> RenderableType:
         loop: the closed loop.
 
     Returns:
-        Headline, evidence, what is left where something is, errors, coefficients.
+        Headline, evidence, unexplained residual if any, errors, coefficients.
     """
     lines = [line for finding in loop.findings for line in finding_words(finding)]
     return Group(

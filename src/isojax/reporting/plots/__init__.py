@@ -25,11 +25,9 @@ from ._force_plots import plot_restoring_force as plot_restoring_force
 from ._map_plots import plot_response_map as plot_response_map
 from ._map_plots import plot_stability_map as plot_stability_map
 from ._record_plot import plot_record as plot_record
-from ._remainder_plots import plot_ceilings as plot_ceilings
 from ._remainder_plots import plot_force_residual_loops as plot_force_residual_loops
 from ._remainder_plots import plot_force_residual_map as plot_force_residual_map
 from ._remainder_plots import plot_remainder_map as plot_remainder_map
-from ._remainder_plots import plot_remainder_parts as plot_remainder_parts
 from ._residual_plots import plot_correlation as plot_correlation
 from ._residual_plots import plot_cycle_residual as plot_cycle_residual
 from ._residual_plots import plot_residual as plot_residual

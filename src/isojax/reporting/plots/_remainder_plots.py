@@ -1,4 +1,4 @@
-"""Pictures of what is left: where, in which harmonics, as a force, and how much any law could explain."""
+"""Pictures of the unexplained residual: where it is, and as a force."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -9,16 +9,15 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ...identification import DwellRemainder, ForceMap, Remainder
-from ..words import typeset_formula
-from ._style import AFTER, BAND, BEFORE, LEVELS, NEUTRAL, axes_for, entitle
+from ...identification import DwellRemainder, ForceMap
+from ._style import BAND, LEVELS, axes_for, entitle
 
 
 def plot_remainder_map(dwells: Sequence[DwellRemainder], *, ax: Axes | None = None) -> Figure:
     """Draw chi2/dof of each dwell over drive frequency and amplitude of the motion.
 
     Args:
-        dwells: what is left of them.
+        dwells: their force residuals.
         ax: axes to draw on.
 
     Returns:
@@ -58,7 +57,7 @@ def plot_remainder_map(dwells: Sequence[DwellRemainder], *, ax: Axes | None = No
     ax.set_ylabel("excitation level" if levelled else "amplitude [mm]")
     ax.margins(y=0.25)
     ax.legend(fontsize=7.5, loc="upper right", ncols=2)
-    entitle(ax, "where something is left")
+    entitle(ax, "where the residual exceeds the noise")
     return figure
 
 
@@ -77,43 +76,17 @@ def _refuse_none(dwells: Sequence[DwellRemainder]) -> None:
         raise ValueError("Argument `dwells` must hold at least one dwell, but holds none.")
 
 
-def plot_remainder_parts(parts: dict[str, float], *, ax: Axes | None = None) -> Figure:
-    """Draw which harmonics the missing force is made of.
-
-    Args:
-        parts: shares by name.
-        ax: axes to draw on.
-
-    Returns:
-        The figure.
-    """
-    figure, ax = axes_for(ax)
-    names = list(parts)
-    values = 100.0 * np.array([parts[name] for name in names])
-    colours = [AFTER if name.startswith("with") else NEUTRAL for name in names]
-    bars = ax.bar(range(len(names)), values, 0.7, color=colours)
-    ax.bar_label(bars, [f"{value:.0f}" if value >= 0.5 else "" for value in values], fontsize=8, padding=1)
-    labels = [name.replace("harmonic ", "") for name in names]
-    ax.set_xticks(range(len(names)), labels, fontsize=8)
-    ax.set_xlabel("first harmonic with x and with v; orders of the drive")
-    ax.set_ylabel("share of the missing force's power [%]")
-    ax.set_ylim(0.0, 112.0)
-    ax.grid(False, axis="x")
-    entitle(ax, "what the missing force is made of")
-    return figure
-
-
 def plot_force_residual_loops(
     dwells: Sequence[DwellRemainder],
     *,
     against: Literal["displacement", "velocity"] = "displacement",
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw the missing force over one cycle: the worst dwell of the lowest, middle and highest level.
+    """Draw the force residual over one cycle: the worst dwell of the lowest, middle and highest level.
 
     Args:
-        dwells: what is left of them; only those of fitted records are drawn, where there are any.
-        against: what it is drawn over.
+        dwells: force residuals; only those of fitted records are drawn, where there are any.
+        against: quantity of the horizontal axis.
         ax: axes to draw on.
 
     Returns:
@@ -138,7 +111,7 @@ def plot_force_residual_loops(
             linewidth=1.5,
             label=f"{level}{one.frequency:.3g} Hz",
         )
-        # The way round: an arrow on the upper branch.
+        # The direction of time: an arrow on the upper branch.
         place = int(np.argmax(force))
         ahead = (place + 3) % force.size
         ax.annotate(
@@ -148,10 +121,10 @@ def plot_force_residual_loops(
             arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.2},
         )
     ax.set_xlabel("displacement [mm]" if against == "displacement" else "velocity [mm/s]")
-    ax.set_ylabel("missing force [N]")
+    ax.set_ylabel("force residual [N]")
     ax.margins(y=0.28)
     ax.legend(fontsize=7.5, loc="upper right", ncols=3)
-    entitle(ax, f"the missing force over a cycle, against {against}")
+    entitle(ax, f"force residual over a cycle, against {against}")
     return figure
 
 
@@ -164,7 +137,7 @@ def _worst_of_levels(dwells: Sequence[DwellRemainder]) -> list[DwellRemainder]:
 
 
 def plot_force_residual_map(force_map: ForceMap, *, ax: Axes | None = None) -> Figure:
-    """Draw the mean missing force over the plane of displacement and velocity.
+    """Draw the mean force residual over the plane of displacement and velocity.
 
     Args:
         force_map: the mean force.
@@ -184,47 +157,9 @@ def plot_force_residual_map(force_map: ForceMap, *, ax: Axes | None = None) -> F
         vmin=-reach,
         vmax=reach,
     )
-    _small_print(figure.colorbar(shown, ax=ax, label="mean missing force [N]"))
+    _small_print(figure.colorbar(shown, ax=ax, label="mean force residual [N]"))
     ax.set_xlabel("displacement [mm]")
     ax.set_ylabel("velocity [mm/s]")
     ax.grid(False)
-    entitle(ax, "the missing force over the plane of motion")
-    return figure
-
-
-def plot_ceilings(remainder: Remainder, *, ax: Axes | None = None) -> Figure:
-    """Draw how much the pursued laws make up, and how much any law could.
-
-    Args:
-        remainder: the description.
-        ax: axes to draw on.
-
-    Returns:
-        The figure.
-    """
-    figure, ax = axes_for(ax)
-    rows: list[tuple[str, float, float, str]] = []
-    for place, law in enumerate(remainder.pursuit.laws):
-        rows.append((f"{'+ ' if place else ''}{typeset_formula(law.formula)}", law.share, 0.0, AFTER))
-    rows.append(("any law of x and v", remainder.static.share, remainder.static.error, NEUTRAL))
-    rows.append(("black box with memory", remainder.black_box.share, remainder.black_box.error, BEFORE))
-    for place, (_, share, error, colour) in enumerate(rows):
-        if np.isfinite(share):
-            ax.barh(place, 100.0 * max(share, 0.0), 0.62, color=colour, xerr=100.0 * error or None, capsize=2)
-            ax.text(
-                1.02,
-                place,
-                f"{100.0 * share:.0f} %",
-                fontsize=8,
-                va="center",
-                transform=ax.get_yaxis_transform(),
-            )
-        else:
-            ax.text(2.0, place, "too little beyond the noise", fontsize=8, va="center", color="#5d6b7a")
-    ax.set_yticks(range(len(rows)), [name for name, *_ in rows])
-    ax.invert_yaxis()
-    ax.set_xlim(0.0, 105.0)
-    ax.grid(False, axis="y")
-    ax.set_xlabel("share of what is left [%]")
-    entitle(ax, "free laws (blue), and what any law could do")
+    entitle(ax, "force residual over the plane of motion")
     return figure

@@ -13,10 +13,9 @@ from ._quantities import typeset_share as typeset_share
 from ._quantities import typeset_unit as typeset_unit
 from ._quantities import typeset_with_error as typeset_with_error
 from ._remainder_words import law_rows as law_rows
+from ._remainder_words import pursuit_words as pursuit_words
 from ._remainder_words import remainder_dict as remainder_dict
 from ._remainder_words import remainder_summary as remainder_summary
-from ._remainder_words import remainder_words as remainder_words
-from ._remainder_words import typeset_formula as typeset_formula
 from ._sentences import caveats as caveats
 from ._sentences import effect_words as effect_words
 from ._sentences import finding_words as finding_words
