@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from isojax import (
-    plot_ceilings,
-    plot_force_residual_loops,
-    plot_force_residual_map,
-    plot_remainder_map,
-    plot_remainder_parts,
-)
+from isojax import plot
 from isojax.identification import loop_remainder
 from isojax.reporting import loop_summary, render_page, render_text, result_dict
 
@@ -85,11 +79,11 @@ def test_every_picture_draws_on_the_axes_it_is_given_and_labels_them(unexplained
     assert remainder is not None
     axes = Figure().subplots(1, 5)
     drawn = (
-        plot_ceilings(remainder, ax=axes[0]),
-        plot_remainder_parts(remainder.parts, ax=axes[1]),
-        plot_force_residual_map(remainder.force_map, ax=axes[2]),
-        plot_remainder_map(remainder.dwells, ax=axes[3]),
-        plot_force_residual_loops(remainder.dwells, ax=axes[4]),
+        plot.ceilings(remainder, ax=axes[0]),
+        plot.remainder_parts(remainder.parts, ax=axes[1]),
+        plot.force_residual_map(remainder.force_map, ax=axes[2]),
+        plot.remainder_map(remainder.dwells, ax=axes[3]),
+        plot.force_residual_loops(remainder.dwells, ax=axes[4]),
     )
     assert all(figure is axes[0].figure for figure in drawn)
     for ax in axes:
@@ -98,6 +92,6 @@ def test_every_picture_draws_on_the_axes_it_is_given_and_labels_them(unexplained
 
 
 def test_pictures_without_dwells_are_refused():
-    for plot in (plot_force_residual_loops, plot_remainder_map):
+    for draw in (plot.force_residual_loops, plot.remainder_map):
         with pytest.raises(ValueError, match="must hold at least one dwell"):
-            plot(())
+            draw(())
