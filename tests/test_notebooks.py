@@ -76,5 +76,5 @@ def test_notebook_runs_from_top_to_bottom(path, tmp_path, monkeypatch):
         shown = [name for output in cell.outputs for name in output.get("data", {})]
         said = "".join(output.text for output in cell.outputs if output.get("name") == "stderr")
         assert said == "", f"{cell.source}\n\nwrote to stderr:\n{said}"
-        if "plot_" in cell.source or ".plot(" in cell.source:
+        if ".plot." in cell.source or ".plot(" in cell.source:
             assert "image/png" in shown, f"{cell.source}\n\nshowed no picture"

@@ -1,46 +1,28 @@
-"""Identify nonlinear vibration isolators from measured time histories, and name what their model lacks."""
+"""Identify nonlinear vibration isolators from measured time histories, and name what their model lacks.
+
+From records to a model: `read_campaign`, `classical_guess`, `fit`, `residual`, `diagnose`, `extend`, or all
+of them with `close_loop`. From a model to its stability: `find_periodic_orbit`, `stability_map`,
+`continue_branch`, `sensitivity`. Namespaces hold the rest: `elements` every physical effect, `excitations`
+what drives it, `plot` the pictures, `reporting` the tables; the others hold the classes of the results.
+"""
 
 from importlib.metadata import version as _version
+from types import ModuleType as _ModuleType
+from typing import Any as _Any
 
 from . import elements as elements
+from . import excitations as excitations
+from . import identification as identification
+from . import models as models
 from . import paper as paper
+from . import plot as plot
+from . import records as records
+from . import reporting as reporting
+from . import stability as stability
 from ._compiling import compile_quickly as compile_quickly
 from ._results import RESULTS as RESULTS
 from ._results import is_successful as is_successful
-from .elements import CATALOGUE as CATALOGUE
-from .elements import AbsQuadraticDamping as AbsQuadraticDamping
-from .elements import AbsQuadraticStiffness as AbsQuadraticStiffness
-from .elements import AbstractElement as AbstractElement
-from .elements import AddedMass as AddedMass
-from .elements import BoucWen as BoucWen
-from .elements import CoulombFriction as CoulombFriction
-from .elements import CubicDamping as CubicDamping
-from .elements import CubicStiffness as CubicStiffness
-from .elements import DahlFriction as DahlFriction
-from .elements import InputDelay as InputDelay
-from .elements import InputGain as InputGain
-from .elements import InputOffset as InputOffset
-from .elements import LinearDamping as LinearDamping
-from .elements import LinearStiffness as LinearStiffness
-from .elements import MaxwellBranch as MaxwellBranch
-from .elements import PositionDamping as PositionDamping
-from .elements import QuadraticStiffness as QuadraticStiffness
-from .elements import Scales as Scales
-from .elements import SensorGain as SensorGain
-from .elements import SensorOffset as SensorOffset
-from .excitations import AbstractExcitation as AbstractExcitation
 from .excitations import Harmonic as Harmonic
-from .excitations import Multisine as Multisine
-from .excitations import Sampled as Sampled
-from .excitations import SteppedSine as SteppedSine
-from .excitations import SweptSine as SweptSine
-from .excitations import random_phase_multisine as random_phase_multisine
-from .identification import ClassicalGuess as ClassicalGuess
-from .identification import Extension as Extension
-from .identification import Fit as Fit
-from .identification import Remainder as Remainder
-from .identification import Residual as Residual
-from .identification import Verdict as Verdict
 from .identification import classical_guess as classical_guess
 from .identification import diagnose as diagnose
 from .identification import explain_remainder as explain_remainder
@@ -51,85 +33,39 @@ from .identification import read_campaign as read_campaign
 from .identification import residual as residual
 from .models import Integrator as Integrator
 from .models import Isolator as Isolator
-from .models import Simulation as Simulation
 from .models import load_model as load_model
 from .models import save_model as save_model
 from .models import simulate as simulate
-from .records import Campaign as Campaign
-from .records import Record as Record
-from .records import compare_filtered_receptance as compare_filtered_receptance
-from .records import data_health as data_health
-from .records import estimate_noise as estimate_noise
-from .reporting import ClosedLoop as ClosedLoop
 from .reporting import close_loop as close_loop
-from .reporting import error_table as error_table
-from .reporting import parameter_table as parameter_table
-from .reporting import plot_backbone as plot_backbone
-from .reporting import plot_basins as plot_basins
-from .reporting import plot_bifurcation_diagram as plot_bifurcation_diagram
-from .reporting import plot_branch as plot_branch
-from .reporting import plot_correlation as plot_correlation
-from .reporting import plot_cycle_residual as plot_cycle_residual
-from .reporting import plot_dwell_stability as plot_dwell_stability
-from .reporting import plot_effect as plot_effect
-from .reporting import plot_equivalent as plot_equivalent
-from .reporting import plot_errors as plot_errors
-from .reporting import plot_fold_curve as plot_fold_curve
-from .reporting import plot_force_residual_loops as plot_force_residual_loops
-from .reporting import plot_force_residual_map as plot_force_residual_map
-from .reporting import plot_frequency_response as plot_frequency_response
-from .reporting import plot_phase_portrait as plot_phase_portrait
-from .reporting import plot_ranking as plot_ranking
-from .reporting import plot_receptance as plot_receptance
-from .reporting import plot_record as plot_record
-from .reporting import plot_remainder_map as plot_remainder_map
-from .reporting import plot_residual as plot_residual
-from .reporting import plot_response_map as plot_response_map
-from .reporting import plot_restoring_force as plot_restoring_force
-from .reporting import plot_return as plot_return
-from .reporting import plot_sensitivity as plot_sensitivity
-from .reporting import plot_stability_map as plot_stability_map
-from .reporting import plot_stiffness_scatter as plot_stiffness_scatter
-from .reporting import plot_time_history as plot_time_history
-from .reporting import plot_transmissibility as plot_transmissibility
-from .reporting import plot_where as plot_where
-from .reporting import ranking_table as ranking_table
-from .reporting import render_text as render_text
-from .reporting import write_report as write_report
-from .stability import BackboneCurve as BackboneCurve
-from .stability import BasinsOfAttraction as BasinsOfAttraction
-from .stability import BifurcationDiagram as BifurcationDiagram
-from .stability import Branch as Branch
-from .stability import Floquet as Floquet
-from .stability import FoldCurve as FoldCurve
-from .stability import FrequencyResponse as FrequencyResponse
-from .stability import HarmonicBalance as HarmonicBalance
-from .stability import LyapunovExponent as LyapunovExponent
-from .stability import Orbit as Orbit
-from .stability import PeriodDoublingCurve as PeriodDoublingCurve
-from .stability import PhasePortrait as PhasePortrait
-from .stability import PoincareSection as PoincareSection
-from .stability import ReturnToOrbit as ReturnToOrbit
-from .stability import Sensitivity as Sensitivity
-from .stability import SpecialPoint as SpecialPoint
-from .stability import StabilityMap as StabilityMap
-from .stability import Transmissibility as Transmissibility
+from .reporting import plots as _plots
 from .stability import backbone_curve as backbone_curve
-from .stability import basins_of_attraction as basins_of_attraction
 from .stability import bifurcation_diagram as bifurcation_diagram
 from .stability import continue_branch as continue_branch
 from .stability import find_periodic_orbit as find_periodic_orbit
 from .stability import fold_curve as fold_curve
 from .stability import frequency_response as frequency_response
 from .stability import harmonic_balance as harmonic_balance
-from .stability import largest_lyapunov_exponent as largest_lyapunov_exponent
-from .stability import period_doubling_curve as period_doubling_curve
-from .stability import phase_portrait as phase_portrait
-from .stability import poincare_section as poincare_section
-from .stability import return_to_orbit as return_to_orbit
 from .stability import sensitivity as sensitivity
 from .stability import stability_map as stability_map
-from .stability import switch_branch as switch_branch
 from .stability import transmissibility as transmissibility
 
 __version__ = _version("isojax")
+
+_NAMESPACES = (elements, excitations, identification, models, paper, plot, records, reporting, stability)
+
+
+def __dir__() -> list[str]:
+    """Public names: functions and classes of the journey, and the namespaces."""
+    return sorted(
+        name
+        for name, value in globals().items()
+        if not name.startswith("_") and (not isinstance(value, _ModuleType) or value in _NAMESPACES)
+    )
+
+
+def __getattr__(name: str) -> _Any:
+    """Find a name that is not listed here where it lives: `isojax.CubicStiffness`, `isojax.plot_record`."""
+    for room in (elements, excitations, records, models, identification, stability, reporting, _plots):
+        if not name.startswith("_") and name in vars(room):
+            return vars(room)[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,8 +7,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import isojax
-from isojax import reporting
 from isojax.identification import residual
+from isojax.reporting import plots
 
 
 def pairs(loop):
@@ -16,29 +16,27 @@ def pairs(loop):
 
 
 PLOTS = {
-    "record": lambda loop, ax: reporting.plot_record(loop.campaign.records[0], loop.campaign, ax=ax),
-    "time_history": lambda loop, ax: reporting.plot_time_history(loop.before, loop.after, ax=ax),
-    "residual": lambda loop, ax: reporting.plot_residual(loop.before, loop.after, ax=ax),
-    "cycle_residual": lambda loop, ax: reporting.plot_cycle_residual(loop.before, loop.after, ax=ax),
-    "where": lambda loop, ax: reporting.plot_where(loop.before, loop.after, ax=ax),
-    "correlation": lambda loop, ax: reporting.plot_correlation(
+    "record": lambda loop, ax: isojax.plot.record(loop.campaign.records[0], loop.campaign, ax=ax),
+    "time_history": lambda loop, ax: isojax.plot.time_history(loop.before, loop.after, ax=ax),
+    "residual": lambda loop, ax: isojax.plot.residual(loop.before, loop.after, ax=ax),
+    "cycle_residual": lambda loop, ax: isojax.plot.cycle_residual(loop.before, loop.after, ax=ax),
+    "where": lambda loop, ax: isojax.plot.where(loop.before, loop.after, ax=ax),
+    "correlation": lambda loop, ax: isojax.plot.correlation(
         residual(loop.before), residual(loop.after), ax=ax
     ),
-    "receptance": lambda loop, ax: reporting.plot_receptance(loop.guess, ax=ax),
-    "backbone": lambda loop, ax: reporting.plot_receptance(
+    "receptance": lambda loop, ax: isojax.plot.receptance(loop.guess, ax=ax),
+    "backbone": lambda loop, ax: isojax.plot.receptance(
         loop.guess, what="displacement", fits=pairs(loop), ax=ax
     ),
-    "stiffness": lambda loop, ax: reporting.plot_equivalent(loop.guess, pairs(loop), ax=ax),
-    "damping": lambda loop, ax: reporting.plot_equivalent(loop.guess, pairs(loop), what="damping", ax=ax),
-    "restoring_force": lambda loop, ax: reporting.plot_restoring_force(loop.before, loop.after, ax=ax),
-    "effect": lambda loop, ax: reporting.plot_effect(
-        loop.after, "coulomb_friction", (1e-4, 1e-3), 5.0, ax=ax
-    ),
-    "ranking": lambda loop, ax: reporting.plot_ranking(
+    "stiffness": lambda loop, ax: isojax.plot.equivalent(loop.guess, pairs(loop), ax=ax),
+    "damping": lambda loop, ax: isojax.plot.equivalent(loop.guess, pairs(loop), what="damping", ax=ax),
+    "restoring_force": lambda loop, ax: isojax.plot.restoring_force(loop.before, loop.after, ax=ax),
+    "effect": lambda loop, ax: isojax.plot.effect(loop.after, "coulomb_friction", (1e-4, 1e-3), 5.0, ax=ax),
+    "ranking": lambda loop, ax: isojax.plot.ranking(
         loop.findings[0].ranking, effect="coulomb_friction", indistinguishable=("dahl_friction",), ax=ax
     ),
-    "errors": lambda loop, ax: reporting.plot_errors(loop.before, loop.after, ax=ax),
-    "stiffness_scatter": lambda loop, ax: reporting.plot_stiffness_scatter(loop.before, loop.after, ax=ax),
+    "errors": lambda loop, ax: isojax.plot.errors(loop.before, loop.after, ax=ax),
+    "stiffness_scatter": lambda loop, ax: isojax.plot.stiffness_scatter(loop.before, loop.after, ax=ax),
 }
 
 
@@ -61,7 +59,7 @@ def test_a_plot_without_axes_makes_its_own_figure(found, name):
 
 
 def test_curves_show_what_was_measured_and_simulated(found):
-    figure = reporting.plot_time_history(found.before, found.after, record=2, window=(1.0, 2.0))
+    figure = isojax.plot.time_history(found.before, found.after, record=2, window=(1.0, 2.0))
     lines = {line.get_label(): line.get_ydata() for line in figure.axes[0].lines}
     record = found.campaign.records[2]
     shown = (record.time >= 1.0) & (record.time <= 2.0)
@@ -70,7 +68,7 @@ def test_curves_show_what_was_measured_and_simulated(found):
 
 
 def test_bars_have_the_height_of_the_errors(found):
-    figure = reporting.plot_errors(found.before, found.after, measure="nrmse")
+    figure = isojax.plot.errors(found.before, found.after, measure="nrmse")
     heights = [patch.get_height() for patch in figure.axes[0].patches]
     fits, roles = (found.before, found.after), ("fit", "holdout")
     expected = [100.0 * fit.errors[role].nrmse for fit in fits for role in roles]
@@ -78,7 +76,7 @@ def test_bars_have_the_height_of_the_errors(found):
 
 
 def test_friction_alone_is_a_rectangle_of_its_level(found):
-    figure = reporting.plot_effect(found.after, "coulomb_friction", (1e-3,), 5.0)
+    figure = isojax.plot.effect(found.after, "coulomb_friction", (1e-3,), 5.0)
     level = float(found.after.model["coulomb_friction.force_level"])
     force = figure.axes[0].lines[0].get_ydata()
     assert np.max(np.abs(force)) == pytest.approx(level, rel=1e-6)
@@ -87,11 +85,11 @@ def test_friction_alone_is_a_rectangle_of_its_level(found):
 
 def test_without_dwells_there_is_no_cycle_to_average(plain):
     with pytest.raises(ValueError, match="must be a fit of records with dwells"):
-        reporting.plot_cycle_residual(plain.before)
+        isojax.plot.cycle_residual(plain.before)
 
 
 def test_noise_alone_is_the_share_of_its_rms_in_what_was_measured(found):
-    figure = reporting.plot_errors(found.before, found.after, measure="nrmse")
+    figure = isojax.plot.errors(found.before, found.after, measure="nrmse")
     (lines,) = [one for one in figure.axes[0].collections if one.get_label() == "noise alone"]
     for segment, role in zip(lines.get_segments(), ("fit", "holdout"), strict=True):
         outputs = [record.output for record in found.campaign.records if record.role == role]
@@ -103,7 +101,7 @@ def test_noise_alone_is_the_share_of_its_rms_in_what_was_measured(found):
 @pytest.mark.parametrize("what", ["input", "output"])
 def test_a_record_is_drawn_sample_by_sample_with_its_quantity_and_unit(found, what):
     record = found.campaign.records[1]
-    figure = isojax.plot_record(record, found.campaign, what=what, window=(0.5, 1.5))
+    figure = isojax.plot.record(record, found.campaign, what=what, window=(0.5, 1.5))
     ax = figure.axes[0]
     np.testing.assert_array_equal(ax.lines[0].get_xdata(), np.arange(250, 751) / 500.0)
     np.testing.assert_array_equal(ax.lines[0].get_ydata(), getattr(record, what)[250:751])
@@ -113,7 +111,7 @@ def test_a_record_is_drawn_sample_by_sample_with_its_quantity_and_unit(found, wh
 
 def test_a_record_shows_which_samples_a_dwell_and_the_settling_take(found):
     record = dataclasses.replace(found.campaign.records[0], settle=200)
-    ax = isojax.plot_record(record, found.campaign).axes[0]
+    ax = isojax.plot.record(record, found.campaign).axes[0]
     spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in ax.patches]
     shaded = [(dwell.start / 500.0, dwell.stop / 500.0) for dwell in record.dwells[1::2]]
     np.testing.assert_allclose(spans, [*shaded, (0.0, 0.4)])
@@ -123,17 +121,16 @@ def test_a_record_shows_which_samples_a_dwell_and_the_settling_take(found):
 def test_a_window_past_the_end_of_a_record_is_refused(found):
     record = found.campaign.records[0]
     with pytest.raises(ValueError, match="must hold samples of"):
-        isojax.plot_record(record, found.campaign, window=(1e3, 2e3))
+        isojax.plot.record(record, found.campaign, window=(1e3, 2e3))
 
 
-def test_every_picture_can_be_had_from_the_package():
-    drawn = {name for name in vars(reporting) if name.startswith("plot_")}
+def test_every_picture_stands_under_plot_and_is_drawn_by_a_test():
+    drawn = {name: plot for name, plot in vars(isojax.plot).items() if inspect.isfunction(plot)}
     files = Path(__file__).parent.glob("test_*.py")
     tests = "".join(file.read_text(encoding="utf-8") for file in files)
-    assert len(drawn) >= 25
-    for name in sorted(drawn):
-        assert f"{name}(" in tests, f"no test draws {name}"
-        plot = getattr(isojax, name)
+    assert {plot.__name__ for plot in drawn.values()} == {name for name in vars(plots) if name[:5] == "plot_"}
+    for name, plot in drawn.items():
+        assert f"plot.{name}(" in tests, f"no test draws {name}"
         signature = inspect.signature(plot)
         assert signature.parameters["ax"].default is None, name
         assert signature.return_annotation is Figure, name

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from isojax import ClosedLoop
+from isojax import plot
 from isojax.health import DwellStability
 from isojax.identification import DriftBudget, Share
 from isojax.records import Dwell, HumLine, MainsCollision
-from isojax.reporting import plot_dwell_stability
+from isojax.reporting import ClosedLoop
 from isojax.reporting.words._health_words import budget_words, dwell_words, mains_words
 
 
@@ -60,7 +60,7 @@ def test_repeatability_of_a_finding_is_one_sentence_in_its_unit(found):
 
 @pytest.mark.parametrize("what", ["multiplier", "fold"])
 def test_pictures_leave_out_what_is_not_known(what):
-    figure = plot_dwell_stability([dwell(4.0, 0.5), dwell(4.4, 0.9, 1.5, 0.02, level=None), LOST], what=what)
+    figure = plot.dwell_stability([dwell(4.0, 0.5), dwell(4.4, 0.9, 1.5, 0.02, level=None), LOST], what=what)
     (ax,) = figure.axes
     drawn = [line for line in ax.lines if line.get_marker() == "o"]
     assert [list(line.get_xdata()) for line in drawn] == [[4.0], [4.4]]

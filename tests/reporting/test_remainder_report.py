@@ -6,11 +6,7 @@ import re
 import pytest
 from matplotlib.figure import Figure
 
-from isojax import (
-    plot_force_residual_loops,
-    plot_force_residual_map,
-    plot_remainder_map,
-)
+from isojax import plot
 from isojax.identification import loop_remainder
 from isojax.reporting import loop_summary, render_page, render_text, result_dict
 
@@ -73,9 +69,9 @@ def test_every_picture_draws_on_the_axes_it_is_given_and_labels_them(unexplained
     assert remainder is not None
     axes = Figure().subplots(1, 3)
     drawn = (
-        plot_force_residual_map(remainder.force_map, ax=axes[0]),
-        plot_remainder_map(remainder.dwells, ax=axes[1]),
-        plot_force_residual_loops(remainder.dwells, ax=axes[2]),
+        plot.force_residual_map(remainder.force_map, ax=axes[0]),
+        plot.remainder_map(remainder.dwells, ax=axes[1]),
+        plot.force_residual_loops(remainder.dwells, ax=axes[2]),
     )
     assert all(figure is axes[0].figure for figure in drawn)
     for ax in axes:
@@ -84,6 +80,6 @@ def test_every_picture_draws_on_the_axes_it_is_given_and_labels_them(unexplained
 
 
 def test_pictures_without_dwells_are_refused():
-    for plot in (plot_force_residual_loops, plot_remainder_map):
+    for draw in (plot.force_residual_loops, plot.remainder_map):
         with pytest.raises(ValueError, match="must hold at least one dwell"):
-            plot(())
+            draw(())

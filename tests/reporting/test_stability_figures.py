@@ -51,7 +51,7 @@ def contour_crossings(ax, frequency):
 
 @pytest.mark.slow
 def test_contour_of_the_map_passes_through_the_known_folds(lens):
-    figure = ij.plot_stability_map(lens)
+    figure = ij.plot.stability_map(lens)
     spacing = AMPLITUDES[1] - AMPLITUDES[0]
     crossings = contour_crossings(figure.axes[0], 4.2)
     assert crossings.size == 2
@@ -63,7 +63,7 @@ def test_contour_of_the_map_passes_through_the_known_folds(lens):
 @pytest.mark.slow
 def test_outline_holds_the_cells_between_the_known_folds(lens):
     between = np.stack([(low < AMPLITUDES) & (high > AMPLITUDES) for low, high in FOLDS.values()], axis=1)
-    figure = ij.plot_stability_map(lens)
+    figure = ij.plot.stability_map(lens)
     (outline,) = [c for c in figure.axes[0].collections if type(c).__name__ == "LineCollection"]
     padded = np.pad(between, 1).astype(int)
     edges = np.abs(np.diff(padded, axis=0)).sum() + np.abs(np.diff(padded, axis=1)).sum()
@@ -73,25 +73,25 @@ def test_outline_holds_the_cells_between_the_known_folds(lens):
 
 @pytest.mark.slow
 def test_colours_break_at_one_where_an_orbit_is_unstable_and_end_there_where_none_is(lens):
-    mesh = ij.plot_stability_map(lens).axes[0].collections[0]
+    mesh = ij.plot.stability_map(lens).axes[0].collections[0]
     assert isinstance(mesh.norm, TwoSlopeNorm)
     assert mesh.norm.vcenter == 1.0
     below, above = mesh.cmap(mesh.norm(0.999)), mesh.cmap(mesh.norm(1.001))
     assert below[2] > 0.9
     assert above[0] > 0.9
     assert above[2] < 0.4
-    lowest = ij.plot_stability_map(lens, orbit=0).axes[0].collections[0]
+    lowest = ij.plot.stability_map(lens, orbit=0).axes[0].collections[0]
     assert lowest.norm.vmax == 1.0
 
 
 @pytest.mark.slow
 def test_map_shows_the_least_stable_or_the_asked_orbit(lens):
-    shown = ij.plot_stability_map(lens).axes[0].collections[0].get_array()
+    shown = ij.plot.stability_map(lens).axes[0].collections[0].get_array()
     np.testing.assert_array_equal(shown, np.nanmax(np.asarray(lens.spectral_radius), axis=0))
-    saddle = ij.plot_stability_map(lens, orbit=1).axes[0].collections[0].get_array()
+    saddle = ij.plot.stability_map(lens, orbit=1).axes[0].collections[0].get_array()
     assert np.ma.count_masked(saddle) == np.sum(np.asarray(lens.count) == 1)
     with pytest.raises(ValueError, match="orbit"):
-        ij.plot_stability_map(lens, orbit=3)
+        ij.plot.stability_map(lens, orbit=3)
 
 
 @pytest.mark.slow
@@ -106,7 +106,7 @@ def test_cells_without_an_orbit_are_grey_and_counted(lens):
             lens.count.at[gaps, 0].set(0),
         ),
     )
-    for plot in (ij.plot_stability_map, ij.plot_response_map):
+    for plot in (ij.plot.stability_map, ij.plot.response_map):
         figure = plot(failed)
         assert "no orbit (3 cells)" in entries(figure)
         assert "3 without an orbit" in figure.axes[0].get_title(loc="left")
@@ -116,13 +116,13 @@ def test_cells_without_an_orbit_are_grey_and_counted(lens):
 
 @pytest.mark.slow
 def test_response_map_is_in_millimetres(lens):
-    shown = ij.plot_response_map(lens).axes[0].collections[0].get_array()
+    shown = ij.plot.response_map(lens).axes[0].collections[0].get_array()
     np.testing.assert_allclose(shown, 1e3 * np.nanmax(np.asarray(lens.response), axis=0), rtol=1e-12)
 
 
 @pytest.mark.slow
 def test_branch_is_dashed_between_the_known_folds_and_marks_them(branch):
-    figure = ij.plot_branch(branch)
+    figure = ij.plot.branch(branch)
     ax = figure.axes[0]
     solid, dashed, marks = ax.lines
     assert dashed.is_dashed()
@@ -162,7 +162,7 @@ def test_fold_curve_shows_both_cusps():
         True,
         ij.RESULTS.promote(diffrax.RESULTS.successful),
     )
-    figure = ij.plot_fold_curve(curve, excitation="base_acceleration")
+    figure = ij.plot.fold_curve(curve, excitation="base_acceleration")
     ax = figure.axes[0]
     stars = [line for line in ax.lines if line.get_marker() == "*"]
     np.testing.assert_allclose(np.sort(stars[0].get_xdata()), [3.0, 5.0])
@@ -178,7 +178,7 @@ def test_phase_portrait_basins_diagram_and_return_draw_what_they_hold(model):
     figure = Figure()
     ax = figure.add_subplot()
     section = ij.poincare_section(model, drive, settle=40, periods=2)
-    assert ij.plot_phase_portrait(portrait, section=section, ax=ax) is figure
+    assert ij.plot.phase_portrait(portrait, section=section, ax=ax) is figure
     np.testing.assert_allclose(ax.lines[0].get_xdata(), 1e3 * np.asarray(portrait.displacement))
     assert entries(figure) == ["at 0° of the drive"]
 
@@ -186,7 +186,7 @@ def test_phase_portrait_basins_diagram_and_return_draw_what_they_hold(model):
         model, drive, np.linspace(-2e-3, 2e-3, 5), np.linspace(-0.05, 0.05, 5), settle=60
     )
     assert basins.periods.size == 2
-    figure = ij.plot_basins(basins)
+    figure = ij.plot.basins(basins)
     labels = entries(figure)
     assert len(labels) == 3
     assert [
@@ -197,7 +197,7 @@ def test_phase_portrait_basins_diagram_and_return_draw_what_they_hold(model):
     diagram = ij.bifurcation_diagram(
         model, [170.0, 175.0, 180.0], frequency=4.2, direction="both", settle=60, samples=4, longest=2
     )
-    figure = ij.plot_bifurcation_diagram(diagram)
+    figure = ij.plot.bifurcation_diagram(diagram)
     up, down = figure.axes[0].lines
     assert up.get_color() != down.get_color()
     middle = np.asarray(up.get_xdata()) == 175.0
@@ -209,7 +209,7 @@ def test_phase_portrait_basins_diagram_and_return_draw_what_they_hold(model):
 @pytest.mark.slow
 def test_return_falls_along_the_line_of_the_multipliers(model):
     orbit = ij.find_periodic_orbit(model, ij.Harmonic(amplitude=150.0, frequency=6.0))
-    figure = ij.plot_return(ij.return_to_orbit(model, orbit, (1e-5, 0.0), periods=20))
+    figure = ij.plot.return_to_orbit(ij.return_to_orbit(model, orbit, (1e-5, 0.0), periods=20))
     distance, promised = figure.axes[0].lines
     slope = np.diff(np.log(promised.get_ydata()))
     np.testing.assert_allclose(slope, np.log(float(orbit.floquet.spectral_radius)), rtol=1e-9)
@@ -229,7 +229,7 @@ def test_bars_of_a_power_law_are_its_exponents():
         covariance=np.diag([0.02**2, 3.0**2]),
         covariance_of=names,
     )
-    figure = ij.plot_sensitivity(found, "ratio", parameter_errors={"mass": 0.02, names[1]: 3.0})
+    figure = ij.plot.sensitivity(found, "ratio", parameter_errors={"mass": 0.02, names[1]: 3.0})
     ax = figure.axes[0]
     np.testing.assert_allclose([bar.get_width() for bar in ax.patches], [2.0, -1.0], rtol=1e-12)
     assert [text.get_text() for text in ax.get_yticklabels()] == ["mass", "linear stiffness"]
@@ -238,9 +238,9 @@ def test_bars_of_a_power_law_are_its_exponents():
     # sqrt(2^2 + 3^2) % of 0.04
     assert "0.04000 ± 0.0014" in ax.get_title(loc="left")
     with pytest.raises(ValueError, match="index"):
-        ij.plot_sensitivity(found, "ratio", index=1)
+        ij.plot.sensitivity(found, "ratio", index=1)
     with pytest.raises(ValueError, match="quantity"):
-        ij.plot_sensitivity(found, "other")
+        ij.plot.sensitivity(found, "other")
 
 
 @pytest.mark.slow
@@ -290,7 +290,7 @@ def test_backbone_of_a_linear_spring_stands_upright():
         jnp.zeros((4, 2)),
         result,
     )
-    figure = ij.plot_backbone(curve)
+    figure = ij.plot.backbone(curve)
     free, forced = figure.axes[0].lines
     np.testing.assert_array_equal(free.get_xdata(), 5.0)
     np.testing.assert_allclose(forced.get_ydata(), 1e3 * displacements)
@@ -311,7 +311,7 @@ def test_transmissibility_goes_on_into_the_nearest_stable_orbit_and_closes_its_f
         jnp.asarray(radius),
         successful()[1],
     )
-    figure = ij.plot_transmissibility(found)
+    figure = ij.plot.transmissibility(found)
     pieces = set()
     for line in figure.axes[0].lines:
         x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
@@ -329,11 +329,11 @@ def test_transmissibility_goes_on_into_the_nearest_stable_orbit_and_closes_its_f
 @pytest.mark.slow
 def test_frequency_response_marks_its_folds_where_the_curve_turns(model):
     response = ij.frequency_response(model, 150.66, (4.2, 4.6))
-    figure = ij.plot_frequency_response(response)
+    figure = ij.plot.frequency_response(response)
     (marks,) = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
     # At 4.4 Hz the upper fold force is 150.66 N, so one of the two folds over frequency lies there.
     assert np.min(np.abs(marks.get_xdata() - 4.4)) < 1e-3
     assert entries(figure) == ["150.7 N", "stable", "unstable", "fold"]
-    phase = ij.plot_frequency_response(response, what="phase").axes[0].lines[0].get_ydata()
+    phase = ij.plot.frequency_response(response, what="phase").axes[0].lines[0].get_ydata()
     assert np.nanmax(phase) < 0.0
     assert np.nanmin(phase) > -180.0

@@ -7,6 +7,7 @@ from .diagnosis import Candidate as Candidate
 from .diagnosis import Extension as Extension
 from .diagnosis import Finding as Finding
 from .diagnosis import Loop as Loop
+from .diagnosis import Separation as Separation
 from .diagnosis import Verdict as Verdict
 from .diagnosis import diagnose as diagnose
 from .experiment import find_separating_experiment as find_separating_experiment
