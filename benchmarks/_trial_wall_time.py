@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from isojax import rig
+from isojax import read_campaign, rig
 from isojax.identification import Loop, close_loop
-from isojax.records import Campaign, read_campaign
+from isojax.records import Campaign
 
 LEVELS = (60.0, 105.0, 150.0)
 FREQUENCIES = tuple(np.linspace(4.0, 7.0, 15).round(3).tolist())

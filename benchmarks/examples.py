@@ -109,8 +109,8 @@ def print_finding(loop, finding, truth: list[float]) -> bool:
 
 def check_example(name: str, folder: Path, talk: bool) -> bool:
     """Run one example, print what came of it, and say whether it passed."""
+    from isojax import read_campaign
     from isojax.identification import close_loop, fit
-    from isojax.records import read_campaign
 
     print(f"\n{name}", flush=True)
     truth = json.loads((folder / "truth.json").read_text())

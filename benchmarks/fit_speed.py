@@ -69,8 +69,8 @@ def values_of(model) -> list[float]:
 
 def isojax_runner(splits: list[tuple[float, float, float]]) -> Callable[[], tuple[float, dict]]:
     """Give the function that reads the records, fits them, and says how long the fit took."""
+    from isojax import read_campaign
     from isojax.identification import classical_guess, fit
-    from isojax.records import read_campaign
 
     start = classical_guess(read_campaign(find_campaign())).model
 
@@ -169,9 +169,9 @@ class Peer:
     """SciPy's least squares with a compiled simulator."""
 
     def __init__(self, tuned: bool):
+        from isojax import read_campaign
         from isojax.excitations import tabulate
         from isojax.identification import classical_guess
-        from isojax.records import read_campaign
 
         campaign = read_campaign(find_campaign())
         self.start = np.array(values_of(classical_guess(campaign).model))

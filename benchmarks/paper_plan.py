@@ -270,8 +270,8 @@ def values_of(model) -> np.ndarray:
 
 def identify(case: Case, repeats: int) -> None:
     """Identify one direction by every route and print the table."""
+    from isojax import read_campaign
     from isojax.identification import classical_guess, fit, paper_table
-    from isojax.records import read_campaign
 
     begin = time.perf_counter()
     campaign = read_campaign(write_test(case.direction, repeats))

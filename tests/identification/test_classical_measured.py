@@ -7,11 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from isojax import read_campaign
 from isojax.excitations import Sampled
 from isojax.identification.guess._classical_guess import classical_guess
 from isojax.identification.guess._paper_table import paper_table
 from isojax.models import simulate
-from isojax.records import dwell_harmonics, read_campaign
+from isojax.records import dwell_harmonics
 
 NAMES = [
     "linear_stiffness.coefficient",

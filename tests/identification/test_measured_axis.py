@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+from isojax import read_campaign
 from isojax.elements import CATALOGUE
 from isojax.identification import close_loop
-from isojax.records import read_campaign
 from measured import EMPS
 
 RIVALS = {

@@ -1,13 +1,14 @@
 """Every mistake in campaign.toml gives one ValueError: file, field, what was found and what was expected."""
 
 import shutil
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from isojax.records import read_campaign
+from isojax import read_campaign
 
 RECORD = r'role = "fit"'
 FLOOR = """\
@@ -212,6 +213,13 @@ def test_the_tiny_campaign_itself_is_read(tiny: Callable[..., Path]) -> None:
 def test_broken_toml_names_the_file_and_the_line(tiny: Callable[..., Path]) -> None:
     with pytest.raises(ValueError, match=r"campaign\.toml is not valid TOML: .*line 3"):
         read_campaign(tiny(("mass = 2.0", "mass = ")))
+
+
+def test_the_toml_is_parsed_once(tiny: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    parse, texts = tomllib.loads, []
+    monkeypatch.setattr(tomllib, "loads", lambda text: texts.append(text) or parse(text))
+    read_campaign(tiny())
+    assert len(texts) == 1
 
 
 @pytest.mark.parametrize(

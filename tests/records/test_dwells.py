@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from isojax.records import detect_kind, read_campaign, segment_dwells
+from isojax import read_campaign
+from isojax.records import detect_kind, segment_dwells
 
 RATE = 1000.0
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from isojax.records import read_campaign
+from isojax import read_campaign
 
 Channels = dict[str, np.ndarray]
 Tiny = Callable[..., Path]

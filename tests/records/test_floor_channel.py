@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from isojax import rig
-from isojax.identification import read_campaign as read_with_catalogue
-from isojax.records import estimate_noise, read_campaign
+from isojax import read_campaign, rig
+from isojax.records import estimate_noise
 from isojax.records.reading._floor import floor_acceleration
 
 RATE, SIZE = 200.0, 2000
@@ -118,7 +117,7 @@ def test_a_floor_under_a_driven_base_is_refused(
 def test_an_element_that_follows_the_floor_asks_for_its_section(tiny: Callable[..., Path]) -> None:
     folder = tiny((r'damping = \["linear"\]', 'damping = ["linear"]\nelements = ["floor_motion"]'))
     with pytest.raises(ValueError, match=r"\[model\] names `floor_motion`.*section \[floor\]"):
-        read_with_catalogue(folder)
+        read_campaign(folder)
 
 
 def test_what_a_measured_floor_does_is_no_noise(tmp_path: Path) -> None:

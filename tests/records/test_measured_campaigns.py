@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from isojax.records import Campaign, estimate_noise, excited_band, measured_state, read_campaign
+from isojax import read_campaign
+from isojax.records import Campaign, estimate_noise, excited_band, measured_state
 
 
 def write(folder: Path, text: str) -> Campaign:

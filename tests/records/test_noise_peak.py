@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isojax import rig
-from isojax.records import data_health, noise_peak, read_campaign
+from isojax import read_campaign, rig
+from isojax.records import data_health, noise_peak
 
 EXAMPLES = ["quiet", "friction", "relaxation", "asymmetry"]
 STIFFNESS, MASS = 1.0805e6, 800.0

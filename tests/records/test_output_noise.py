@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from isojax.records import (
-    Campaign,
-    Filter,
-    InputChannel,
-    OutputChannel,
-    Record,
-    data_health,
-    estimate_noise,
-    read_campaign,
-)
+from isojax import read_campaign
+from isojax.records import Campaign, Filter, InputChannel, OutputChannel, Record, data_health, estimate_noise
 
 RATE, SIGMA = 500.0, 0.013
 EXAMPLES = ["quiet", "friction", "relaxation", "asymmetry"]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
+from isojax import read_campaign
 from isojax.records import (
     Campaign,
     Dwell,
@@ -19,7 +20,6 @@ from isojax.records import (
     dwell_harmonics,
     integrate_acceleration,
     measured_state,
-    read_campaign,
     receptance,
     zero_phase_butterworth,
 )

@@ -7,8 +7,7 @@ import pytest
 from scipy import signal
 from scipy.integrate import solve_ivp
 
-from isojax import rig
-from isojax.records import read_campaign
+from isojax import read_campaign, rig
 
 MASS, K, C = 800.0, 1.0805e6, 1.027e4
 LINEAR = rig.Plant((rig.LinearStiffness(K), rig.LinearDamping(C)), MASS)

@@ -17,8 +17,8 @@ from .noise import estimate_noise as estimate_noise
 from .noise import noise_peak as noise_peak
 from .reading import Declaration as Declaration
 from .reading import detect_kind as detect_kind
-from .reading import read_campaign as read_campaign
 from .reading import read_declaration as read_declaration
+from .reading import read_measurements as read_measurements
 from .reading import segment_dwells as segment_dwells
 from .spectrum import Band as Band
 from .spectrum import DwellHarmonics as DwellHarmonics

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from ...elements import CATALOGUE
-from ...records import Campaign, read_declaration
-from ...records import read_campaign as read_records
+from ...records import Campaign, read_declaration, read_measurements
 from ._declared_model import catalogue_names
 
 
@@ -35,4 +34,4 @@ def read_campaign(path: str | Path) -> Campaign:
                 f"{declared.file}: [model] names `{name}`, which follows the measured motion of the "
                 "floor, but section [floor], which says where that was measured, is missing"
             )
-    return read_records(path)
+    return read_measurements(declared)

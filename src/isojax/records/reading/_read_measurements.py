@@ -1,4 +1,4 @@
-"""campaign.toml and its data files as one `Campaign` in SI."""
+"""The data files of a declaration as one `Campaign` in SI."""
 
 import filecmp
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from .._wording import row
 from ..spectrum import compensate_butterworth, ringing_frequency, unsure_samples, zero_phase_butterworth
 from ._channel_units import si_factor
 from ._data_file import read_columns
-from ._declaration import Declaration, read_declaration
+from ._declaration import Declaration
 from ._excitation_kind import detect_kind
 from ._find_dwells import check_dwells, segment_dwells
 from ._floor import floor_acceleration
@@ -31,28 +31,23 @@ _INPUT_MEASURES = {
 _FEWEST_SAMPLES = 16
 
 
-def read_campaign(path: str | Path) -> Campaign:
-    """Gives a measurement campaign, its records in SI units and in the order of the test.
+def read_measurements(declared: Declaration) -> Campaign:
+    """Gives the campaign that a declaration describes, its records in SI units and in the order of the test.
 
-    Paths of data files and schedules are relative to the campaign.toml. Units are converted, a reaction mass
-    becomes a force, the filter runs where `applied = false` and is taken out where
-    `compensate = true`, dwells come from the schedule or are found, and
-    the kind of each record is detected.
+    Paths of data files and schedules are relative to the campaign.toml. Units are converted, and a reaction
+    mass becomes a force. The filter runs where `applied = false` and is compensated where
+    `compensate = true`. Dwells come from the schedule or are detected, and so is the kind of each record.
 
     Args:
-        path: The campaign.toml or its folder.
+        declared: The checked contents of the campaign.toml, as `read_declaration` gives them.
 
     Returns:
         The campaign.
 
     Raises:
-        ValueError: At the first thing that is wrong with the .toml or a data file: which file, which field or
-            row, what was found and what was expected.
-
-    Source:
-        The form of campaign.toml is described in docs/campaign.md.
+        ValueError: At the first unit or data file that is wrong: which file, which field or row, what was
+            found and what was expected.
     """
-    declared = read_declaration(path)
     file, sections = declared.file, declared.sections
     drive = InputChannel(**sections["input"])
     response = OutputChannel(**sections["output"])
