@@ -303,7 +303,7 @@ def coverage(rows: list[Row]) -> list[Mark]:
 
 
 def coverage_markdown(rows: list[Row]) -> list[str]:
-    """Give the coverage as the README shows it, a line an effect."""
+    """Give the coverage as docs/validation.md shows it, a line an effect."""
     lines = [
         "| 95 % intervals of | cover the truth (90-98 %) | coefficients | 95 % interval | rms error, se |",
         "|---|---|---|---|---|",
@@ -318,7 +318,7 @@ def coverage_markdown(rows: list[Row]) -> list[str]:
 
 
 def markdown(rows: list[Row]) -> list[str]:
-    """Give the table as the README shows it, a line a criterion."""
+    """Give the table as docs/validation.md shows it, a line a criterion."""
     words = {True: "met", False: "**missed**", None: ""}
     lines = ["| criterion | figure | of | 95 % interval | |", "|---|---|---|---|---|"]
     for mark in table(rows):

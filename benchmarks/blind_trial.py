@@ -2,8 +2,8 @@
 
 Run `python benchmarks/blind_trial.py --seeds 0:200 --out trial.jsonl`, then `... --report trial.jsonl`. A run
 can be stopped at any time and goes on where it stopped: a line of the file is a campaign, and what is there
-is skipped. About half a minute a campaign and core once the code is compiled. The rows of the README's
-tables are in `results/`; each says of which commit it is.
+is skipped. About half a minute a campaign and core once the code is compiled. The rows behind the
+tables of docs/validation.md are in `results/`; each says of which commit it is.
 
 The plant is the paper's y direction with every coefficient moved by up to 10 %, on the rig simulator, which
 shares no code with the models. Levels, noise, distortion and drift of the stiffness (0 to 0.2 %) are drawn;
@@ -137,7 +137,7 @@ def main() -> None:
     parser.add_argument(
         "--report", type=Path, nargs="+", metavar="FILE", help="print the table of these files"
     )
-    parser.add_argument("--markdown", action="store_true", help="print it as the README shows it")
+    parser.add_argument("--markdown", action="store_true", help="print it as docs/validation.md shows it")
     parser.add_argument("--verbose", action="store_true", help="list what speaks against each criterion")
     options = parser.parse_args()
     if options.report:

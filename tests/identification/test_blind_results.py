@@ -1,4 +1,4 @@
-"""The blind trial's rows that are kept, and what the README says of them."""
+"""The blind trial's rows that are kept, and what docs/validation.md says of them."""
 
 import re
 import sys
@@ -41,20 +41,20 @@ def test_a_hundred_repeats_of_each_common_effect_are_there(rows):
 
 
 def table_below(head):
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
     _, _, rest = text.partition("\n".join(head) + "\n")
-    told = re.match(r"(?:\|.*\n)+", rest)
-    assert told, f"README lacks the table of {head[0]}"
-    return told.group().splitlines()
+    table = re.match(r"(?:\|.*\n)+", rest)
+    assert table, f"docs/validation.md lacks the table of {head[0]}"
+    return table.group().splitlines()
 
 
-def test_the_coverage_of_the_readme_is_what_the_rows_give(rows):
+def test_the_coverage_of_the_page_is_what_the_rows_give(rows):
     given = coverage_markdown([row for row in rows if row["task"] == "coverage"])
     assert table_below(given[:2]) == given[2:]
     assert len(given) == 2 + len(COMMONEST) + 1
 
 
-def test_the_table_of_the_readme_is_what_the_rows_give(rows):
+def test_the_table_of_the_page_is_what_the_rows_give(rows):
     given = markdown([row for row in rows if row["task"] in ("loop", "leave_out")])
     lines = table_below(given[:2])
     assert len(lines) >= 12
