@@ -84,10 +84,8 @@ def split_dwells(fit: Fit, latent: tuple[ForceResidual, ...]) -> tuple[DwellRema
     Returns:
         One a dwell whose integrals are to be trusted; none without dwells.
     """
-    runs = {id(run.record): run for run in fit.restarts.runs}
     found = []
-    for one in latent:
-        run = runs[id(one.record)]
+    for one, run in zip(latent, fit.restarts.runs, strict=True):
         for dwell in one.record.dwells:
             window = _window(one, dwell)
             orders = min(HARMONICS, int(one.highest / dwell.frequency))

@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float
 
 from ..._results import is_successful
-from ..diagnosis import Loop
-from ..fitting import DEFAULT_SOLVER, Evaluation, Fit, silent
-from ..guess import scales as campaign_scales
+from .._rules import Rules
+from ..fitting import DEFAULT_SOLVER, Fit, search_of, silent
 from ._ceiling import Ceiling, find_ceilings
 from ._dwell_remainder import PARTS, DwellRemainder, share_parts, split_dwells
 from ._exponents import Exponents, find_exponents
@@ -67,6 +65,7 @@ def explain_remainder(
     refit: bool = True,
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
+    rules: Rules = Rules(),
 ) -> Remainder:
     """Describe what a fitted model leaves of its records, where no known effect explains it.
 
@@ -76,7 +75,8 @@ def explain_remainder(
         fit: the fit.
         refit: whether to fit the pursued laws, to say what their linear step is worth.
         solver: an optimistix least-squares solver for that.
-        progress: told a line a step.
+        progress: receives a line a step.
+        rules: which laws stand out of the noise.
 
     Returns:
         The description.
@@ -86,15 +86,15 @@ def explain_remainder(
     """
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
-    scales = campaign_scales(fit.campaign)
-    pursuit = pursue_laws(fit.estimate, scales, refit=refit, solver=solver, progress=progress)
+    search = search_of(fit.campaign, rules, solver, progress)
+    pursuit = pursue_laws(fit.estimate, search, refit=refit)
     progress("the force that the balance lacks")
     latent = force_residuals(fit)
     dwells = split_dwells(fit, latent)
     parts = share_parts(dwells)
     # What is not locked to the drive leaks into harmonics and is none.
     locked = parts.get(PARTS[-1], 0.0) < 0.5
-    static, black_box = find_ceilings(latent, scales)
+    static, black_box = find_ceilings(latent, search.scales)
     return Remainder(
         pursuit,
         dwells,
@@ -104,28 +104,6 @@ def explain_remainder(
         black_box,
         _force_map(latent),
     )
-
-
-_KNOWN: WeakKeyDictionary[Evaluation, Remainder] = WeakKeyDictionary()
-"""Remainders already described: a report asks for one several times."""
-
-
-def loop_remainder(loop: Loop) -> Remainder | None:
-    """Describe what a closed loop leaves, where it leaves something; worked out once.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        The description; None where the verdict is another, or the last fit failed.
-    """
-    after = loop.after
-    asked = loop.verdict in ("unexplained", "partly_explained")
-    if not (asked and is_successful(after.result) and after.estimate.point.is_finite):
-        return None
-    if after.evaluation not in _KNOWN:
-        _KNOWN[after.evaluation] = explain_remainder(after)
-    return _KNOWN[after.evaluation]
 
 
 def _force_map(latent: tuple[ForceResidual, ...]) -> ForceMap:
