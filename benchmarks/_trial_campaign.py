@@ -21,6 +21,7 @@ from _trial_outside import OUTSIDE
 from isojax import elements, rig
 from isojax.identification import fit, read_campaign, scales
 from isojax.identification.diagnosis._score import score_test
+from isojax.identification.fitting import Search
 from isojax.models import Isolator
 
 CLASSES = ("none", "one", "two", "outside")
@@ -231,7 +232,7 @@ def traces(seed: int, kind: str) -> Traces:
     shapes = {name: effect.shape(generator(seed, "shape", name), motion) for name, effect in EFFECTS.items()}
     magnitudes = scales(innocent.campaign)
     probes = tuple(element_of(name, shapes[name], magnitudes) for name in EFFECTS)
-    test = score_test(innocent.estimate, magnitudes, probes)
+    test = score_test(innocent.estimate, Search(magnitudes), probes)
     limits = {score.element.name: SIGNIFICANT * score.error for score in test.scores}
     return Traces(motion, shapes, limits)
 

@@ -87,15 +87,26 @@ def own_parameters(module: eqx.Module | type[eqx.Module]) -> tuple[tuple[str, Pa
     )
 
 
-def _owners(model: eqx.Module) -> list[tuple[str, eqx.Module]]:
-    """Pair every module of the model with its name in reports; a second element of a kind gets `_2`."""
-    owners: list[tuple[str, eqx.Module]] = [("", model)]
+def element_names(model: eqx.Module) -> tuple[str, ...]:
+    """Give each element's name in reports.
+
+    Args:
+        model: an isolator; anything else has no elements.
+
+    Returns:
+        Catalogue names; a second element of a kind carries `_2`.
+    """
     seen: dict[str, int] = {}
+    names = []
     for element in getattr(model, "elements", ()):
         seen[element.name] = seen.get(element.name, 0) + 1
-        suffix = "" if seen[element.name] == 1 else f"_{seen[element.name]}"
-        owners.append((element.name + suffix, element))
-    return owners
+        names.append(element.name if seen[element.name] == 1 else f"{element.name}_{seen[element.name]}")
+    return tuple(names)
+
+
+def _owners(model: eqx.Module) -> list[tuple[str, eqx.Module]]:
+    """Pair every module of the model with its name in reports."""
+    return [("", model), *zip(element_names(model), getattr(model, "elements", ()), strict=True)]
 
 
 def list_parameters(model: eqx.Module) -> tuple[Parameter, ...]:

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from isojax.identification.fitting._fit import DEFAULT_SOLVER
 
 from isojax import rig
 from isojax._results import RESULTS
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
-from isojax.identification import diagnose, fit, scales
+from isojax.identification import Rules, diagnose, fit, scales
 from isojax.identification.diagnosis._refit import is_determined, refit_candidate
 from isojax.identification.diagnosis._score import score_test
+from isojax.identification.fitting import Search
 from isojax.models import Isolator
 
 PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(1e11), rig.LinearDamping(8e3)))
@@ -29,13 +29,13 @@ def _scored(simulated, effect, rate=200.0):
     campaign = _measured(simulated, effect, rate)
     found, magnitudes = fit(START, campaign), scales(campaign)
     probes = tuple(probe for name in RIVALS for probe in CATALOGUE[name].grid(magnitudes))
-    return score_test(found.estimate, magnitudes, probes), magnitudes
+    return score_test(found.estimate, Search(magnitudes), probes), magnitudes
 
 
 def _refitted(test, magnitudes, name):
     index = next(place for place, score in enumerate(test.scores) if score.element.name == name)
-    found = refit_candidate(test, index, magnitudes, DEFAULT_SOLVER, 40, lambda line: None)
-    assert is_determined(found, test.scores[index])
+    found = refit_candidate(test, index, Search(magnitudes, max_steps=40))
+    assert is_determined(found, test.scores[index], Rules.determined)
     return found
 
 
@@ -87,7 +87,7 @@ def test_play_is_reported_with_the_stop_even_where_the_search_for_the_stop_fails
             return test.fitted._replace(result=RESULTS.outdone)
         return refit_candidate(test, index, *others)
 
-    monkeypatch.setattr("isojax.identification.diagnosis._diagnose.refit_candidate", lost)
+    monkeypatch.setattr("isojax.identification.diagnosis._candidate_refits.refit_candidate", lost)
     # Enough levels that the gap carries over to each from the others.
     plan = rig.Multisine((300.0, 450.0, 600.0), 2.0, 14.0, period=2.0, periods=4, lines="full")
     campaign = _measured(simulated, rig.Freeplay(1e5, 5e-4), plan=plan)

@@ -4,15 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from isojax.identification.fitting._fit import DEFAULT_SOLVER, silent
 
 from isojax import rig
 from isojax._parameters import list_parameters
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
-from isojax.identification import fit, scales
+from isojax.identification import Rules, fit, scales
 from isojax.identification.diagnosis._admissibility import find_violation
 from isojax.identification.diagnosis._refit import is_determined, refit_candidate
 from isojax.identification.diagnosis._score import score_test
+from isojax.identification.fitting import Search
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
@@ -81,7 +81,7 @@ def scored(simulated, case):
     magnitudes = scales(campaign)
     found = fit(START, campaign, integrator=Integrator())
     probes = tuple(probe for name in ASKED for probe in CATALOGUE[name].grid(magnitudes))
-    return score_test(found.estimate, magnitudes, probes), magnitudes, campaign
+    return score_test(found.estimate, Search(magnitudes), probes), magnitudes, campaign
 
 
 @every_case
@@ -96,10 +96,10 @@ def test_the_effect_has_the_largest_score_and_the_sign_of_matter(case, simulated
 @every_case
 def test_its_coefficients_come_back_within_their_errors(case, simulated):
     test, magnitudes, campaign = scored(simulated, case)
-    found = refit_candidate(test, 0, magnitudes, DEFAULT_SOLVER, 40, silent)
+    found = refit_candidate(test, 0, Search(magnitudes, max_steps=40))
     assert found.chi2 / found.dof == pytest.approx(1.0, abs=0.03)
-    assert is_determined(found, test.scores[0])
-    assert find_violation(found.model, campaign.fit_records, "acceleration") is None
+    assert is_determined(found, test.scores[0], Rules.determined)
+    assert find_violation(found.model, campaign.fit_records, "acceleration", Rules()) is None
     listed = list_parameters(found.model)
     values = {
         listed[place].name.split(".")[1]: (float(listed[place].value), float(error))

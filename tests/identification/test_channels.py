@@ -20,6 +20,7 @@ from isojax.elements import (
 )
 from isojax.identification import diagnose, fit, scales
 from isojax.identification.diagnosis._score import score_test
+from isojax.identification.fitting import Search
 from isojax.identification.jacobian._channels import channel_table, drive_harmonic, output_line
 from isojax.models import Isolator
 from isojax.records import Record
@@ -266,6 +267,6 @@ def test_a_held_drive_is_scored_with_its_share_where_one_step_spans_a_sample(sim
     campaign = simulated(plant.plus(rig.InputHold(0.0)), plan, bench=bench)
     truth = Isolator(MASS, (LinearStiffness(STIFFNESS), LinearDamping(DAMPING)))
     found = fit(truth, campaign)
-    (score,) = score_test(found.estimate, scales(campaign), (InputHold(0.0, 0.0),)).scores
+    (score,) = score_test(found.estimate, Search(scales(campaign)), (InputHold(0.0, 0.0),)).scores
     assert score.strength == pytest.approx(1.0, abs=0.05)
     assert score.error < 0.02

@@ -19,6 +19,7 @@ from isojax.elements import (
 )
 from isojax.identification import close_loop, diagnose, extend, fit, residual, scales
 from isojax.identification.diagnosis._score import absent_effects, score_test
+from isojax.identification.fitting import Search
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
@@ -38,7 +39,7 @@ def _campaign(simulated, *effects, **changes):
 
 def _scores(found):
     magnitudes = scales(found.campaign)
-    return score_test(found.estimate, magnitudes, absent_effects(found.model, magnitudes))
+    return score_test(found.estimate, Search(magnitudes), absent_effects(found.model, magnitudes))
 
 
 @pytest.mark.parametrize(
@@ -105,14 +106,16 @@ def test_an_exactly_degenerate_effect_is_hidden(simulated):
     campaign = _campaign(simulated, mass_free=True)
     found = fit(START, campaign, integrator=ONE_STEP)
     magnitudes = scales(campaign)
-    test = score_test(found.estimate, magnitudes, (AddedMass(0.0), InputGain(0.0), SensorGain(0.0)))
+    test = score_test(found.estimate, Search(magnitudes), (AddedMass(0.0), InputGain(0.0), SensorGain(0.0)))
     assert {"added_mass", "input_gain", "sensor_gain"} == set(test.hidden)
     assert test.scores == ()
 
 
 def test_mass_and_gain_errors_look_alike(innocent):
     magnitudes = scales(innocent.campaign)
-    test = score_test(innocent.estimate, magnitudes, (AddedMass(0.0), InputGain(0.0), SensorGain(0.0)))
+    test = score_test(
+        innocent.estimate, Search(magnitudes), (AddedMass(0.0), InputGain(0.0), SensorGain(0.0))
+    )
     assert len(test.scores) == 3
     assert np.abs(test.likeness).min() > 0.999
 

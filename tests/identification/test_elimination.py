@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate, step_nuisances
 
+from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate, step_nuisances
 from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT
 
 NOISE, SPREAD, WITHIN = 0.3, 2e-3, 1e-3
@@ -75,7 +75,7 @@ def setting(request):
     nuisances = _nuisances(rng, within)
     blocks = _blocks(has_scale)
     matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)
-    reduced = eliminate(matrices, NOISE, OWNER, USED, RECORDS, COLUMNS, has_scale, nuisances)
+    reduced = eliminate(matrices[:USED], NOISE, OWNER[:USED], COLUMNS, nuisances)
     rows, right, owner = _dense(blocks, has_scale, nuisances)
     return reduced, nuisances, has_scale, rows, right, owner
 
@@ -121,7 +121,7 @@ def test_a_column_that_is_not_finite_leaves_the_steps_of_the_others_alone():
 
     def moved(matrices, columns):
         with np.errstate(invalid="ignore"):
-            reduced = eliminate(matrices, NOISE, OWNER, USED, RECORDS, COLUMNS, True, nuisances)
+            reduced = eliminate(matrices[:USED], NOISE, OWNER[:USED], COLUMNS, nuisances)
         step = np.linspace(1.0, 2.0, COLUMNS)
         step[1] = 0.0
         return reduced.without(columns), step_nuisances(reduced.without(columns), OWNER, nuisances, step)

@@ -19,17 +19,19 @@ from isojax.elements import (
     MaxwellBranch,
 )
 from isojax.excitations import Sampled
-from isojax.identification import fit, scales
+from isojax.identification import Rules, fit, scales
 from isojax.identification.fitting._build_problem import build_problem
 from isojax.identification.fitting._estimate import estimate
-from isojax.identification.fitting._fit import DEFAULT_SOLVER, silent, simulator_for
+from isojax.identification.fitting._fit import simulator_for
 from isojax.identification.fitting._fit_result import warnings_of
 from isojax.identification.fitting._initial_states import find_initial_states
 from isojax.identification.fitting._integration_steps import find_integrator, step_error
 from isojax.identification.fitting._problem import Problem
+from isojax.identification.fitting._search import Search
 from isojax.identification.jacobian._batch import coordinate_motion
 from isojax.identification.jacobian._segments import cut_segments
 from isojax.models import Integrator, Isolator, simulate
+from isojax.records import estimate_noise
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
 START = Isolator(800.0, (LinearStiffness(1.0e6), LinearDamping(1.3e4)))
@@ -84,15 +86,10 @@ def test_covariance_is_the_same_from_three_starts(linear):
     for stiffness, damping in ((9e5, 5e3), (1.25e6, 2e4), (1.08e6, 1e4)):
         start = START.replace(linear_stiffness__coefficient=stiffness, linear_damping__coefficient=damping)
         found = estimate(
-            simulator_for(start, linear, 0.01, ONE_STEP),
+            simulator_for(start, linear, estimate_noise(linear), ONE_STEP, Rules()),
             start,
             (1, 2),
-            scales(linear),
-            nuisances=None,
-            solver=DEFAULT_SOLVER,
-            max_steps=40,
-            progress=silent,
-            tolerance=1e-12,
+            Search(scales(linear), max_steps=40, tolerance=1e-12),
         )
         covariances.append(found.uncertainty.covariance)
     np.testing.assert_allclose(covariances[1], covariances[0], rtol=1e-6)
@@ -353,7 +350,7 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
     problem = _stiff_problem(simulated, model)
     coarse, fine = step_error(problem, model, 1), step_error(problem, model, 2)
     assert coarse / fine == pytest.approx(16.0, rel=0.35)
-    chosen = find_integrator(problem, model).integrator
+    chosen = find_integrator(problem, model, 0.05).integrator
     assert chosen.substeps > 1
     assert (
         step_error(problem, model, chosen.substeps) <= 0.05 < step_error(problem, model, chosen.substeps // 2)
@@ -363,7 +360,7 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
 def test_an_element_with_a_sharp_law_keeps_its_own_steps(simulated):
     model = START.with_elements(LugreFriction(1.0, 1e-3, 0.0, 1e-2, 1e-3))
     problem = _stiff_problem(simulated, model)._replace(noise=1e3)
-    assert find_integrator(problem, model).integrator.substeps == LugreFriction.substeps
+    assert find_integrator(problem, model, 0.05).integrator.substeps == LugreFriction.substeps
     # Dry friction is split at its reversals instead.
     model = START.with_elements(CoulombFriction(1.0, 1.0))
-    assert find_integrator(problem, model).integrator.substeps == 1
+    assert find_integrator(problem, model, 0.05).integrator.substeps == 1

@@ -17,11 +17,12 @@ from isojax.elements import (
     LinearDamping,
     LinearStiffness,
 )
-from isojax.identification import fit, scales
+from isojax.identification import Rules, fit, scales
 from isojax.identification.diagnosis._refit import polish
 from isojax.identification.diagnosis._score import absent_effects, score_test
 from isojax.identification.fitting._elimination import Nuisances, Reduced, Spread
 from isojax.identification.fitting._problem import Point
+from isojax.identification.fitting._search import Search
 from isojax.identification.fitting._segment_scatter import segment_scatter
 from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT
 from isojax.identification.jacobian._segments import Segment
@@ -53,7 +54,7 @@ def test_scatter_from_dwell_to_dwell_is_told_by_repeats_and_taken_for_no_effect(
     magnitudes = scales(campaign)
 
     def surest(found):
-        test = score_test(found.estimate, magnitudes, absent_effects(found.model, magnitudes))
+        test = score_test(found.estimate, Search(magnitudes), absent_effects(found.model, magnitudes))
         return min(score.p_value for score in test.scores)
 
     found = fit(START, campaign)
@@ -86,7 +87,7 @@ def test_scatter_that_a_wrong_model_showed_is_given_up_with_the_finding(simulate
     old = right.estimate.point.nuisances
     moved = old._replace(spread=Spread(old.spread.records, 1e-3), segments=old.segments + 1e-3)
     wrong = right.estimate._replace(point=right.estimate.point._replace(nuisances=moved))
-    again = polish(wrong, scales(campaign), optx.LevenbergMarquardt(1e-3, 1e-3), lambda line: None)
+    again = polish(wrong, Search(scales(campaign), solver=optx.LevenbergMarquardt(1e-3, 1e-3)))
     assert again.point.nuisances.spread.segments == 0.0
     np.testing.assert_array_equal(again.point.nuisances.segments, 0.0)
     np.testing.assert_allclose(
@@ -159,7 +160,7 @@ def _told(
     own = known * apparent / STIFFNESS_SCALE_UNIT
     nuisances = Nuisances(nothing, np.zeros(2), own, Spread(1e-2))
     point = Point(START, nuisances, reduced, np.ones(2))
-    return segment_scatter(records, segments, point, assumed**-2)
+    return segment_scatter(records, segments, point, assumed**-2, Rules())
 
 
 @pytest.mark.parametrize(("scatter", "within"), [(5e-4, 0.2), (1e-3, 0.1), (4e-3, 0.05)])

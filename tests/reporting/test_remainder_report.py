@@ -1,5 +1,6 @@
 """The section "Unexplained residual", on the demo's dry friction treated as if no effect explained it."""
 
+import dataclasses
 import json
 import re
 
@@ -7,7 +8,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from isojax import plot
-from isojax.identification import loop_remainder
 from isojax.reporting import loop_summary, render_page, render_text, result_dict
 
 LAW = {"formula", "coefficient", "standard_error", "unit", "share", "alike"}
@@ -17,25 +17,27 @@ LAW = {"formula", "coefficient", "standard_error", "unit", "share", "alike"}
 def unexplained(found):
     """The loop before friction was added, as if nothing had been found."""
     verdict = found.last._replace(verdict="unexplained", bounds={}, reason="Nothing explains it.")
-    return found._replace(extensions=(), after=found.before, verdict="unexplained", last=verdict, bounds={})
+    return dataclasses.replace(
+        found, extensions=(), after=found.before, verdict="unexplained", last=verdict, bounds={}
+    )
 
 
 @pytest.mark.slow
 def test_the_residual_is_described_once(unexplained):
-    first = loop_remainder(unexplained)
+    first = unexplained.remainder
     assert first is not None
-    assert loop_remainder(unexplained) is first
+    assert unexplained.remainder is first
 
 
 @pytest.mark.slow
 def test_nothing_is_described_where_the_verdict_is_another(found, written):
-    assert loop_remainder(found) is None
+    assert found.remainder is None
     assert "Unexplained residual" not in (written / "report.html").read_text(encoding="utf-8")
     assert "remainder" not in result_dict(found)
 
 
 def test_dry_friction_is_pursued_as_a_force_that_opposes_the_velocity(unexplained):
-    remainder = loop_remainder(unexplained)
+    remainder = unexplained.remainder
     assert remainder is not None
     first = remainder.pursuit.laws[0]
     assert "sgn(v)" in (first.formula, *first.alike)
@@ -65,7 +67,7 @@ def test_result_holds_the_same_facts(unexplained):
 
 
 def test_every_picture_draws_on_the_axes_it_is_given_and_labels_them(unexplained):
-    remainder = loop_remainder(unexplained)
+    remainder = unexplained.remainder
     assert remainder is not None
     axes = Figure().subplots(1, 3)
     drawn = (

@@ -1,3 +1,4 @@
+import dataclasses
 import json
 from types import SimpleNamespace
 
@@ -95,7 +96,7 @@ def test_failed_fit_is_written_with_nulls_and_said_in_the_report(plain, tmp_path
     runs, restarts = plain.after.free_runs, plain.after.restarts
     held = SimpleNamespace(errors={"fit": unknown, "holdout": None}, free_runs=runs, restarts=restarts)
     failed = plain.after._replace(result=RESULTS.not_converged, evaluation=held)
-    loop = plain._replace(before=failed, after=failed, verdict="unexplained")
+    loop = dataclasses.replace(plain, before=failed, after=failed, verdict="unexplained")
     ClosedLoop(loop).report(tmp_path / "deep" / "out")
     result = json.loads((tmp_path / "deep" / "out" / "result.json").read_text(encoding="utf-8"))
     assert set(result["after"]["error"]["fit"].values()) == {None}
@@ -124,5 +125,5 @@ def test_a_file_in_the_way_is_refused_and_nothing_is_written(found, tmp_path):
 def test_a_model_that_is_not_finite_writes_nothing(found, tmp_path):
     model = found.after.model.replace(coulomb_friction__force_level=np.nan)
     with pytest.raises(ValueError, match=r"coulomb_friction\.force_level"):
-        write_report(found._replace(after=found.after._replace(model=model)), tmp_path / "out")
+        write_report(dataclasses.replace(found, after=found.after._replace(model=model)), tmp_path / "out")
     assert not (tmp_path / "out").exists()

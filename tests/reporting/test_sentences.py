@@ -23,7 +23,7 @@ from isojax.reporting.words._sentences import caveats, doubt_words, finding_word
     ],
 )
 def test_headline_says_what_the_verdict_says(found, verdict, start):
-    sentence = headline(found._replace(verdict=verdict))
+    sentence = headline(dataclasses.replace(found, verdict=verdict))
     assert sentence.startswith(start)
     assert ("something else is too" in sentence) == (verdict == "partly_explained")
     assert sentence.endswith(".")
@@ -52,10 +52,10 @@ def test_what_held_out_records_say_against_a_finding_is_told(
         return {"holdout": Errors(0.01, 0.04, 0.04, before if held is found.before else after, samples)}
 
     monkeypatch.setattr(Fit, "errors", property(errors))
-    told = doubt_words(found._replace(verdict=verdict))
+    told = doubt_words(dataclasses.replace(found, verdict=verdict))
     assert told.endswith(said)
     assert bool(told) == bool(said)
-    assert doubt_words(found._replace(verdict="none", extensions=())) == ""
+    assert doubt_words(dataclasses.replace(found, verdict="none", extensions=())) == ""
 
 
 def test_of_what_is_below_the_noise_no_share_is_told(found):
@@ -73,10 +73,10 @@ def test_a_doubt_stands_in_the_headline(found, monkeypatch):
 
 
 def test_headline_without_findings_names_nothing(found):
-    alone = found._replace(extensions=(), after=found.before)
-    assert headline(alone._replace(verdict="none")).startswith("Nothing is missing")
+    alone = dataclasses.replace(found, extensions=(), after=found.before)
+    assert headline(dataclasses.replace(alone, verdict="none")).startswith("Nothing is missing")
     for verdict in ("partly_explained", "unexplained"):
-        sentence = headline(alone._replace(verdict=verdict))
+        sentence = headline(dataclasses.replace(alone, verdict=verdict))
         assert sentence.startswith("Something is missing that no known effect explains; held-out χ²/dof")
         assert "→" not in sentence
 
@@ -87,7 +87,7 @@ def test_a_finding_that_a_later_one_contains_is_told_by_that(found):
     later = step._replace(verdict=step.verdict._replace(finding=finding))
     model = found.after.model.with_elements(StribeckFriction(4.0, 0.8, 0.01, 1e-4))
     after = found.after._replace(model=model)
-    both = found._replace(extensions=(step, later), after=after)
+    both = dataclasses.replace(found, extensions=(step, later), after=after)
     assert [one.effect for one in both.findings] == ["stribeck_friction"]
     assert headline(both).startswith("Falling (Stribeck) friction")
     assert len(budget_words(DriftBudget(math.nan, ()), after, both.findings)) == 0
@@ -95,7 +95,7 @@ def test_a_finding_that_a_later_one_contains_is_told_by_that(found):
 
 def test_more_than_two_findings_of_a_good_fit_are_said_to_explain_it(found):
     (step,) = found.extensions
-    sentence = headline(found._replace(extensions=(step,) * 3, verdict="partly_explained"))
+    sentence = headline(dataclasses.replace(found, extensions=(step,) * 3, verdict="partly_explained"))
     assert "explain the records together" in sentence
     assert "something else is too" not in sentence
 

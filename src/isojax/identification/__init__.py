@@ -1,12 +1,12 @@
 """From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop."""
 
+from ._close_loop import Loop as Loop
 from ._close_loop import close_loop as close_loop
 from ._close_loop import extend as extend
-from .diagnosis import GOOD as GOOD
+from ._rules import Rules as Rules
 from .diagnosis import Candidate as Candidate
 from .diagnosis import Extension as Extension
 from .diagnosis import Finding as Finding
-from .diagnosis import Loop as Loop
 from .diagnosis import Separation as Separation
 from .diagnosis import Verdict as Verdict
 from .diagnosis import diagnose as diagnose
@@ -48,4 +48,3 @@ from .remainder import PursuedLaw as PursuedLaw
 from .remainder import Pursuit as Pursuit
 from .remainder import Remainder as Remainder
 from .remainder import explain_remainder as explain_remainder
-from .remainder import loop_remainder as loop_remainder

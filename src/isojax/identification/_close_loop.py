@@ -1,37 +1,78 @@
 """The closed loop: fit, find what is missing, add it, and again until nothing is left."""
 
+import dataclasses
 import time
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from .._results import RESULTS, is_successful
 from ..elements import CATALOGUE
 from ..records import Campaign
+from ._rules import Rules
 from .diagnosis import (
-    MOST_OF_IT,
     Extension,
-    Loop,
+    Finding,
     Verdict,
     VerdictWord,
     bic,
-    diagnose,
+    diagnose_with,
     find_superfluous,
     findings_in,
     is_clean,
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, complete, fit, silent
-from .guess import classical_guess
-from .guess import scales as campaign_scales
+from .fitting import DEFAULT_SOLVER, Fit, Search, complete, fit, search_of, silent
+from .guess import ClassicalGuess, classical_guess
+from .remainder import Remainder, explain_remainder
 
-MOST_AT_ONCE = 2
-"""Effects that explain all a campaign lacks. More are rather the parts by which they imitate one law that the
-catalogue does not have, so that no more than "partly explained" is said of them."""
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Loop:
+    """The closed loop: from records to a model that explains them, or to the admission that it does not.
+
+    Attributes:
+        campaign: the measurements.
+        guess: the classical start.
+        before: the declared model, fitted.
+        extensions: each effect that was added, in the order of discovery.
+        after: the final fit (the same as `before` where nothing was added).
+        verdict: over all iterations.
+        last: the diagnosis of the final fit; what it found, if anything, is not added any more.
+        bounds: for each effect that was not found, how large its strength could still be beside the
+            final model, with its unit; empty where its fit is not good.
+        seconds: wall time.
+        rules: the numbers that decided.
+    """
+
+    campaign: Campaign
+    guess: ClassicalGuess
+    before: Fit
+    extensions: tuple[Extension, ...]
+    after: Fit
+    verdict: VerdictWord
+    last: Verdict
+    bounds: dict[str, tuple[float, str]]
+    seconds: float
+    rules: Rules = Rules()
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The effects found, in the order of discovery; not those that a later one contains."""
+        return findings_in(self.after.model, self.extensions)
+
+    @cached_property
+    def remainder(self) -> Remainder | None:
+        """What the last fit leaves; None where the verdict claims no remainder, or the fit failed."""
+        asked = self.verdict in ("unexplained", "partly_explained")
+        if not (asked and is_successful(self.after.result) and self.after.estimate.point.is_finite):
+            return None
+        return explain_remainder(self.after, rules=self.rules)
 
 
 def extend(before: Fit, verdict: Verdict) -> Extension:
-    """Add the effect that a diagnosis found, and hold the new model against every record.
+    """Add the effect that a diagnosis found, and compare the new model with every record.
 
     Args:
         before: the fit that was diagnosed.
@@ -59,6 +100,7 @@ def close_loop(
     excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
+    rules: Rules = Rules(),
 ) -> Loop:
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 
@@ -69,7 +111,8 @@ def close_loop(
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.
-        progress: told a line a step.
+        progress: receives a line a step.
+        rules: the numbers that decide verdicts.
 
     Returns:
         The loop: fits before and after, the findings, and the verdict over all.
@@ -83,115 +126,115 @@ def close_loop(
     unknown = [name for name in excluded if name not in CATALOGUE]
     if unknown:
         raise ValueError(f"Argument `excluded` must hold catalogue names, but {unknown[0]!r} is none.")
-    begin = time.perf_counter()
+    start = time.perf_counter()
     progress("classical guess")
-    guess = classical_guess(campaign)
+    guess = classical_guess(campaign, rules=rules)
     progress("fit of the declared model")
-    before = current = fit(guess.model, campaign, solver=solver, progress=progress)
-    first = before.estimate.excess
-    extensions, verdict = _grow(before, first, excluded, max_iterations, solver, progress)
-    extensions, verdict = _revise(
-        before, first, extensions, verdict, excluded, max_iterations, solver, progress
+    before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules)
+    extensions, verdict = search_effects(
+        before, search_of(campaign, rules, solver, progress), max_iterations, excluded
     )
-    extensions = tuple(map(with_separating_experiment, extensions))
-    current = extensions[-1].after if extensions else before
-    if not is_successful(current.result):
-        verdict = _without_evidence(current)
+    extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
+    after = extensions[-1].after if extensions else before
+    if not is_successful(after.result):
+        verdict = _without_evidence(after)
     elif verdict.refit is not None:
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
     # Asked for here, so that the time of the loop counts it.
-    for when, held in (("before", before), ("after", current)):
-        progress(f"free-run error {when}: {held.nrmse:.4g} of the measured rms")
+    for when, compared in (("before", before), ("after", after)):
+        progress(f"free-run error {when}: {compared.nrmse:.4g} of the measured rms")
     return Loop(
         campaign,
         guess,
         before,
         extensions,
-        current,
-        _overall(before, current, len(findings_in(current.model, extensions)), verdict),
+        after,
+        overall_verdict(before, after, len(findings_in(after.model, extensions)), verdict, rules),
         verdict,
         verdict.bounds,
-        time.perf_counter() - begin,
+        time.perf_counter() - start,
+        rules,
     )
 
 
 def _without_evidence(failed: Fit) -> Verdict:
-    """Say that a fit that failed tells nothing: no ranking and no bound may come of it."""
+    """Say that a fit that failed says nothing: no ranking and no bound may come of it."""
     reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[failed.result]}"
     return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
 
 
+def search_effects(
+    before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...] = ()
+) -> tuple[tuple[Extension, ...], Verdict]:
+    """Add effects until nothing is left to add; search again without one that later ones made superfluous.
+
+    Args:
+        before: the declared model, fitted.
+        search: how to search.
+        max_iterations: effects that may be added at most.
+        excluded: catalogue names that are not to be considered.
+
+    Returns:
+        The steps of the better model, and its last diagnosis.
+    """
+    extensions, verdict = _grow(before, search, max_iterations, excluded)
+    if len(extensions) < 2:
+        return extensions, verdict
+    final = extensions[-1].after.estimate
+    earlier = tuple(
+        step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
+    )
+    doubtful = find_superfluous(final, earlier, search)
+    if doubtful is None:
+        return extensions, verdict
+    search.progress(f"{doubtful} is not needed beside the later findings: search again without it")
+    again, last = _grow(before, search, max_iterations, (*excluded, doubtful))
+    if not again:
+        return extensions, verdict
+    new = again[-1].after.estimate
+    inflation = max(1.0, min(new.chi2 / new.dof, final.chi2 / final.dof))
+    return (again, last) if bic(new, inflation) <= bic(final, inflation) else (extensions, verdict)
+
+
 def _grow(
-    before: Fit,
-    first_excess: float,
-    excluded: tuple[str, ...],
-    max_iterations: int,
-    solver: Any,
-    progress: Callable[[str], None],
+    before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...]
 ) -> tuple[tuple[Extension, ...], Verdict]:
     """Add effects until nothing is left to add; give the steps and the last diagnosis.
 
-    A good fit is looked at like any other: a second effect may still stand out of what is left.
+    A good fit is diagnosed like any other: a second effect may still stand out of what is left.
     """
     extensions: tuple[Extension, ...] = ()
-    current, significance = before, 0.01
+    current, significance = before, search.rules.significance
     while True:
-        verdict = diagnose(
-            current,
-            first_excess=first_excess,
-            significance=significance,
-            excluded=excluded,
-            solver=solver,
-            progress=progress,
-        )
-        progress(verdict.reason)
+        verdict = diagnose_with(search, current, before.estimate.excess, significance, excluded)
+        search.progress(verdict.reason)
         if verdict.refit is None or len(extensions) == max_iterations:
             return extensions, verdict
         extensions = (*extensions, extend(current, verdict))
         current = extensions[-1].after
-        significance *= 0.5
+        significance *= search.rules.significance_factor
 
 
-def _revise(
-    before: Fit,
-    first_excess: float,
-    extensions: tuple[Extension, ...],
-    verdict: Verdict,
-    excluded: tuple[str, ...],
-    max_iterations: int,
-    solver: Any,
-    progress: Callable[[str], None],
-) -> tuple[tuple[Extension, ...], Verdict]:
-    """Search again without an effect that the later ones made superfluous; keep the better model."""
-    if len(extensions) < 2:
-        return extensions, verdict
-    final = extensions[-1].after
-    earlier = tuple(
-        step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
-    )
-    doubtful = find_superfluous(
-        final.estimate, earlier, final.campaign, campaign_scales(final.campaign), solver, progress
-    )
-    if doubtful is None:
-        return extensions, verdict
-    progress(f"{doubtful} is not needed beside the later findings: search again without it")
-    again, last = _grow(before, first_excess, (*excluded, doubtful), max_iterations, solver, progress)
-    if not again:
-        return extensions, verdict
-    new, old = again[-1].after.estimate, final.estimate
-    inflation = max(1.0, min(new.chi2 / new.dof, old.chi2 / old.dof))
-    return (again, last) if bic(new, inflation) <= bic(old, inflation) else (extensions, verdict)
+def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules: Rules) -> VerdictWord:
+    """Give the verdict over all iterations.
 
+    Args:
+        before: the declared model, fitted.
+        final: the last fit.
+        findings: count of the effects that it has more.
+        last: its diagnosis.
+        rules: the numbers that decide.
 
-def _overall(before: Fit, final: Fit, findings: int, last: Verdict) -> VerdictWord:
-    """Give the verdict over all iterations."""
-    found = final.estimate
-    first = before.estimate
-    good = is_good(found.chi2 / found.dof, found.excess, first.excess)
+    Returns:
+        The verdict in one word.
+    """
+    first, found = before.estimate, final.estimate
     if not findings or not is_successful(final.result):
         return last.verdict
+    good = is_good(found.chi2 / found.dof, found.excess, first.excess, rules)
     explained = 1.0 - found.excess / max(first.excess, 1.0)
-    if good and findings <= MOST_AT_ONCE and (is_clean(first, found) or explained >= MOST_OF_IT):
+    most_of_it = explained >= rules.most_of_it
+    if good and findings <= rules.most_at_once and (is_clean(first, found, rules) or most_of_it):
         return "found"
-    return "partly_explained" if explained >= MOST_OF_IT else "unexplained"
+    return "partly_explained" if most_of_it else "unexplained"

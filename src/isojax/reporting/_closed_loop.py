@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..health import CampaignHealth, campaign_health
-from ..identification import DEFAULT_SOLVER, ClassicalGuess, Finding, Fit, Loop, silent
+from ..identification import DEFAULT_SOLVER, ClassicalGuess, Finding, Fit, Loop, Rules, silent
 from ..identification import close_loop as find_loop
 from ..records import Campaign
 from .page import loop_summary, render_text, write_report
@@ -86,6 +86,7 @@ def close_loop(
     max_iterations: int = 3,
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
+    rules: Rules = Rules(),
 ) -> ClosedLoop:
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 
@@ -93,7 +94,8 @@ def close_loop(
         campaign: the measurements.
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         solver: an optimistix least-squares solver.
-        progress: told a line a step.
+        progress: receives a line a step.
+        rules: the numbers that decide verdicts.
 
     Returns:
         The closed loop; `.report(folder)` writes it, `print` shows it.
@@ -102,4 +104,5 @@ def close_loop(
         ValueError: if the campaign has no record to fit, or names an effect that is not in the catalogue.
         RuntimeError: if JAX is not in 64-bit mode.
     """
-    return ClosedLoop(find_loop(campaign, max_iterations=max_iterations, solver=solver, progress=progress))
+    loop = find_loop(campaign, max_iterations=max_iterations, solver=solver, progress=progress, rules=rules)
+    return ClosedLoop(loop)

@@ -1,23 +1,25 @@
-"""isojax.identification.diagnose."""
+"""What a fitted model lacks: absent effects scored, refitted, and named or rejected.
 
-from ._bounds import GOOD as GOOD
-from ._diagnose import CLOSE_LIKENESS as CLOSE_LIKENESS
-from ._diagnose import MOST_OF_IT as MOST_OF_IT
+In: a `Fit`. Out: a `Verdict`, with a `Finding` where an effect is missing.
+Read `_diagnose` (the door, and the verdict), then in the order in which it asks them `_score` and
+`_projection` (traces of all absent effects), `_candidate_refits` and `_refit` (the strongest, everything
+free), `_imitations`, `_admissibility` and `_passivity` (what speaks against them), `_evidence`, `_transfer`
+and `_bounds`. `_findings` and `_separation` hold the results.
+"""
+
 from ._diagnose import diagnose as diagnose
+from ._diagnose import diagnose_with as diagnose_with
 from ._diagnose import is_clean as is_clean
 from ._diagnose import is_good as is_good
-from ._evidence import CLOSE_BIC as CLOSE_BIC
 from ._findings import Candidate as Candidate
 from ._findings import Extension as Extension
 from ._findings import Finding as Finding
-from ._findings import Loop as Loop
 from ._findings import Verdict as Verdict
 from ._findings import VerdictWord as VerdictWord
 from ._findings import findings_in as findings_in
 from ._imitations import find_superfluous as find_superfluous
 from ._projection import Projection as Projection
 from ._projection import project as project
-from ._refit import SMALLEST_GAIN as SMALLEST_GAIN
 from ._refit import bic as bic
 from ._refit import refit_from as refit_from
 from ._separation import AGAIN as AGAIN

@@ -7,26 +7,30 @@ from jaxtyping import Float
 
 from ...models import Isolator, Quantity
 from ...records import Record
+from .._rules import Rules
 from ..jacobian import coordinate_motion
 from ._passivity import find_activity
 
 
-def visited_range(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> tuple[float, float]:
+def visited_range(
+    model: Isolator, records: tuple[Record, ...], quantity: Quantity, rules: Rules
+) -> tuple[float, float]:
     """Give the largest displacement [m] and velocity [m/s] that dwells and windows reached.
 
     Args:
         model: the isolator, for what its coordinate is.
         records: the records.
         quantity: what the sensor measures.
+        rules: the quantile to take.
 
     Returns:
-        Both, as 99.5 % quantiles: integrals of a measured acceleration are rough at the ends of a record.
+        Both, as quantiles: integrals of a measured acceleration are rough at the ends of a record.
     """
     based = model.excitation == "base_acceleration"
     states = [coordinate_motion(record, quantity, based) for record in records]
     return (
-        float(max(np.quantile(np.abs(x), 0.995) for x, _ in states)),
-        float(max(np.quantile(np.abs(v), 0.995) for _, v in states)),
+        float(max(np.quantile(np.abs(x), rules.visited_quantile) for x, _ in states)),
+        float(max(np.quantile(np.abs(v), rules.visited_quantile) for _, v in states)),
     )
 
 
@@ -35,7 +39,9 @@ def _static_force(model: Isolator, x: Float[jax.Array, ""], v: Float[jax.Array, 
     return model.restoring_force((x, v, *(jnp.zeros(()),) * model.internal_states))
 
 
-def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
+def find_violation(
+    model: Isolator, records: tuple[Record, ...], quantity: Quantity, rules: Rules
+) -> str | None:
     """Find what is unphysical in a model over the visited motion, if anything.
 
     The static tangent stiffness must be positive wherever the model has a linear spring. The static damping
@@ -46,11 +52,12 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
         model: the isolator.
         records: the records.
         quantity: what the sensor measures.
+        rules: which motion counts, and when a loop gives energy.
 
     Returns:
         A sentence, or None.
     """
-    largest_x, largest_v = visited_range(model, records, quantity)
+    largest_x, largest_v = visited_range(model, records, quantity, rules)
     passive, still = (
         Isolator(model.mass, tuple(one for one in model.elements if not one.active)),
         jnp.zeros(()),
@@ -73,5 +80,5 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
     if float(power.min()) < -1e-9 * float(jnp.abs(power).max()):
         where = 1e3 * float(speeds[int(jnp.argmin(power))])
         return f"its damping feeds energy in at {where:.3g} mm/s, within the visited motion"
-    activities = (find_activity(element, largest_x, largest_v) for element in model.elements)
+    activities = (find_activity(element, largest_x, largest_v, rules) for element in model.elements)
     return next((sentence for sentence in activities if sentence is not None), None)

@@ -4,11 +4,9 @@ import numpy as np
 
 from ..._parameters import own_parameters
 from ...elements import AbstractElement
+from .._rules import Rules
 from ..fitting import Estimate
 from ._score import ScoreTest
-
-GOOD = 1.05
-"""chi2/dof up to which a fit is good."""
 
 
 def strength_unit(element: AbstractElement) -> str:
@@ -23,7 +21,9 @@ def strength_unit(element: AbstractElement) -> str:
     return dict(own_parameters(element))[element.strength].unit
 
 
-def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
+def upper_bounds(
+    test: ScoreTest, fitted: Estimate, found: str | None, rules: Rules
+) -> dict[str, tuple[float, str]]:
     """Say how large each effect that was not found could still be.
 
     A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
@@ -33,11 +33,12 @@ def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[s
         test: the score test.
         fitted: the fit.
         found: catalogue name of the effect that was found, or None.
+        rules: when a fit is good.
 
     Returns:
         `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name; empty unless the fit is good.
     """
-    if fitted.chi2 / fitted.dof > GOOD:
+    if fitted.chi2 / fitted.dof > rules.good:
         return {}
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {

@@ -1,23 +1,23 @@
 """What ranks the refits of candidates: evidence, and simplicity where it does not decide."""
 
 from ..._parameters import list_parameters
+from .._rules import Rules
 from ..fitting import Estimate
 from ._bounds import strength_unit
 from ._findings import Candidate
-from ._refit import SMALLEST_GAIN, Refit, bic, strength_place
+from ._refit import Refit, bic, strength_place
 from ._score import Score, ScoreTest
 
-CLOSE_BIC = 10.0
-"""Difference of Schwarz's criterion up to which two effects are not told apart, however few the samples."""
 
-
-def by_evidence(refits: list[Refit]) -> list[Refit]:
+def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
     """List the refits that nothing speaks against, best first.
 
-    Of those that these data do not tell apart the simplest goes first: fewest coefficients, then memories.
+    Of those that these data do not distinguish the simplest goes first: fewest coefficients, then internal
+    states.
 
     Args:
         refits: all of them.
+        rules: the evidence that distinguishes two effects.
 
     Returns:
         Those without a violation.
@@ -27,7 +27,7 @@ def by_evidence(refits: list[Refit]) -> list[Refit]:
         return usable
     inflation = smallest_inflation(usable)
     usable = sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
-    most = bic(usable[0].estimate, inflation) + least_difference(usable[0].estimate)
+    most = bic(usable[0].estimate, inflation) + least_difference(usable[0].estimate, rules)
 
     def simplicity(refit: Refit) -> tuple[int, int]:
         return len(refit.estimate.places), refit.estimate.model.internal_states
@@ -36,16 +36,17 @@ def by_evidence(refits: list[Refit]) -> list[Refit]:
     return [first, *(one for one in usable if one is not first)]
 
 
-def least_difference(found: Estimate) -> float:
-    """Give the difference of Schwarz's criterion up to which two effects are not told apart.
+def least_difference(found: Estimate, rules: Rules) -> float:
+    """Give the difference of Schwarz's criterion up to which two effects are indistinguishable.
 
     Args:
         found: the better one.
+        rules: clear evidence, and the smallest gain that is no tie.
 
     Returns:
         The difference.
     """
-    return max(CLOSE_BIC, SMALLEST_GAIN * found.dof)
+    return max(rules.close_bic, rules.smallest_gain * found.dof)
 
 
 def smallest_inflation(usable: list[Refit]) -> float:

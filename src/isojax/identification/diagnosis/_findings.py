@@ -4,9 +4,7 @@ from typing import Literal, NamedTuple
 
 from ...elements import AbstractElement
 from ...models import Isolator
-from ...records import Campaign
 from ..fitting import Estimate, Fit
-from ..guess import ClassicalGuess
 from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
@@ -116,38 +114,6 @@ class Extension(NamedTuple):
     def after(self) -> Fit:
         """The fit with the effect."""
         return self.fit
-
-
-class Loop(NamedTuple):
-    """The closed loop: from records to a model that explains them, or to the admission that it does not.
-
-    Attributes:
-        campaign: the measurements.
-        guess: the classical start.
-        before: the declared model, fitted.
-        extensions: each effect that was added, in the order of discovery.
-        after: the final fit (the same as `before` where nothing was added).
-        verdict: over all iterations.
-        last: the diagnosis of the final fit; what it found, if anything, is not added any more.
-        bounds: for each effect that was not found, how large its strength could still be beside the
-            final model, with its unit; empty where its fit is not good.
-        seconds: wall time.
-    """
-
-    campaign: Campaign
-    guess: ClassicalGuess
-    before: Fit
-    extensions: tuple[Extension, ...]
-    after: Fit
-    verdict: VerdictWord
-    last: Verdict
-    bounds: dict[str, tuple[float, str]]
-    seconds: float
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """The effects found, in the order of discovery; one that a later one contains is told by that."""
-        return findings_in(self.after.model, self.extensions)
 
 
 def findings_in(model: Isolator, extensions: tuple[Extension, ...]) -> tuple[Finding, ...]:

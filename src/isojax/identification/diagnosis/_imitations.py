@@ -1,84 +1,65 @@
 """Two simple effects against one law of many coefficients; effects that later ones made superfluous."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import NamedTuple
 
 from ..._results import RESULTS
-from ...elements import Scales
 from ...models import Isolator
-from ...records import Campaign
-from ..fitting import Estimate
+from ..fitting import Estimate, Search
 from ._admissibility import find_violation
 from ._refit import Refit, bic, follows_freely, is_determined, refit_candidate, refit_from
 from ._score import absent_effects, score_test
 
-CLEARLY = 10.0
-"""Difference of Schwarz's criterion that counts as clear."""
 
-TRIED = 2
-"""Partners that are refitted."""
+class _Opponent(NamedTuple):
+    """The model that a smaller one with a partner must beat.
 
-ROOM = 1.5
-"""Times its squared score, a partner may gain at most: a score is a linear step."""
+    Attributes:
+        estimate: the model, fitted.
+        gained: by how much Schwarz's criterion of another estimate is lower.
+    """
+
+    estimate: Estimate
+    gained: Callable[[Estimate], float]
 
 
-def _best_addition(
-    found: Estimate,
-    campaign: Campaign,
-    scales: Scales,
-    excluded: tuple[str, ...],
-    most: int,
-    to_beat: Callable[[Estimate], float],
-    needed: float,
-    solver: Any,
-    progress: Callable[[str], None],
-) -> Estimate | None:
-    """Add the one effect that makes a model explain as much as another.
+def _best_addition(found: Estimate, excluded: str, opponent: _Opponent, search: Search) -> Estimate | None:
+    """Add the one effect that makes a model clearly better than another of as many coefficients.
 
     Args:
         found: the model to add to, fitted.
-        campaign: the measurements.
-        scales: magnitudes of the records.
-        excluded: catalogue names that are not to be considered.
-        most: coefficients that the result may have.
-        to_beat: how much Schwarz's criterion falls below that of the other model.
-        needed: chi2 that the addition must reach to matter.
-        solver: an optimistix least-squares solver.
-        progress: told a line a step.
+        excluded: catalogue name of the effect that is not to be considered.
+        opponent: the other model.
+        search: how to search.
 
     Returns:
         The first admissible refit that is clearly better, or None.
     """
-    test = score_test(found, scales, absent_effects(found.model, scales, excluded))
+    rules, other = search.rules, opponent.estimate
+    search = search._replace(max_steps=rules.partner_evaluations)
+    test = score_test(found, search, absent_effects(found.model, search.scales, (excluded,)))
     tried = 0
     for index, score in enumerate(test.scores):
-        if tried == TRIED or found.chi2 - ROOM * score.z**2 > needed:
+        if tried == rules.tried or found.chi2 - rules.room * score.z**2 > other.chi2:
             break
         if not score.admissible:
             continue
         tried += 1
-        progress(f"refit with {score.element.name} beside {found.model.elements[-1].name}")
-        pair = refit_candidate(test, index, scales, solver, 20, progress)
+        search.progress(f"refit with {score.element.name} beside {found.model.elements[-1].name}")
+        pair = refit_candidate(test, index, search)
         if (
             pair.result == RESULTS.successful
-            and len(pair.places) <= most
-            and to_beat(pair) > CLEARLY
-            and is_determined(pair, score)
-            and find_violation(pair.model, campaign.fit_records, pair.simulator.problem.quantity) is None
+            and len(pair.places) <= len(other.places)
+            and opponent.gained(pair) > rules.close_bic
+            and is_determined(pair, score, rules.determined)
+            and find_violation(pair.model, pair.problem.records, pair.problem.quantity, rules) is None
             and follows_freely(found, pair)
         ):
             return pair
     return None
 
 
-def find_simpler_pair(
-    fitted: Estimate,
-    usable: list[Refit],
-    campaign: Campaign,
-    scales: Scales,
-    solver: Any,
-    progress: Callable[[str], None],
-) -> str | None:
+def find_simpler_pair(fitted: Estimate, usable: list[Refit], search: Search) -> str | None:
     """Say which two simpler effects explain clearly more than the best candidate, at no more coefficients.
 
     A search that adds one effect a time prefers a law of three coefficients that imitates two effects a
@@ -87,10 +68,7 @@ def find_simpler_pair(
     Args:
         fitted: the estimate without any of them.
         usable: admissible refits, best first.
-        campaign: the measurements.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        progress: told a line a step.
+        search: how to search.
 
     Returns:
         Both names in words, or None where the best candidate stands.
@@ -106,31 +84,15 @@ def find_simpler_pair(
         inflation = max(1.0, pair.chi2 / pair.dof)
         return bic(best, inflation) - bic(pair, inflation)
 
-    progress(f"can two simpler effects do better than {usable[0].score.element.name}?")
-    pair = _best_addition(
-        rival.estimate,
-        campaign,
-        scales,
-        (usable[0].score.element.name,),
-        len(best.places),
-        gained,
-        best.chi2,
-        solver,
-        progress,
-    )
+    name = usable[0].score.element.name
+    search.progress(f"can two simpler effects do better than {name}?")
+    pair = _best_addition(rival.estimate, name, _Opponent(best, gained), search)
     if pair is None:
         return None
     return f"{rival.score.element.words} and {pair.model.elements[-1].words}"
 
 
-def find_superfluous(
-    final: Estimate,
-    names: tuple[str, ...],
-    campaign: Campaign,
-    scales: Scales,
-    solver: Any,
-    progress: Callable[[str], None],
-) -> str | None:
+def find_superfluous(final: Estimate, names: tuple[str, ...], search: Search) -> str | None:
     """Find an effect, among those added one after the other, that the final model would do better without.
 
     The first effect of several was named while the others were missing. It is superfluous if the model
@@ -139,21 +101,19 @@ def find_superfluous(
     Args:
         final: the final model, fitted.
         names: catalogue names of the effects to ask about, in the order in which they were added.
-        campaign: the measurements.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        progress: told a line a step.
+        search: how to search.
 
     Returns:
         Its catalogue name, or None where each is needed.
     """
+    short = search._replace(max_steps=search.rules.partner_evaluations)
     for name in names:
         if final.model.element(name) is None:  # a later one contains it
             continue
-        progress(f"is {name} still needed?")
+        search.progress(f"is {name} still needed?")
         left = tuple(element for element in final.model.elements if element.name != name)
         model = Isolator(final.model.mass, left, final.model.excitation)
-        without = refit_from(final, model, scales, solver, 20, progress)
+        without = refit_from(final, model, short)
         if without.result != RESULTS.successful:
             continue
 
@@ -163,8 +123,6 @@ def find_superfluous(
 
         if gained(without) >= 0.0:
             return name
-        if _best_addition(
-            without, campaign, scales, (name,), len(final.places), gained, final.chi2, solver, progress
-        ):
+        if _best_addition(without, name, _Opponent(final, gained), search):
             return name
     return None

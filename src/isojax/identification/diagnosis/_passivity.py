@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...elements import AbstractElement
+from .._rules import Rules
 
 CYCLES = 6
 """Cycles of the motion; the work is that of the last, so that a memory has forgotten its start."""
@@ -14,14 +15,7 @@ CYCLES = 6
 STEPS = 1024
 """Steps a cycle."""
 
-SMALLEST_SHARE = 0.25
-"""A passive law is so at small motion too: the loop is driven at this share of the largest motion as well."""
-
-TOLERANCE = 1e-3
-"""Work below zero that is laid to rounding, as a share of the elastic energy that the loop moves."""
-
-
-SETTLED = 1e-2
+STEADY = 1e-2
 """Share of its range by which a settled force may differ between the last two cycles."""
 
 
@@ -83,17 +77,18 @@ def work_per_cycle(
     with np.errstate(over="ignore", invalid="ignore"):
         works = 2.0 * np.pi * amplitude * np.mean(power, axis=1)
     reach = np.ptp(force, axis=0)
-    rings = np.max(np.abs(force - before), axis=0) > SETTLED * reach
+    rings = np.max(np.abs(force - before), axis=0) > STEADY * reach
     return np.where(rings, np.mean(works, axis=0), works[-1]), 0.5 * reach * amplitude
 
 
-def find_activity(element: AbstractElement, largest_x: float, largest_v: float) -> str | None:
+def find_activity(element: AbstractElement, largest_x: float, largest_v: float, rules: Rules) -> str | None:
     """Find how an element with memory feeds energy into the visited motion, if it does.
 
     Args:
         element: the element.
         largest_x: largest displacement visited [m].
         largest_v: largest velocity visited [m/s].
+        rules: the smaller loop that is tried, too, and the energy that is rounding.
 
     Returns:
         A sentence, or None where every loop takes energy, the element is declared active, or it has no
@@ -104,12 +99,12 @@ def find_activity(element: AbstractElement, largest_x: float, largest_v: float) 
     shape = element.unphysical_shape(largest_x)
     if shape is not None:
         return f"its {element.words} {shape}"
-    shares = np.array([SMALLEST_SHARE, 1.0])
+    shares = np.array([rules.smaller_loop, 1.0])
     amplitude = largest_x * shares
     work, elastic = work_per_cycle(element, amplitude, np.full(2, largest_v / largest_x))
     if not np.all(np.isfinite(work)):
         return f"its {element.words} runs away over the visited loop"
-    if not element.active and np.any(work < -TOLERANCE * elastic):
+    if not element.active and np.any(work < -rules.energy_tolerance * elastic):
         where = 1e3 * float(amplitude[int(np.argmin(work / np.maximum(elastic, 1e-300)))])
         return f"its {element.words} feeds energy into a loop of {where:.3g} mm, within the visited motion"
     return None

@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
-from ..._parameters import list_parameters
+from ..._parameters import element_names, list_parameters
 from ...elements import AbstractElement
 from ...models import Isolator
-from ..fitting import Estimate, Point, element_names, one_hot
-
-SMALLEST_VISIBILITY = 0.005
-"""Share of a trace that must be left after projection; less is numerical dust."""
+from ..fitting import Estimate, Point, one_hot
 
 
 class Projection(NamedTuple):
@@ -39,11 +36,6 @@ class Projection(NamedTuple):
     information: Float[np.ndarray, "effect effect"]
     score: Float[np.ndarray, " effect"]
     visibility: Float[np.ndarray, " effect"]
-
-    @property
-    def seen(self) -> Bool[np.ndarray, " effect"]:
-        """Whether enough of a trace is left."""
-        return self.visibility > SMALLEST_VISIBILITY
 
     @property
     def step(self) -> Float[np.ndarray, "coefficient column"]:

@@ -1,20 +1,18 @@
 """Candidates refitted: the model with one absent effect, everything free."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Float
 
 from ..._parameters import list_parameters, own_parameters, replace_parameters
 from ..._results import RESULTS
-from ...elements import AbstractElement, Scales
+from ...elements import AbstractElement
 from ...models import Isolator
 from ..fitting import (
     Estimate,
     Nuisances,
-    Rival,
+    Search,
     best_nuisances,
     estimate,
     fit_by_multiple_shooting,
@@ -23,13 +21,6 @@ from ..fitting import (
 )
 from ..jacobian import has_stiffness_scale
 from ._score import Score, ScoreTest
-
-SMALLEST_GAIN = 0.0005
-"""Gain in chi2/dof below which no effect is named, and no effect told from another: with half a million
-samples anything is significant, and no bench is as good as that."""
-
-ROUGH = 1.0
-"""Decrease of chi2 below which the refit of a candidate is over: a tenth of the evidence that ranks it."""
 
 
 class Refit(NamedTuple):
@@ -46,41 +37,29 @@ class Refit(NamedTuple):
     violation: str | None
 
 
-def refit_candidate(
-    test: ScoreTest,
-    index: int,
-    scales: Scales,
-    solver: Any,
-    max_steps: int,
-    progress: Callable[[str], None],
-    rival: Rival | None = None,
-) -> Estimate:
+def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
     """Fit the model with one absent effect, everything free, from the linear step that the score gives.
 
     Args:
         test: the score test.
         index: the candidate.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        max_steps: evaluations at most.
-        progress: told a line a step.
-        rival: the best other candidate, far behind which the search is given up.
+        search: how to search.
 
     Returns:
         The refit.
     """
     fitted, score = test.fitted, test.scores[index]
-    element = score.element
     best: tuple[float, Isolator, Nuisances] | None = None
-    places = _free_places(fitted, element)
+    places = _free_places(fitted, fitted.model.with_elements(score.element))
     for share in (1.0, 0.3, 0.03):
-        model = _extended(fitted, element, share * score.strength, share * test.steps[index])
+        model = _extended(fitted, score.element, share * score.strength, share * test.steps[index])
         old, new = fitted.point.nuisances, test.nuisances[index]
-        states = old.states + share * (new.states - old.states)
-        states = _states_of(model, fitted.model, states)
+        motion = old.states[:, :2] + share * (new.states[:, :2] - old.states[:, :2])
+        # Internal states start where the measured motion puts them.
+        internal = np.zeros((motion.shape[0], model.internal_states))
         stiffness = old.stiffness + share * (new.stiffness - old.stiffness)
         segments = old.segments + share * (new.segments - old.segments)
-        nuisances = Nuisances(states, stiffness, segments, old.spread)
+        nuisances = Nuisances(np.hstack([motion, internal]), stiffness, segments, old.spread)
         # The columns are not needed yet, but with them the search shares the compiled code.
         directions = one_hot(model, places, [1.0] * len(places))
         point = fitted.simulator.evaluate(model, directions, nuisances)
@@ -91,58 +70,31 @@ def refit_candidate(
     if best is None:
         return fitted._replace(result=RESULTS.not_finite)
     _, model, nuisances = best
-    found = estimate(
-        fitted.simulator,
-        model,
-        places,
-        scales,
-        nuisances=nuisances,
-        solver=solver,
-        max_steps=max_steps,
-        progress=progress,
-        tolerance=_rough(fitted),
-        rival=rival,
-    )
+    found = estimate(fitted.simulator, model, places, _rough(search, fitted), nuisances)
     if found.result in (RESULTS.successful, RESULTS.outdone) or not found.excess < fitted.excess:
         return found
     # Beside a fold the initial states that followed the steps may lie on the other branch: the measured ones
     # again.
-    progress("the search stalled: again, from the measured states")
-    again = refit_from(found, found.model, scales, solver, max_steps // 2, progress)
+    search.progress("the search stalled: again, from the measured states")
+    again = refit_from(found, found.model, search._replace(max_steps=search.max_steps // 2, rival=None))
     return again if again.chi2 <= found.chi2 else found
 
 
-def refit_from(
-    fitted: Estimate,
-    model: Isolator,
-    scales: Scales,
-    solver: Any,
-    max_steps: int,
-    progress: Callable[[str], None],
-    far: bool = False,
-) -> Estimate:
+def refit_from(fitted: Estimate, model: Isolator, search: Search, far: bool = False) -> Estimate:
     """Fit a model that shares coefficients with a fitted one, everything free, from its own numbers.
 
     Args:
         fitted: the estimate whose records and free coefficients count.
         model: the start; elements that the estimate lacks have all their fitted kinds free.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        max_steps: evaluations at most.
-        progress: told a line a step.
+        search: how to search.
         far: whether the start may be far off: windows of records that are left whole are then fitted first.
 
     Returns:
         The refit.
     """
-    known = {entry.name for entry in list_parameters(fitted.model)}
-    places = tuple(
-        place
-        for place, entry in enumerate(list_parameters(model))
-        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
-    )
-    if far and fitted.simulator.problem.heads:
-        model = fit_by_multiple_shooting(fitted, model, places, scales, solver, _rough(fitted), progress)
+    places, search = _free_places(fitted, model), _rough(search, fitted)
+    if far and fitted.problem.heads:
+        model = fit_by_multiple_shooting(fitted, model, places, search)
     # The scatter of a stiffness that the fitted model lacks is still to be found.
     nuisances = None
     if has_stiffness_scale(fitted.model) == has_stiffness_scale(model):
@@ -151,22 +103,13 @@ def refit_from(
         # Eliminated by one linear step from far, initial states promise a chi2 that no later step reaches.
         settled = best_nuisances(fitted.simulator, model, old.spread, fresh, places)
         nuisances = settled.nuisances if settled.is_finite else fresh
-    return estimate(
-        fitted.simulator,
-        model,
-        places,
-        scales,
-        nuisances=nuisances,
-        solver=solver,
-        max_steps=max_steps,
-        progress=progress,
-        tolerance=_rough(fitted),
-    )
+    return estimate(fitted.simulator, model, places, search, nuisances)
 
 
-def _rough(fitted: Estimate) -> float:
-    """Give the decrease of chi2 below which a refit is over: among many samples more tells nothing apart."""
-    return max(ROUGH, 0.1 * SMALLEST_GAIN * fitted.dof)
+def _rough(search: Search, fitted: Estimate) -> Search:
+    """Give the search of a refit that is only ranked: with many samples smaller steps separate nothing."""
+    rules = search.rules
+    return search._replace(tolerance=max(rules.rough, rules.rough_share * rules.smallest_gain * fitted.dof))
 
 
 def bic(found: Estimate, inflation: float) -> float:
@@ -180,20 +123,19 @@ def bic(found: Estimate, inflation: float) -> float:
         chi2 / inflation + degrees of freedom of the nuisances + coefficients ln(samples). A phase found in
         each record counts as a coefficient.
     """
-    phases = sum(element.phased for element in found.model.elements) * len(found.simulator.problem.records)
+    phases = sum(element.phased for element in found.model.elements) * len(found.problem.records)
     samples = float(np.log(found.point.samples.sum()))
     taken = found.misfit - found.chi2
     return found.chi2 / inflation + taken + (len(found.places) + phases) * samples
 
 
-def _free_places(fitted: Estimate, element: AbstractElement) -> tuple[int, ...]:
-    """Give the free coefficients of the model extended by an effect."""
-    listed = list_parameters(fitted.model.with_elements(element))
-    first_new = len(listed) - len(own_parameters(element))
+def _free_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
+    """Give the free coefficients of a model that shares some with a fitted one: those, and what is new."""
+    known = {entry.name for entry in list_parameters(fitted.model)}
     return tuple(
         place
-        for place, entry in enumerate(listed)
-        if entry.name in fitted.names or (place >= first_new and entry.spec.fitted)
+        for place, entry in enumerate(list_parameters(model))
+        if entry.name in fitted.names or (entry.name not in known and entry.spec.fitted)
     )
 
 
@@ -225,54 +167,32 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
     return replace_parameters(model, numbers)
 
 
-def _states_of(
-    model: Isolator, before: Isolator, states: Float[np.ndarray, "lanes state"]
-) -> Float[np.ndarray, "lanes extended"]:
-    """Give the deviations of the initial states of an extended model: of what stayed; none of the rest."""
-    known, place = {}, 2
-    for element in before.elements:
-        known[id(element)] = states[:, place : place + element.internal_states]
-        place += element.internal_states
-    nothing = {id(e): np.zeros((states.shape[0], e.internal_states)) for e in model.elements}
-    return np.concatenate([states[:, :2], *({**nothing, **known}[id(e)] for e in model.elements)], axis=1)
-
-
-def polish(found: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]) -> Estimate:
-    """Take a rough refit to the end of its search; what scatter repeats show beside its law is told anew.
+def polish(found: Estimate, search: Search) -> Estimate:
+    """Take a rough refit to the end of its search, with the scatter that repeats show beside its law.
 
     Args:
         found: the refit.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        progress: told a line a step.
+        search: how to search.
 
     Returns:
         The estimate, no worse than the refit.
     """
-    progress("the finding, fitted to the end")
-    again = estimate(
-        found.simulator,
-        found.model,
-        found.places,
-        scales,
-        nuisances=found.point.nuisances,
-        solver=solver,
-        max_steps=25,
-        progress=progress,
-        anew=True,
-    )
+    search.progress("the finding, fitted to the end")
+    search = search._replace(max_steps=search.rules.final_evaluations)
+    again = estimate(found.simulator, found.model, found.places, search, found.point.nuisances, anew=True)
     # With another scatter another sum is made least.
     comparable = again.point.nuisances.spread == found.point.nuisances.spread
     better = again.chi2 <= found.chi2 or not comparable
     return again if again.result == RESULTS.successful and better else found
 
 
-def is_determined(found: Estimate, score: Score) -> bool:
-    """Say whether a refitted strength is at least two standard errors from zero.
+def is_determined(found: Estimate, score: Score, errors: float) -> bool:
+    """Say whether a refitted strength is clearly not zero.
 
     Args:
         found: the refit.
         score: the score of its effect.
+        errors: standard errors that it must be away from zero.
 
     Returns:
         True if it is.
@@ -280,7 +200,7 @@ def is_determined(found: Estimate, score: Score) -> bool:
     place = strength_place(found, score)
     error = float(found.uncertainty.standard_error[place])
     strength = float(list_parameters(found.model)[found.places[place]].value)
-    return abs(strength) > 2.0 * error
+    return abs(strength) > errors * error
 
 
 def strength_place(found: Estimate, score: Score) -> int:
@@ -311,10 +231,10 @@ def follows_freely(fitted: Estimate, found: Estimate) -> bool:
     Returns:
         True if the free-run error is no larger, or records are cut into segments anyway.
     """
-    if not found.simulator.problem.heads:
+    if not found.problem.heads:
         return True
     squares = [
-        sum(float(np.sum(run.residual**2)) for run in run_freely(entry.simulator.problem, entry.model))
+        sum(float(np.sum(run.residual**2)) for run in run_freely(entry.problem, entry.model))
         for entry in (fitted, found)
     ]
     return bool(squares[1] <= squares[0])

@@ -9,7 +9,7 @@ from scipy import stats
 
 from ...elements import CATALOGUE, AbstractElement, Scales
 from ...models import Isolator
-from ..fitting import Estimate, Nuisances, step_nuisances
+from ..fitting import Estimate, Nuisances, Search, step_nuisances
 from ..jacobian import effects_without_signal
 from ._projection import project
 
@@ -89,7 +89,7 @@ def absent_effects(
 
 
 def score_test(
-    fitted: Estimate, scales: Scales, probes: tuple[AbstractElement, ...], seed: int = 0
+    fitted: Estimate, search: Search, probes: tuple[AbstractElement, ...], seed: int = 0
 ) -> ScoreTest:
     """Test the absent effects, all at once.
 
@@ -99,7 +99,7 @@ def score_test(
 
     Args:
         fitted: the estimate to test.
-        scales: magnitudes of the records.
+        search: the scales of the campaign, and how much of a trace must be left.
         probes: absent effects at zero strength; those that follow signals which the records lack are left
             out.
         seed: of the draws for the family-wise p-value.
@@ -109,19 +109,19 @@ def score_test(
 
     Source: Rao 1948; Davies 1977 for parameters that mean nothing under the null; Westfall & Young 1993.
     """
-    pointless = effects_without_signal(fitted.simulator.problem.records)
+    pointless = effects_without_signal(fitted.problem.records)
     probes = tuple(probe for probe in probes if probe.name not in pointless)
     count, carried = len(fitted.places), len(fitted.model.elements)
-    units = np.array([1e-3 * probe.typical_strength(scales) for probe in probes])
+    units = np.array([1e-3 * probe.typical_strength(search.scales) for probe in probes])
     traces = project(fitted, probes, units)
-    absorbed, seen = traces.absorbed, traces.seen
+    absorbed, seen = traces.absorbed, traces.visibility > search.rules.smallest_visibility
     information, score = traces.information, traces.score
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)
     z = score / safe
     # A phase that each record chose for itself makes the sum of as many Rayleigh amplitudes of noise.
     chosen = np.array([probe.phased for probe in probes], dtype=bool)
-    records = len(fitted.simulator.problem.records)
+    records = len(fitted.problem.records)
     z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(records)) / _RAYLEIGH[1], z)
 
     # Within a family a shape of admissible sign goes before any other: the others are evidence against those

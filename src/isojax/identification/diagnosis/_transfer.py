@@ -1,35 +1,28 @@
 """Whether a finding carries over: refit on a part of the data, predict the rest."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from jaxtyping import Float
 
 from ..._results import RESULTS
-from ...elements import Scales
-from ..fitting import Estimate, Fit, Problem, Simulator, Spread, best_nuisances, estimate, one_hot
-
-VISIBLE = 0.03
-"""Share of its gain that an effect must make at a level for that level to be left out: what sets in above it
-only, such as a stop, is not told there."""
+from .._rules import Rules
+from ..fitting import Estimate, Problem, Search, Simulator, Spread, best_nuisances, estimate, one_hot
 
 
-def _split(fitted: Estimate, extended: Estimate) -> tuple[Problem, Problem]:
+def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem, Problem]:
     """Leave out the records of the highest level but one; without three levels every other segment.
 
-    Two levels are not parted: a law fitted to the lower alone says little of the upper. Nor is a level left
-    out at which the effect is not seen, unless its records are whole segments (releases): every other one of
-    those would leave out the highest.
+    Two levels are not separated: a law fitted to the lower alone says little of the upper. Nor is a level
+    left out at which the effect is not seen, unless its records are whole segments (releases): every other
+    one of those would leave out the highest.
     """
-    problem = extended.simulator.problem
+    problem = extended.problem
     levels = sorted({record.level for record in problem.records if record.level is not None})
     out = set()
     if len(levels) >= 3:
         out = {place for place, record in enumerate(problem.records) if record.level == levels[-2]}
         gains = _misfit_by_record(fitted) - _misfit_by_record(extended)
         separated = len(problem.segments) > len(problem.records)
-        if separated and not gains[list(out)].sum() > VISIBLE * gains.sum():
+        if separated and not gains[list(out)].sum() > rules.transfer_visible * gains.sum():
             out = set()
     if out:
         seen = tuple(part for part in problem.segments if part.record not in out)
@@ -51,7 +44,7 @@ def _misfit_by_record(found: Estimate) -> Float[np.ndarray, " record"]:
 
 
 def _excess_unseen(part: Estimate, unseen: Problem, spread: Spread) -> float:
-    """Give chi2 - dof of data that a refit did not see, its coefficients no surer than the refit made them.
+    """Give chi2 - dof of data that a refit did not see, with the refit's parameter uncertainty.
 
     With r the whitened error, J its slopes and C the covariance of the coefficients, chi2 is
     `r' (I + J C J')^-1 r = r'r - r'J (C^-1 + J'J)^-1 J'r`.
@@ -69,43 +62,29 @@ def _excess_unseen(part: Estimate, unseen: Problem, spread: Spread) -> float:
     return float(matrix[-1, -1] - error @ step - point.free_samples)
 
 
-def transferred_share(
-    fit: Fit, extended: Estimate, scales: Scales, solver: Any, progress: Callable[[str], None]
-) -> float:
+def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> float:
     """Give the share of the excess that an effect removes on data its refit did not see.
 
     Both models, without and with the effect, are refitted without a part of the data (a level, or half) and
-    held against that part; no coefficient is touched there, but each may be wrong by what its refit leaves
-    open.
+    predict that part. The prediction includes the refit's parameter uncertainty.
 
     Args:
-        fit: the fit without the effect.
+        fitted: the estimate without the effect.
         extended: the estimate with it.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        progress: told a line a step.
+        search: how to search.
 
     Returns:
         1 - (excess with the effect)/(excess without it) on the unseen part; not positive where it does not
         carry over or a refit runs away on the part that it sees, 1 where only the motion without it runs away
         on the unseen part.
     """
-    seen, unseen = _split(fit.estimate, extended)
-    excess = []
-    for found in (fit.estimate, extended):
-        progress("carry-over: refit on a part of the data")
+    seen, unseen = _split(fitted, extended, search.rules)
+    search, excess = search._replace(max_steps=search.rules.transfer_evaluations), []
+    for found in (fitted, extended):
+        search.progress("carry-over: refit on a part of the data")
         nuisances = found.point.nuisances
-        start = nuisances.afresh()
-        part = estimate(
-            Simulator(seen, like=found.simulator),
-            found.model,
-            found.places,
-            scales,
-            nuisances=start,
-            solver=solver,
-            max_steps=15,
-            progress=progress,
-        )
+        simulator = Simulator(seen, like=found.simulator)
+        part = estimate(simulator, found.model, found.places, search, nuisances.afresh())
         if part.result == RESULTS.not_finite:
             return 0.0
         excess.append(_excess_unseen(part, unseen, nuisances.spread))

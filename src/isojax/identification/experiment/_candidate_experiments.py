@@ -17,7 +17,7 @@ DWELLS = 6
 
 LEVELS = 3
 
-CYCLES = 10.0
+MIDDLE_CYCLES = 10.0
 """Cycles of the middle frequency in a stretch."""
 
 SLOW_CYCLES = 4.0
@@ -86,7 +86,7 @@ def find_test_outline(campaign: Campaign, substeps: int, every_sample: bool) -> 
     rate = campaign.rate / fewer
     middle = 0.5 * (lowest + highest)
     longest = max(MOST_STEPS / substeps, FEWEST_CYCLES * rate / middle)
-    samples = min(rate * max(CYCLES / middle, SLOW_CYCLES / lowest), longest)
+    samples = min(rate * max(MIDDLE_CYCLES / middle, SLOW_CYCLES / lowest), longest)
     stepped = any(one.dwells or one.kind == "swept" for one in driven)
     levels = tuple(sizes[place] for place in chosen)[:LEVELS]
     return TestOutline(levels, lowest, highest, stepped, rate, int(np.ceil(samples)))

@@ -1,4 +1,4 @@
-"""The experiment that parts a finding from its look-alikes, found by simulation with the fitted model."""
+"""The experiment that separates a finding from its look-alikes, found by simulation with the fitted model."""
 
 from typing import NamedTuple
 
@@ -7,11 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from ..._parameters import find_parameter, own_parameters
+from ..._parameters import element_names, find_parameter, own_parameters
 from ...elements import CATALOGUE, AbstractElement, Scales
 from ...models import Integrator, Isolator
-from ..diagnosis import CLOSE_BIC, SMALLEST_GAIN, Experiment, Extension, Prospect, Separation, rank_prospects
-from ..fitting import Estimate, Nuisances, Simulator, element_names, one_hot
+from .._rules import Rules
+from ..diagnosis import Experiment, Extension, Prospect, Separation, rank_prospects
+from ..fitting import Estimate, Nuisances, Simulator, one_hot
 from ..guess import scales as campaign_scales
 from ..jacobian import Segment
 from ._candidate_experiments import DWELLS, candidate_experiments, find_test_outline, repeated_campaign
@@ -40,8 +41,10 @@ class _Question(NamedTuple):
     strength: float
 
 
-def find_separating_experiment(extension: Extension, *, seconds: float | None = None) -> Separation:
-    """Find the test that parts a finding from its look-alikes.
+def find_separating_experiment(
+    extension: Extension, *, seconds: float | None = None, rules: Rules = Rules()
+) -> Separation:
+    """Find the test that separates a finding from its look-alikes.
 
     Each candidate is simulated with the fitted model without the effect. With the effect A and a look-alike B
     riding along at zero strength, I the information on their strengths in the old records and the new ones
@@ -52,6 +55,7 @@ def find_separating_experiment(extension: Extension, *, seconds: float | None = 
     Args:
         extension: a model before and after the finding, such as one of `close_loop(campaign).extensions`.
         seconds: measuring time of the new test [s]; that of the campaign if omitted.
+        rules: the evidence that separates two effects.
 
     Returns:
         The candidates, best first. Without look-alikes, or where nothing drove the isolator on and on, there
@@ -68,12 +72,12 @@ def find_separating_experiment(extension: Extension, *, seconds: float | None = 
     if seconds is not None and not 0.0 < seconds < np.inf:
         raise ValueError(f"Argument `seconds` must be positive and finite, but is {seconds}.")
     campaign = extension.before.campaign
-    problem = extension.before.estimate.simulator.problem
+    problem = extension.before.estimate.problem
     lasted = sum(part.stop - part.counted for part in problem.segments) / campaign.rate
     seconds = lasted if seconds is None else seconds
     after = extension.fit.estimate
-    # From here on a diagnosis of the old records and the new ones tells them apart.
-    needed = max(CLOSE_BIC, SMALLEST_GAIN * after.dof * (1.0 + seconds / lasted))
+    # From here on a diagnosis of the old records and the new ones separates them.
+    needed = max(rules.close_bic, rules.smallest_gain * after.dof * (1.0 + seconds / lasted))
     nothing = Separation(finding.effect, finding.indistinguishable, (), needed, seconds)
     if not finding.indistinguishable:
         return nothing
@@ -114,11 +118,12 @@ def find_separating_experiment(extension: Extension, *, seconds: float | None = 
     return nothing._replace(prospects=rank_prospects(tuple(prospects), needed))
 
 
-def with_separating_experiment(extension: Extension) -> Extension:
-    """Put the test that parts a finding from its look-alikes into the finding.
+def with_separating_experiment(extension: Extension, rules: Rules = Rules()) -> Extension:
+    """Put the test that separates a finding from its look-alikes into the finding.
 
     Args:
         extension: a model before and after the finding.
+        rules: the evidence that separates two effects.
 
     Returns:
         The same extension; where nothing can be simulated, its finding keeps the advice in words.
@@ -126,7 +131,7 @@ def with_separating_experiment(extension: Extension) -> Extension:
     finding = extension.verdict.finding
     if finding is None or not finding.indistinguishable:
         return extension
-    separation = find_separating_experiment(extension)
+    separation = find_separating_experiment(extension, rules=rules)
     best, words = separation.best, separation.words
     if best is None:
         return extension
@@ -194,7 +199,7 @@ def _made(model: Isolator, experiment: Experiment, question: _Question, rest: fl
     """Carry out an experiment; say why where that is impossible."""
     if experiment.lacking:
         return experiment.lacking
-    problem = question.fitted.simulator.problem
+    problem = question.fitted.problem
     model = _as_tested(model, experiment)
     if experiment.load:
         restless = [e.words for e in (*model.elements, *question.probes) if not _rests(e, rest)]
@@ -241,7 +246,7 @@ def _of_trial(
     question: _Question, model: Isolator, experiment: Experiment, made: TrialRun, noise: float
 ) -> Float[np.ndarray, "column column"]:
     """Give the information that an experiment adds."""
-    old, probes, starts = question.fitted.simulator.problem, question.probes, made.starts
+    old, probes, starts = question.fitted.problem, question.probes, made.starts
     model = _as_tested(model, experiment)
     if experiment.quantity != old.quantity:
         rows = [0, 1]

@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...excitations import Hold
+from ...excitations import Hold, tabulate
 from ...models import RK4, Instant, Isolator, Quantity, State, add_ringing, read_record, scan_records
 from ...records import Dwell, Record
-from ..jacobian import carries, channel_table, drive_table
+from ..jacobian import carries, channel_table
 from ._candidate_experiments import DWELLS, Experiment
 
 
@@ -141,7 +141,7 @@ def trial_run(
         lanes = [np.moveaxis(table[window], 2, 1) for table in tables]
         return jnp.asarray(np.concatenate(lanes, axis=2))
 
-    tables = [drive_table(record, hold, substeps, shift) for record in blank]
+    tables = [tabulate(record.input, record.rate, hold, substeps, shift) for record in blank]
     channels = {
         name: side_by_side([channel_table(name, record, hold, substeps, shift) for record in blank])
         for name in model.channels

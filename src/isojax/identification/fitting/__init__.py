@@ -1,8 +1,13 @@
-"""isojax.identification.fit."""
+"""Coefficients, error bars and errors of a model, straight from time histories.
+
+In: a start model and a campaign. Out: a `Fit`; `uncertainty`, `residual` and `drift_budget` describe it.
+Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
+then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
+What follows the search is in `_evaluation`, `_errors`, `_covariance` and `_fit_result`.
+"""
 
 from ._covariance import Uncertainty as Uncertainty
 from ._covariance import uncertainty as uncertainty
-from ._descent import Rival as Rival
 from ._drift_budget import DriftBudget as DriftBudget
 from ._drift_budget import Share as Share
 from ._drift_budget import drift_budget as drift_budget
@@ -14,12 +19,8 @@ from ._errors import Run as Run
 from ._errors import run_freely as run_freely
 from ._estimate import Estimate as Estimate
 from ._estimate import estimate as estimate
-from ._evaluation import Evaluation as Evaluation
-from ._fit import DEFAULT_SOLVER as DEFAULT_SOLVER
-from ._fit import MOST_STEPS as MOST_STEPS
 from ._fit import complete as complete
 from ._fit import fit as fit
-from ._fit import silent as silent
 from ._fit_result import Fit as Fit
 from ._fit_result import Statistics as Statistics
 from ._initial_states import best_nuisances as best_nuisances
@@ -28,8 +29,12 @@ from ._output_units import OUTPUT_UNITS as OUTPUT_UNITS
 from ._output_units import plain_unit as plain_unit
 from ._problem import Point as Point
 from ._problem import Problem as Problem
-from ._problem import Simulator as Simulator
-from ._problem import element_names as element_names
 from ._problem import one_hot as one_hot
 from ._residual import Residual as Residual
 from ._residual import residual as residual
+from ._search import DEFAULT_SOLVER as DEFAULT_SOLVER
+from ._search import Rival as Rival
+from ._search import Search as Search
+from ._search import search_of as search_of
+from ._search import silent as silent
+from ._simulator import Simulator as Simulator

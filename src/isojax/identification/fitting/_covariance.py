@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-SMALLEST_SHARE = 1e-11
+SMALLEST_EIGENVALUE = 1e-11
 """Relative eigenvalue of the scaled information below which a combination counts as undetermined.
 
 Products are accumulated in float64, so that shares of about 1e-13 are rounding; a hundred times that is the
@@ -70,7 +70,7 @@ def uncertainty(matrix: Float[np.ndarray, "column column"], inflation: float = 1
     safe = np.where(dead, 1.0, size)
     scaled = matrix / np.outer(safe, safe)
     values, vectors = np.linalg.eigh(scaled) if count else (np.zeros(0), np.zeros((0, 0)))
-    good = values > SMALLEST_SHARE * max(1.0, count)
+    good = values > SMALLEST_EIGENVALUE * max(1.0, count)
     partners = tuple(
         tuple(int(place) for place in np.flatnonzero(np.abs(vectors[:, index]) > 0.1))
         for index in np.flatnonzero(~good)

@@ -1,20 +1,20 @@
 """The search itself: optimistix on systems of coefficient size."""
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float, Int
 
 from ..._parameters import ParameterSpec, list_parameters, replace_parameters, to_free, to_physical
 from ..._results import RESULTS
 from ...models import Isolator
 from ._elimination import Nuisances, step_nuisances
-from ._problem import Point, Simulator, one_hot
+from ._problem import Point, one_hot
+from ._search import Search
+from ._simulator import Simulator
 
 FIRST_DAMPING = 1e-5
 """Marquardt's damping at the first step, over the diagonal of the normal equations: starts are good."""
@@ -28,22 +28,6 @@ DOUBTFUL = 5
 
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
-
-
-class Rival(NamedTuple):
-    """The best other model, far behind which a search is given up.
-
-    Attributes:
-        chi2: what it reaches.
-        far: how much more chi2 is far behind; who is nearer may take its time.
-        patience: evaluations in which a search must catch up.
-        share: how much of what it is behind it must then make good to be worth going on.
-    """
-
-    chi2: float
-    far: float
-    patience: int = 5
-    share: float = 0.05
 
 
 SHRINKS = 3
@@ -132,14 +116,9 @@ def descend(
     simulator: Simulator,
     model: Isolator,
     places: tuple[int, ...],
-    scales: tuple[float, ...],
+    sizes: tuple[float, ...],
     nuisances: Nuisances,
-    *,
-    solver: optx.AbstractLeastSquaresSolver,
-    max_steps: int,
-    tolerance: float,
-    rival: Rival | None = None,
-    progress: Callable[[str], None],
+    search: Search,
 ) -> Descent:
     """Fit coefficients to the records, nuisances eliminated on the way.
 
@@ -150,31 +129,27 @@ def descend(
         simulator: the records.
         model: start.
         places: free coefficients, by their place in `list_parameters`.
-        scales: magnitude of each.
+        sizes: magnitude of each.
         nuisances: start of the nuisances.
-        solver: an optimistix least-squares solver.
-        max_steps: evaluations after which the search gives up.
-        tolerance: decrease of chi2 per max(chi2/dof, 1) below which a step is no longer one.
-        rival: another model, far behind which the search is given up.
-        progress: told a line a step.
+        search: the solver, and when it is over.
 
     Returns:
         The best point and how the search ended.
 
     Source: Golub & Pereyra 1973 (variable projection); Marquardt 1963.
     """
-    listed = list_parameters(model)
+    listed, tolerance = list_parameters(model), search.tolerance
     values = [entry.value for entry in listed]
     specs = tuple(listed[place].spec for place in places)
 
     def physical(free: Array) -> tuple[Isolator, list[float]]:
-        found, slopes = _to_physical(free, jnp.asarray(scales), specs)
+        found, slopes = _to_physical(free, jnp.asarray(sizes), specs)
         numbers = list(values)
         for place, number in zip(places, np.asarray(found), strict=True):
             numbers[place] = number
         return replace_parameters(model, numbers), [float(slope) for slope in np.asarray(slopes)]
 
-    free = jnp.stack([to_free(values[place], specs[c], scales[c]) for c, place in enumerate(places)])
+    free = jnp.stack([to_free(values[place], specs[c], sizes[c]) for c, place in enumerate(places)])
     # Marquardt's scaling: the solver's variables are those in which the first normal equations have an equal
     # diagonal.
     unit = np.ones(len(places))
@@ -185,7 +160,7 @@ def descend(
     evaluations, refused, decrement = 0, 0, float("inf")
     reached: list[float] = []
     levels: list[float] = []
-    while evaluations < max_steps:
+    while evaluations < search.max_steps:
         current, slopes = physical(trial)
         point = simulator.evaluate(current, one_hot(current, places, slopes), trial_nuisances)
         evaluations += 1
@@ -197,14 +172,14 @@ def descend(
         local = _Local(trial / unit, jnp.asarray(residual), jnp.asarray(jacobian * unit))
         if state is None:
             scaled = trial / unit
-            state = _init(solver, scaled, local)
+            state = _init(search.solver, scaled, local)
         accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
         # Only a refusal may count for several: an accepted point is one step on.
         refusals = 1 if accepted else max(1 if point.is_finite else SHRINKS, 1 + refused // 4)
         for _ in range(refusals):
-            scaled, state = _step(solver, scaled, local, state)
+            scaled, state = _step(search.solver, scaled, local, state)
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
-        progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
+        search.progress(f"step {evaluations}: chi2/dof {chi2:.6g}{'' if accepted else ' (rejected)'}")
         if accepted:
             gained = float("inf") if best is None or refused else best.chi2 - point.chi2
             best, best_free, refused = point, trial, 0
@@ -223,6 +198,7 @@ def descend(
         # Where records are split the error itself has kinks, and a slope on either side of its least.
         idle = _gain(levels, IDLE) < tolerance * max(1.0, chi2)
         is_least = decrement < STALLED * best.chi2 or model.splits
+        rival = search.rival
         if rival is not None:
             behind = best.chi2 - rival.chi2
             if behind > rival.far and _gain(reached, rival.patience) < rival.share * behind:
@@ -235,11 +211,11 @@ def descend(
             result = RESULTS.successful
             break
         owner = simulator.prepared(best.model, len(best.model.elements)).record
-        if refused == DOUBTFUL and evaluations < max_steps - 1:
+        if refused == DOUBTFUL and evaluations < search.max_steps - 1:
             settled = _settled(simulator, best, places, physical(best_free)[1], owner)
             evaluations += 1
             if settled.is_finite and settled.chi2 - best.chi2 > tolerance * max(1.0, chi2):
-                progress("the best point promised too much: again from where its nuisances come to lie")
+                search.progress("restarting the search: the predicted decrease was not reached")
                 trial, trial_nuisances, best, state, refused = best_free, settled.nuisances, None, None, 0
                 # What was promised is no measure of what is gained from here on.
                 reached, levels = [], []

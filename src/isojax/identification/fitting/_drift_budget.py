@@ -75,11 +75,11 @@ def drift_budget(fit: Fit) -> DriftBudget:
         The budget.
     """
     found = fit.estimate
-    single = len(found.simulator.problem.records) < 2
+    single = len(found.problem.records) < 2
     if single or not is_successful(fit.result) or not has_stiffness_scale(fit.model):
         return DriftBudget(float("nan"), ())
     spread = found.point.nuisances.spread
-    owner = np.array([segment.record for segment in found.simulator.problem.segments])
+    owner = np.array([segment.record for segment in found.problem.segments])
     noise, if_ignored = noise_and_scatter_errors(found.point.reduced, owner, spread)
     inflation = np.sqrt(max(1.0, found.chi2 / found.dof))
     listed = list_parameters(fit.model)

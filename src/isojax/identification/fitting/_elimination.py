@@ -115,98 +115,56 @@ class Reduced(NamedTuple):
 
 
 def eliminate(
-    matrices: Float[np.ndarray, "lanes column column"],
+    matrices: Float[np.ndarray, "segment column column"],
     noise: float,
-    owner: Int[np.ndarray, " lanes"],
-    used: int,
-    records: int,
+    owner: Int[np.ndarray, " segment"],
     columns: int,
-    has_scale: bool,
     nuisances: Nuisances,
-    heads: Float[np.ndarray, "lanes column column"] | None = None,
+    heads: Float[np.ndarray, "segment column column"] | None = None,
 ) -> Reduced:
     """Eliminate the initial states of each segment, then its own stiffness and that of its record.
 
-    Where `heads` is given, the initial states follow from the beginnings of the records alone, as those of a
-    free run do; the rest of a record then has no say in its own start.
+    Where `heads` is given, the initial states follow from the first samples of the records alone, as those of
+    a free run do; the rest of a record then has no say in its own start.
 
     Args:
-        matrices: from `information`.
+        matrices: from `information`: coefficients, the stiffness scale where the model has one, initial
+            states, residual.
         noise: rms of the noise [SI unit of the output].
-        owner: record of each lane.
-        used: lanes that hold a segment; the rest is padding.
-        records: count of records.
+        owner: record of each segment.
         columns: count of coefficient columns.
-        has_scale: whether the stiffness scale has a column.
-        nuisances: where they stand, and their priors.
-        heads: the same matrices over the beginning of each lane only.
+        nuisances: where they stand, and their priors; lanes beyond the segments are padding.
+        heads: the same matrices over the first samples of each segment only.
 
     Returns:
         The reduced equations.
     """
-    matrices = matrices[:used] / noise**2
-    states = matrices.shape[1] - columns - int(has_scale) - 1
-    shared = columns + int(has_scale)
-    keep = np.r_[0:shared, shared + states]
-    drop = np.arange(shared, shared + states)
-
-    # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
-    offset = nuisances.states[:used]
-    source = matrices if heads is None else heads[:used] / noise**2
-    inner = source[:, drop[:, None], drop] + np.eye(states)
-    cross = source[:, drop[:, None], keep].copy()
-    cross[:, :, -1] -= offset
-    try:
-        states_map = np.linalg.solve(inner, cross)
-        taken = states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
-    except np.linalg.LinAlgError:
-        # Only a simulation that ran away makes a state's column as large as to drown its own prior.
-        states_map, taken = np.full_like(cross, np.nan), np.full(used, np.nan)
-    left = matrices[:, keep[:, None], keep].copy()
-    if heads is None:
-        left[:, -1, -1] += np.sum(offset**2, axis=1)
-        left -= np.swapaxes(cross, 1, 2) @ states_map
-    else:
-        mixed = np.swapaxes(matrices[:, drop[:, None], keep], 1, 2) @ states_map
-        curved = np.swapaxes(states_map, 1, 2) @ matrices[:, drop[:, None], drop] @ states_map
-        left += curved - mixed - np.swapaxes(mixed, 1, 2)
-    eliminated = np.zeros(records)
-    np.add.at(eliminated, owner[:used], taken)
-
-    by_segment = left[:, columns, [columns, -1]] if has_scale else np.zeros((used, 2))
-    segments_map, segments_variance = np.zeros((0, shared + 1)), np.zeros(0)
-    if has_scale and nuisances.spread.segments > 0.0:
-        spread = nuisances.spread.segments / STIFFNESS_SCALE_UNIT
-        own = nuisances.segments[:used]
-        pivot = left[:, columns, columns] + 1.0 / spread**2
-        row = left[:, columns, :].copy()
-        row[:, -1] -= own / spread**2
-        segments_map, segments_variance = row / pivot[:, None], STIFFNESS_SCALE_UNIT**2 / pivot
-        left[:, -1, -1] += (own / spread) ** 2
-        with np.errstate(over="ignore", invalid="ignore"):
-            left -= segments_map[:, :, None] * row[:, None, :]
-        np.add.at(eliminated, owner[:used], 1.0 - 1.0 / (pivot * spread**2))
-
-    per_record = np.zeros((records, shared + 1, shared + 1))
-    np.add.at(per_record, owner[:used], left)
-    stiffness_map = np.zeros((records, columns + 1))
-    variance = np.zeros(records)
-    reduced = per_record.copy()
+    matrices = matrices / noise**2
+    heads = None if heads is None else heads / noise**2
+    offset, spread = nuisances.states[: owner.size], nuisances.spread
+    has_scale = matrices.shape[1] > columns + offset.shape[1] + 1
+    left, states_map, taken = _without_states(matrices, heads, columns + int(has_scale), offset)
+    eliminated = np.zeros(nuisances.stiffness.size)
+    np.add.at(eliminated, owner, taken)
+    by_segment = left[:, columns, [columns, -1]] if has_scale else np.zeros((owner.size, 2))
+    segments_map, segments_variance = np.zeros((0, left.shape[1])), np.zeros(0)
+    if has_scale and spread.segments > 0.0:
+        own = nuisances.segments[: owner.size]
+        left, segments_map, segments_variance, taken = _without_scale(left, columns, own, spread.segments)
+        np.add.at(eliminated, owner, taken)
+    by_record = np.zeros((eliminated.size, *left.shape[1:]))
+    np.add.at(by_record, owner, left)
+    stiffness_map, variance = np.zeros((eliminated.size, columns + 1)), np.zeros(eliminated.size)
     if has_scale:
-        spread = nuisances.spread.records / STIFFNESS_SCALE_UNIT
-        pivot = per_record[:, columns, columns] + 1.0 / spread**2
-        row = np.delete(per_record[:, columns, :], columns, axis=1)
-        row[:, -1] -= nuisances.stiffness / spread**2
-        stiffness_map, variance = row / pivot[:, None], STIFFNESS_SCALE_UNIT**2 / pivot
-        reduced = np.delete(np.delete(per_record, columns, axis=1), columns, axis=2)
-        reduced[:, -1, -1] += (nuisances.stiffness / spread) ** 2
-        # Of a simulation that ran away, finite or not, nothing is asked but that it did.
-        with np.errstate(over="ignore", invalid="ignore"):
-            reduced = reduced - stiffness_map[:, :, None] * row[:, None, :]
-        eliminated += 1.0 - 1.0 / (pivot * spread**2)
+        by_record, whole, variance, taken = _without_scale(
+            by_record, columns, nuisances.stiffness, spread.records
+        )
+        by_record = np.delete(np.delete(by_record, columns, axis=1), columns, axis=2)
+        stiffness_map = np.delete(whole, columns, axis=1)
+        eliminated += taken
     raw = np.diagonal(matrices, axis1=1, axis2=2).sum(axis=0)[:columns]
     return Reduced(
-        reduced,
+        by_record,
         eliminated,
         raw,
         stiffness_map,
@@ -216,6 +174,58 @@ def eliminate(
         segments_variance,
         by_segment,
     )
+
+
+def _without_states(
+    matrices: Float[np.ndarray, "segment column column"],
+    heads: Float[np.ndarray, "segment column column"] | None,
+    shared: int,
+    offset: Float[np.ndarray, "segment state"],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Give what is left without the initial states, the map of their steps, and the freedom they took."""
+    segments, states = offset.shape
+    keep = np.r_[0:shared, shared + states]
+    drop = np.arange(shared, shared + states)
+    # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
+    source = matrices if heads is None else heads
+    inner = source[:, drop[:, None], drop] + np.eye(states)
+    cross = source[:, drop[:, None], keep].copy()
+    cross[:, :, -1] -= offset
+    try:
+        states_map = np.linalg.solve(inner, cross)
+        taken = states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
+    except np.linalg.LinAlgError:
+        # Only a simulation that ran away makes a state's column as large as to drown its own prior.
+        states_map, taken = np.full_like(cross, np.nan), np.full(segments, np.nan)
+    left = matrices[:, keep[:, None], keep].copy()
+    if heads is None:
+        left[:, -1, -1] += np.sum(offset**2, axis=1)
+        left -= np.swapaxes(cross, 1, 2) @ states_map
+    else:
+        mixed = np.swapaxes(matrices[:, drop[:, None], keep], 1, 2) @ states_map
+        curved = np.swapaxes(states_map, 1, 2) @ matrices[:, drop[:, None], drop] @ states_map
+        left += curved - mixed - np.swapaxes(mixed, 1, 2)
+    return left, states_map, taken
+
+
+def _without_scale(
+    matrices: Float[np.ndarray, "lane column column"],
+    column: int,
+    deviation: Float[np.ndarray, " lane"],
+    spread: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Give what is left without a stiffness scale, its step, its variance, and the freedom it took."""
+    spread = spread / STIFFNESS_SCALE_UNIT
+    pivot = matrices[:, column, column] + 1.0 / spread**2
+    row = matrices[:, column, :].copy()
+    row[:, -1] -= deviation / spread**2
+    step = row / pivot[:, None]
+    left = matrices.copy()
+    left[:, -1, -1] += (deviation / spread) ** 2
+    # Of a simulation that ran away, finite or not, nothing is asked but that it did.
+    with np.errstate(over="ignore", invalid="ignore"):
+        left -= step[:, :, None] * row[:, None, :]
+    return left, step, STIFFNESS_SCALE_UNIT**2 / pivot, 1.0 - 1.0 / (pivot * spread**2)
 
 
 def step_nuisances(

@@ -10,7 +10,8 @@ from ...records import Record
 from ..jacobian import STIFFNESS_SCALE_UNIT, Segment, readings
 from ._elimination import Nuisances, Spread
 from ._initial_states import best_nuisances, find_initial_states
-from ._problem import Point, Problem, Simulator, stiffness_deviation
+from ._problem import Point, Problem, stiffness_deviation
+from ._simulator import Simulator
 
 
 class Errors(NamedTuple):

@@ -1,13 +1,11 @@
 """Coefficients estimated from time histories, with the scatter of the stiffness from record to record."""
 
 from collections import defaultdict
-from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array
 
 from ..._parameters import Parameter, list_parameters, replace_parameters
@@ -16,21 +14,16 @@ from ...elements import Scales
 from ...excitations import Hold
 from ...models import Isolator
 from ...records import Record
+from .._rules import Rules
 from ..jacobian import STIFFNESS_SCALE_UNIT, has_stiffness_scale
 from ._covariance import Uncertainty, uncertainty, unknown
-from ._descent import Rival, descend
+from ._descent import descend
 from ._elimination import Nuisances, Spread
 from ._initial_states import HELD, best_nuisances
-from ._problem import Point, Simulator, one_hot
+from ._problem import Point, Problem, one_hot
+from ._search import Search
 from ._segment_scatter import segment_scatter
-
-FIRST_STIFFNESS_SPREAD = Spread(1e-2)
-"""Prior of the stiffness scales before the records have said how much they scatter: one percent."""
-
-SMALLEST_STIFFNESS_SPREAD = 1e-5
-
-_SAME_SCATTER = 0.1
-"""Relative difference up to which two scatters within records are one."""
+from ._simulator import Simulator
 
 
 class Estimate(NamedTuple):
@@ -39,7 +32,7 @@ class Estimate(NamedTuple):
     Attributes:
         model: the fitted isolator.
         places: free coefficients, by their place in `list_parameters`.
-        simulator: the records it was held against.
+        simulator: the records it was fitted to.
         point: equations at the solution, columns in physical units.
         uncertainty: of the free coefficients.
         result: how the search ended.
@@ -53,6 +46,11 @@ class Estimate(NamedTuple):
     uncertainty: Uncertainty
     result: RESULTS
     steps: int
+
+    @property
+    def problem(self) -> Problem:
+        """The records that it was fitted to, cut into segments."""
+        return self.simulator.problem
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -149,7 +147,7 @@ def magnitudes(model: Isolator, places: tuple[int, ...], scales: Scales) -> tupl
     return tuple(sizes)
 
 
-def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: float) -> float:
+def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: float, rules: Rules) -> float:
     """Give the standard deviation of the linear stiffness between repeats of a record.
 
     Repeats at equal level and direction share every deterministic error of the model, so that their
@@ -159,9 +157,10 @@ def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: floa
         records: the records.
         point: equations with loose stiffness scales.
         inflation: chi2/dof.
+        rules: the smallest scatter, and the one to assume where no two records can be compared.
 
     Returns:
-        Relative standard deviation, not below `SMALLEST_STIFFNESS_SPREAD`.
+        Relative standard deviation.
     """
     values = (point.nuisances.stiffness + point.reduced.stiffness_map[:, -1]) * STIFFNESS_SCALE_UNIT
     variance = point.reduced.stiffness_variance * max(1.0, inflation)
@@ -174,23 +173,24 @@ def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: floa
             squares = sum(np.sum((values[group] - values[group].mean()) ** 2) for group in groups)
             expected = sum(np.mean(variance[group]) * (len(group) - 1) for group in groups)
             freedom = sum(len(group) - 1 for group in groups)
-            return float(np.sqrt(max((squares - expected) / freedom, SMALLEST_STIFFNESS_SPREAD**2)))
-    return 1e-3
+            return float(np.sqrt(max((squares - expected) / freedom, rules.smallest_scatter**2)))
+    return rules.single_scatter
 
 
 def _spread(
-    simulator: Simulator, point: Point, places: tuple[int, ...], within: float, inflation: float
+    simulator: Simulator, point: Point, places: tuple[int, ...], within: float, rules: Rules
 ) -> Spread:
-    """Tell the scatter of the stiffness between records, beside that within them."""
+    """Estimate the scatter of the stiffness between records, beside that within them."""
     records = simulator.problem.records
     if len(records) == 1:
-        return Spread(SMALLEST_STIFFNESS_SPREAD, within)
-    loose = FIRST_STIFFNESS_SPREAD._replace(segments=within)
+        return Spread(rules.smallest_scatter, within)
+    inflation = _inflation(point)
+    loose = Spread(rules.first_scatter, within)
     if point.nuisances.spread != loose:
         # What scatters within records moves their means, too, and must not count twice.
         directions = one_hot(point.model, places, [1.0] * len(places))
         point = simulator.evaluate(point.model, directions, point.nuisances._replace(spread=loose))
-    return Spread(stiffness_scatter(records, point, inflation), within)
+    return Spread(stiffness_scatter(records, point, inflation, rules), within)
 
 
 def _check_delay(model: Isolator, places: tuple[int, ...], hold: Hold) -> None:
@@ -211,18 +211,16 @@ def _check_delay(model: Isolator, places: tuple[int, ...], hold: Hold) -> None:
             )
 
 
+def _inflation(point: Point) -> float:
+    return point.chi2 / max(1.0, point.free_samples)
+
+
 def estimate(
     simulator: Simulator,
     model: Isolator,
     places: tuple[int, ...],
-    scales: Scales,
-    *,
-    nuisances: Nuisances | None,
-    solver: optx.AbstractLeastSquaresSolver,
-    max_steps: int,
-    progress: Callable[[str], None],
-    tolerance: float = 1e-2,
-    rival: Rival | None = None,
+    search: Search,
+    nuisances: Nuisances | None = None,
     anew: bool = False,
 ) -> Estimate:
     """Fit the free coefficients of a model to records.
@@ -231,67 +229,27 @@ def estimate(
         simulator: the records.
         model: start.
         places: free coefficients.
-        scales: magnitudes of the records.
+        search: how to search.
         nuisances: known nuisances of an earlier fit, with the scatter of the stiffness; else it is estimated.
-        solver: an optimistix least-squares solver.
-        max_steps: evaluations after which a search gives up.
-        progress: told a line a step.
-        tolerance: decrease of chi2 per max(chi2/dof, 1) below which the search is over.
-        rival: another model, far behind which the search is given up.
-        anew: whether the scatter of the stiffness within records is told again from this model, though it is
-            known of another.
+        anew: whether the scatter of the stiffness within records is estimated again with this model, though
+            it is known with another.
 
     Returns:
         The estimate.
     """
     _check_delay(model, places, simulator.problem.hold)
-    carried = len(model.elements)
-    known = nuisances is not None
-    start = simulator.settle(nuisances, model, carried, FIRST_STIFFNESS_SPREAD)
-    if not known and any(record.kind == "free_decay" for record in simulator.problem.records):
-        # A release is largest where its integral is least known: the states are sought before a coefficient.
-        settled = best_nuisances(simulator, model, HELD)
-        if settled.is_finite:
-            start = settled.nuisances._replace(spread=FIRST_STIFFNESS_SPREAD)
-    sizes = magnitudes(model, places, scales)
-    # The scatter of the stiffness is found from a rough solution; the search goes on from there.
-    rough = max(tolerance, 1.0) if has_stiffness_scale(model) and not known else tolerance
-    found = descend(
-        simulator,
-        model,
-        places,
-        sizes,
-        start,
-        solver=solver,
-        max_steps=max_steps,
-        tolerance=rough,
-        rival=rival,
-        progress=progress,
-    )
+    known, scatters = nuisances is not None, has_stiffness_scale(model)
+    sizes = magnitudes(model, places, search.scales)
+    # The scatter of the stiffness is estimated at a rough solution; the search goes on from there.
+    rough = max(search.tolerance, search.rules.rough) if scatters and not known else search.tolerance
+    start = _start(simulator, model, nuisances, Spread(search.rules.first_scatter))
+    found = descend(simulator, model, places, sizes, start, search._replace(tolerance=rough))
     steps = found.steps
-    if is_successful(found.result) and has_stiffness_scale(model) and (anew or not known):
-        problem, old = simulator.problem, found.point.nuisances
-        inflation = found.point.chi2 / max(1.0, found.point.free_samples)
-        within = segment_scatter(problem.records, problem.segments, found.point, inflation)
-        moved = abs(within - old.spread.segments) > _SAME_SCATTER * max(within, old.spread.segments)
-        if moved or not known:
-            spread = _spread(simulator, found.point, places, within, inflation)
-            progress(
-                f"linear stiffness scatters by {100 * spread.records:.2g} % between records"
-                + (f" and by {100 * within:.2g} % within them" if within else "")
-            )
-            own = old.segments if within else np.zeros_like(old.segments)
-            found = descend(
-                simulator,
-                found.point.model,
-                places,
-                sizes,
-                old._replace(segments=own, spread=spread),
-                solver=solver,
-                max_steps=max_steps,
-                tolerance=tolerance,
-                progress=progress,
-            )
+    if is_successful(found.result) and scatters and (anew or not known):
+        settled = _with_scatter(simulator, found.point, places, search, known)
+        if settled is not None:
+            again = search._replace(rival=None)
+            found = descend(simulator, found.point.model, places, sizes, settled, again)
             steps += found.steps
     point = found.point
     dof = max(1.0, point.free_samples - len(places))
@@ -301,3 +259,31 @@ def estimate(
         else unknown(len(places))
     )
     return Estimate(point.model, places, simulator, point, error, found.result, steps)
+
+
+def _start(simulator: Simulator, model: Isolator, nuisances: Nuisances | None, spread: Spread) -> Nuisances:
+    """Give the nuisances that a search starts from."""
+    if nuisances is None and any(record.kind == "free_decay" for record in simulator.problem.records):
+        # A release is largest where its integral is least known: the states are sought before a coefficient.
+        settled = best_nuisances(simulator, model, HELD)
+        if settled.is_finite:
+            return settled.nuisances._replace(spread=spread)
+    return simulator.settle(nuisances, model, len(model.elements), spread)
+
+
+def _with_scatter(
+    simulator: Simulator, point: Point, places: tuple[int, ...], search: Search, known: bool
+) -> Nuisances | None:
+    """Give the nuisances with the scatter that repeats show; None where it is known and stays as it is."""
+    problem, old, rules = simulator.problem, point.nuisances, search.rules
+    within = segment_scatter(problem.records, problem.segments, point, _inflation(point), rules)
+    largest = max(within, old.spread.segments)
+    if known and not abs(within - old.spread.segments) > rules.same_scatter * largest:
+        return None
+    spread = _spread(simulator, point, places, within, rules)
+    search.progress(
+        f"linear stiffness scatters by {100 * spread.records:.2g} % between records"
+        + (f" and by {100 * within:.2g} % within them" if within else "")
+    )
+    own = old.segments if within else np.zeros_like(old.segments)
+    return old._replace(segments=own, spread=spread)

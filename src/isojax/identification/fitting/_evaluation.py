@@ -1,4 +1,4 @@
-"""An estimate held against every record of its campaign: worked out once, when it is first asked for."""
+"""An estimate compared with every record of its campaign: computed once, when it is first asked for."""
 
 from functools import cached_property
 
@@ -10,41 +10,42 @@ from ._build_problem import build_problem
 from ._elimination import Nuisances
 from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise, without_values
 from ._estimate import Estimate
-from ._problem import Point, Problem, Simulator
+from ._problem import Point
+from ._simulator import Simulator
 
 SAME_BRANCH = 1e-3
 """Difference in chi2/dof, over the fitted records, up to which restarts and the fit are one."""
 
 
-def _chi2_of_fitted(point: Point, everything: Problem, fitted: Problem) -> float:
-    """Give chi2 of the fitted records among all."""
-    kept = {id(record) for record in fitted.records}
-    places = [place for place, record in enumerate(everything.records) if id(record) in kept]
+def _chi2_of(point: Point, places: list[int]) -> float:
+    """Give chi2 of some records."""
     return float(point.reduced.by_record[places, -1, -1].sum())
 
 
-def _carried_over(found: Estimate, simulator: Simulator) -> Nuisances:
-    """Give the nuisances of a fit for a bench that has other records beside the fitted ones."""
+def _carried_over(found: Estimate, simulator: Simulator, places: list[int]) -> Nuisances:
+    """Give the nuisances of a fit for a simulator that has other records beside the fitted ones.
+
+    Args:
+        found: the fit.
+        simulator: all records.
+        places: place of each fitted record among them.
+    """
     model, carried, old = found.model, len(found.model.elements), found.point.nuisances
-    fitted, everything = found.simulator.problem, simulator.problem
     begin = simulator.settle(None, model, carried, old.spread)
     own, scales = found.simulator.starts(model, found.simulator.prepared(model, carried))
     starts, units = simulator.starts(model, simulator.prepared(model, carried))
     reached = own + scales * old.states.T
     lanes = {
-        (id(everything.records[part.record]), part.start, part.stop): lane
-        for lane, part in enumerate(everything.segments)
+        (part.record, part.start, part.stop): lane for lane, part in enumerate(simulator.problem.segments)
     }
     states, segments = begin.states.copy(), begin.segments.copy()
-    for lane, part in enumerate(fitted.segments):
-        place = lanes.get((id(fitted.records[part.record]), part.start, part.stop))
+    for lane, part in enumerate(found.problem.segments):
+        place = lanes.get((places[part.record], part.start, part.stop))
         if place is not None:
             states[place] = (reached[:, lane] - starts[:, place]) / units[:, place]
             segments[place] = old.segments[lane]
-    places = {id(record): place for place, record in enumerate(everything.records)}
     stiffness = begin.stiffness.copy()
-    for record, deviation in zip(fitted.records, old.stiffness, strict=True):
-        stiffness[places[id(record)]] = deviation
+    stiffness[places] = old.stiffness
     return begin._replace(states=states, stiffness=stiffness, segments=segments)
 
 
@@ -62,7 +63,7 @@ class Evaluation:
     @cached_property
     def _runs(self) -> tuple[tuple[Run, ...], Restarts]:
         """Free runs and restarts of every record; NaN where the search failed."""
-        found, fitted = self._found, self._found.simulator.problem
+        found, fitted = self._found, self._found.problem
         everything = build_problem(
             self._campaign.records,
             found.model,
@@ -82,12 +83,13 @@ class Evaluation:
             else:
                 simulator = Simulator(everything)
                 restarts = restart_records(simulator, found.model, nuisances.spread)
-                lost = _chi2_of_fitted(restarts.point, everything, fitted) - found.point.chi2
+                places = [place for place, record in enumerate(everything.records) if record.role == "fit"]
+                lost = _chi2_of(restarts.point, places) - found.point.chi2
                 if is_successful(found.result) and not lost < SAME_BRANCH * found.dof:
                     # Beside a fold the measured states may lead to another branch than the fit is on.
-                    known = _carried_over(found, simulator)
+                    known = _carried_over(found, simulator, places)
                     again = restart_records(simulator, found.model, nuisances.spread, known)
-                    if _chi2_of_fitted(again.point, everything, fitted) < lost + found.point.chi2:
+                    if _chi2_of(again.point, places) < lost + found.point.chi2:
                         restarts = again
         if not is_successful(found.result):
             free_runs = tuple(without_values(run) for run in free_runs)

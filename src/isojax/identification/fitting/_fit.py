@@ -4,45 +4,21 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
 import numpy as np
-import optimistix as optx
 
-from ..._parameters import list_parameters, replace_parameters
+from ..._parameters import element_names, list_parameters, replace_parameters
 from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, estimate_noise
-from ..guess import scales as campaign_scales
+from .._rules import Rules
 from ._build_problem import build_problem
 from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
 from ._fit_result import Fit, Statistics
 from ._integration_steps import find_integrator
-from ._problem import Simulator, element_names
-
-DEFAULT_SOLVER = eqx.tree_at(
-    lambda solver: solver.search,
-    optx.LevenbergMarquardt(rtol=1e-9, atol=1e-9),
-    # optimistix lowers the damping only after a step that attains 99 % of the predicted decrease. Along the
-    # curved valley of coefficients that the records hardly tell apart none does, and the search would creep.
-    optx.ClassicalTrustRegion(high_cutoff=0.75),
-)
-"""Levenberg-Marquardt whose damping falls after a step that attains 75 % of the predicted decrease of chi2.
-
-Source: Nocedal & Wright 2006, *Numerical Optimization*, algorithm 4.1.
-"""
-
-MOST_STEPS = 100
-"""Evaluations after which a search gives up: most need ten, a curved valley some eighty."""
-
-
-def silent(line: str) -> None:
-    """Take a line of progress and say nothing.
-
-    Args:
-        line: the line.
-    """
+from ._search import DEFAULT_SOLVER, search_of, silent
+from ._simulator import Simulator
 
 
 def fit(
@@ -53,8 +29,9 @@ def fit(
     fixed: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
     integrator: Integrator | None = None,
-    max_steps: int = MOST_STEPS,
+    max_steps: int | None = None,
     progress: Callable[[str], None] = silent,
+    rules: Rules = Rules(),
 ) -> Fit:
     """Fit the coefficients of a model to the time histories of all fitting records together.
 
@@ -70,8 +47,9 @@ def fit(
         fixed: names of coefficients to hold.
         solver: an optimistix least-squares solver.
         integrator: solver and steps; the coarsest steps whose error is a twentieth of the noise, if omitted.
-        max_steps: simulations with derivatives after which the search gives up.
-        progress: told a line a step.
+        max_steps: simulations with derivatives after which the search gives up; 100 if omitted.
+        progress: receives a line a step.
+        rules: when a search is over, and what counts as scatter of the stiffness.
 
     Returns:
         The fit. Where the search failed, `result` says why and every error is NaN.
@@ -91,25 +69,15 @@ def fit(
             f"{campaign.file}: the noise of the output must be above 0, but the records, so short or so "
             f"clean, show {noise.sigma:g}; declare it: [output] noise = its rms"
         )
-    scales = campaign_scales(campaign)
+    search = search_of(campaign, rules, solver, progress, max_steps)
 
-    def search(start: Isolator) -> Estimate:
-        simulator = simulator_for(start, campaign, noise.white, integrator, noise.share)
-        return estimate(
-            simulator,
-            start,
-            places,
-            scales,
-            nuisances=None,
-            solver=solver,
-            max_steps=max_steps,
-            progress=progress,
-        )
+    def fit_from(start: Isolator) -> Estimate:
+        return estimate(simulator_for(start, campaign, noise, integrator, rules), start, places, search)
 
-    found = search(model)
+    found = fit_from(model)
     if found.result == RESULTS.not_finite:
         progress("the start runs away: again from its linear part")
-        again = search(_linear_part(model, places))
+        again = fit_from(_linear_part(model, places))
         found = found if again.result == RESULTS.not_finite else again
     return complete(found, model, campaign, noise)
 
@@ -139,31 +107,31 @@ def _check_excitation(model: Isolator, campaign: Campaign) -> None:
 
 
 def simulator_for(
-    model: Isolator, campaign: Campaign, noise: float, integrator: Integrator | None, share: float = 1.0
+    model: Isolator, campaign: Campaign, noise: NoiseEstimate, integrator: Integrator | None, rules: Rules
 ) -> Simulator:
-    """Give the bench of a campaign's fitting records.
+    """Give the simulator of a campaign's fitting records.
 
     Args:
         model: the isolator.
         campaign: the measurements.
-        noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
+        noise: the noise of the output.
         integrator: solver and steps, or None to choose them.
-        share: share of the samples of which the noise is independent.
+        rules: the integration error to choose them for.
 
     Returns:
-        The bench.
+        The simulator.
     """
     problem = build_problem(
         campaign.fit_records,
         model,
         quantity=campaign.output.quantity,
         hold=campaign.input.hold,
-        noise=noise,
-        share=share,
+        noise=noise.white,
+        share=noise.share,
         integrator=Integrator() if integrator is None else integrator,
     )
     if integrator is None:
-        problem = find_integrator(problem, model)
+        problem = find_integrator(problem, model, rules.integration_error)
     return Simulator(problem)
 
 
@@ -177,7 +145,7 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         noise: the noise.
 
     Returns:
-        The fit; it is held against the records when that is first asked for.
+        The fit; it is compared with every record when that is first asked for.
     """
     samples, count = int(found.point.samples.sum()), len(found.places)
     stats = Statistics(
@@ -189,7 +157,7 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         found.chi2 + count * float(np.log(samples)),
         found.steps,
         *found.point.nuisances.spread,
-        found.simulator.problem.step_error,
+        found.problem.step_error,
     )
     return Fit(
         found.model,

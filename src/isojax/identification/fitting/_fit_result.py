@@ -62,10 +62,10 @@ class Fit(NamedTuple):
         free: names of the fitted coefficients.
         covariance: of the fitted coefficients [product of their units], scaled by max(1, chi2/dof).
         stats: counts and criteria.
-        noise: the noise that errors are held against.
+        noise: the noise that errors are compared with.
         result: how the search ended.
         estimate: the equations at the solution.
-        evaluation: the model held against every record, fitted and held out, when first asked for.
+        evaluation: the model compared with every record, fitted and held out, when first asked for.
     """
 
     model: Isolator
@@ -153,7 +153,7 @@ def _statistics(fit: Fit) -> list[str]:
     if not is_successful(fit.result):
         nothing = dict.fromkeys(("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter"), math.nan)
         stats = stats._replace(**nothing)
-    integrator = fit.estimate.simulator.problem.integrator
+    integrator = fit.estimate.problem.integrator
     scatter = f"{100 * stats.stiffness_scatter:.2g} % between records"
     if stats.segment_scatter > 0.0:
         scatter += f", {100 * stats.segment_scatter:.2g} % within them"

@@ -7,7 +7,8 @@ from ...models import Isolator
 from ...records import Record, ringing_frequency
 from ..jacobian import Segment
 from ._elimination import Nuisances, Spread, step_nuisances
-from ._problem import Point, Problem, Simulator, one_hot
+from ._problem import Point, Problem, one_hot
+from ._simulator import Simulator
 
 ROUNDS = 3
 """Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""

@@ -4,10 +4,8 @@ import numpy as np
 
 from ...models import Integrator, Isolator
 from ..jacobian import readings
-from ._problem import Problem, Simulator
-
-SHARE_OF_NOISE = 0.05
-"""Integration error allowed, over the noise: adds 0.0025 to chi2/dof at most."""
+from ._problem import Problem
+from ._simulator import Simulator
 
 FINEST = 32
 
@@ -41,19 +39,20 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise)
 
 
-def find_integrator(problem: Problem, model: Isolator) -> Problem:
+def find_integrator(problem: Problem, model: Isolator, largest: float) -> Problem:
     """Find the coarsest steps whose error is a small share of the noise.
 
     Args:
         problem: the records.
         model: the isolator; a start will do.
+        largest: integration error over the noise that is small enough.
 
     Returns:
         The problem with its integrator (the finest that was tried where none suffices) and its step error.
     """
     substeps = Integrator().record_steps(model)
     error = step_error(problem, model, substeps)
-    while substeps < FINEST and error > SHARE_OF_NOISE:
+    while substeps < FINEST and error > largest:
         substeps *= 2
         error = step_error(problem, model, substeps)
     return problem._replace(integrator=Integrator(problem.integrator.solver, substeps), step_error=error)

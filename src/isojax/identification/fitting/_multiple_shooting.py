@@ -1,30 +1,16 @@
 """A start for records that are left whole: fits to windows of them, each longer than the last."""
 
 import itertools
-from collections.abc import Callable
-from typing import Any
 
-from ...elements import Scales
 from ...models import Isolator
 from ..jacobian import cut_evenly, segments_between
 from ._estimate import Estimate, estimate
-from ._problem import Simulator
-
-WINDOWS = (16, 4)
-"""Windows a record, in the order in which they are fitted."""
-
-ENOUGH = 25
-"""Evaluations after which the next, longer windows are taken."""
+from ._search import Search
+from ._simulator import Simulator
 
 
 def fit_by_multiple_shooting(
-    fitted: Estimate,
-    model: Isolator,
-    places: tuple[int, ...],
-    scales: Scales,
-    solver: Any,
-    tolerance: float,
-    progress: Callable[[str], None],
+    fitted: Estimate, model: Isolator, places: tuple[int, ...], search: Search
 ) -> Isolator:
     """Fit a model to short windows of whole records, then to longer ones.
 
@@ -37,10 +23,7 @@ def fit_by_multiple_shooting(
         fitted: the estimate whose records count.
         model: the start.
         places: free coefficients, by their place in `list_parameters`.
-        scales: magnitudes of the records.
-        solver: an optimistix least-squares solver.
-        tolerance: decrease of chi2 per max(chi2/dof, 1) below which a search is over.
-        progress: told a line a step.
+        search: how to search.
 
     Returns:
         The model that the longest windows leave; the start where none could be simulated.
@@ -48,24 +31,14 @@ def fit_by_multiple_shooting(
     Source: van Domselaar & Hemker 1975, Mathematisch Centrum report NW 18/75, and Bock 1983 (multiple
     shooting), without its matching of the pieces.
     """
-    problem = fitted.simulator.problem
-    for count in WINDOWS:
+    problem, search = fitted.problem, search._replace(max_steps=search.rules.window_evaluations)
+    for count in search.rules.windows:
         pieces = (
             segments_between(place, record, cut_evenly(record.output.size, count))
             for place, record in enumerate(problem.records)
         )
         segments = tuple(itertools.chain.from_iterable(pieces))
-        progress(f"a start from {count} windows a record")
-        found = estimate(
-            Simulator(problem._replace(segments=segments, heads=())),
-            model,
-            places,
-            scales,
-            nuisances=None,
-            solver=solver,
-            max_steps=ENOUGH,
-            progress=progress,
-            tolerance=tolerance,
-        )
+        search.progress(f"a start from {count} windows a record")
+        found = estimate(Simulator(problem._replace(segments=segments, heads=())), model, places, search)
         model = found.model if found.point.is_finite else model
     return model

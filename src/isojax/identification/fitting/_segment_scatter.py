@@ -9,18 +9,15 @@ from jaxtyping import Float
 from scipy import stats
 
 from ...records import Record
+from .._rules import Rules
 from ..jacobian import STIFFNESS_SCALE_UNIT, Segment
 from ._problem import Point
 
-SIGNIFICANCE = 0.01
-"""Chance, were there no scatter, of differences as large as those that are taken for scatter."""
-
-ALIKE = 0.1
-"""Relative difference of rms from which two dwells lie on different branches, or were driven otherwise."""
-
-
 SAME_FREQUENCY = 1e-3
 """Relative difference up to which two dwells have one frequency."""
+
+
+_Lane = tuple[int, Segment]
 
 
 class _Pair(NamedTuple):
@@ -31,7 +28,11 @@ class _Pair(NamedTuple):
 
 
 def segment_scatter(
-    records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point, inflation: float
+    records: tuple[Record, ...],
+    segments: tuple[Segment, ...],
+    point: Point,
+    inflation: float,
+    rules: Rules,
 ) -> float:
     """Give the standard deviation of the linear stiffness from segment to segment within a record.
 
@@ -47,6 +48,7 @@ def segment_scatter(
         inflation: chi2/dof. Noise that is larger than was thought would pass for scatter, and so would a law
             that is missing, as far as the repeats differ in amplitude; scatter itself hardly raises it, each
             segment having many samples to its one stiffness.
+        rules: what counts as scatter, and which dwells are on one branch.
 
     Returns:
         Relative standard deviation; 0 where no repeat shows one.
@@ -54,32 +56,34 @@ def segment_scatter(
     Source: DerSimonian & Laird 1986, Controlled Clinical Trials 7:177, eq. 8 (estimate by moments).
     """
     squares, freedom, weight = 0.0, 0, 0.0
-    for pair in _pairs(records, segments, point):
+    for pair in _pairs(records, segments, point, rules.same_motion):
         weights = 1.0 / (max(1.0, inflation) * pair.variances)
         mean = np.sum(weights * pair.differences) / weights.sum()
         squares += float(np.sum(weights * (pair.differences - mean) ** 2))
         freedom += pair.differences.size - 1
         weight += float(weights.sum() - np.sum(weights**2) / weights.sum())
-    if freedom < 1 or not stats.chi2.sf(squares, freedom) < SIGNIFICANCE:
+    if freedom < 1 or not stats.chi2.sf(squares, freedom) < rules.scatter_significance:
         return 0.0
     # A difference holds the scatter of two segments.
     return float(np.sqrt(max(0.0, squares - freedom) / weight / 2.0)) * STIFFNESS_SCALE_UNIT
 
 
-def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point) -> list[_Pair]:
+def _pairs(
+    records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point, same: float
+) -> list[_Pair]:
     """List pairs of repeats, no record in more than one."""
     groups = defaultdict(list)
     for place, record in enumerate(records):
         groups[record.level, record.direction, record.role, record.kind].append(place)
     held = defaultdict(list)
     for lane, segment in enumerate(segments):
-        held[segment.record].append(lane)
+        held[segment.record].append((lane, segment))
     pairs = []
     for group in groups.values():
         for one, other in itertools.pairwise(group):
             if group.index(one) % 2:
                 continue
-            lanes = np.array(_matched(records, segments, held[one], held[other]), dtype=int).reshape(-1, 2)
+            lanes = np.array(_matched(records, held[one], held[other], same), dtype=int).reshape(-1, 2)
             information, score = point.reduced.by_segment[lanes].transpose(2, 0, 1)
             seen = np.all(information > 0.0, axis=1)
             if np.count_nonzero(seen) > 1:
@@ -90,19 +94,19 @@ def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Po
 
 
 def _matched(
-    records: tuple[Record, ...], segments: tuple[Segment, ...], own: list[int], others: list[int]
+    records: tuple[Record, ...], own: list[_Lane], others: list[_Lane], same: float
 ) -> list[tuple[int, int]]:
     """List the segments of one record with those of its repeat that passed the same test, in their order."""
     pairs, left = [], list(others)
-    for lane in own:
-        match = next((one for one in left if _is_the_same(records, segments[lane], segments[one])), None)
+    for lane, segment in own:
+        match = next((one for one in left if _is_the_same(records, segment, one[1], same)), None)
         if match is not None:
-            pairs.append((lane, match))
+            pairs.append((lane, match[0]))
             left = left[left.index(match) + 1 :]
     return pairs
 
 
-def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment) -> bool:
+def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment, same: float) -> bool:
     """Say whether two segments passed the same test on the same branch.
 
     Of a dwell frequency and level tell that, wherever in the record it lies; of other windows only a drive
@@ -116,7 +120,7 @@ def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment) -> b
         difference = (
             _rms(first.input - second.input, one) if first.input.size == second.input.size else np.inf
         )
-        if not difference < ALIKE * _rms(first.input, one):
+        if not difference < same * _rms(first.input, one):
             return False
     elif abs(frequencies[0] - frequencies[1]) > SAME_FREQUENCY * frequencies[0]:
         return False
@@ -124,7 +128,7 @@ def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment) -> b
         (_rms(record.input, segment), _rms(record.output, segment))
         for record, segment in ((first, one), (second, other))
     ]
-    return all(abs(a - b) < ALIKE * max(a, b) for a, b in zip(*sizes, strict=True))
+    return all(abs(a - b) < same * max(a, b) for a, b in zip(*sizes, strict=True))
 
 
 def _rms(signal: Float[np.ndarray, " time"], segment: Segment) -> float:

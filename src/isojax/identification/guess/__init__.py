@@ -1,4 +1,11 @@
-"""isojax.identification.guess."""
+"""Classical analysis: coefficients to start from, and typical magnitudes, without a simulation.
+
+In: a campaign. Out: a `ClassicalGuess` with the start of a fit, and the `Scales` of the campaign.
+Read `_read_campaign` and `_declared_model`, then `_classical_guess` (the door) and `_start_coefficients`
+(dwells or time?), then `_dwell_balance`, `_restoring_force` and `_force_balance` (the regression).
+`_paper_table` is the paper's route: `_half_power`, `_circle_fit`, `_equivalent_law`. `_scales` and
+`_motion` serve all rooms above.
+"""
 
 from ._balance_start import find_balance_start as find_balance_start
 from ._circle_fit import CircleFit as CircleFit

@@ -8,15 +8,13 @@ from ..._parameters import own_parameters
 from ...elements import AbstractElement, Scales
 from ...models import Isolator
 from ...records import Campaign
+from .._rules import Rules
 from ._dwell_balance import fit_all_dwells
 from ._force_balance import BalanceFit
 from ._measured_receptance import measured_receptance
 from ._motion import measured_motion
 from ._restoring_force import fit_restoring_force
 from ._scales import excited_centre
-
-MUCH_BETTER = 0.5
-"""An effect leads the balance if it leaves less than this share of what is unbalanced without it."""
 
 
 class BalanceStart(NamedTuple):
@@ -36,7 +34,11 @@ class BalanceStart(NamedTuple):
 
 
 def find_balance_start(
-    campaign: Campaign, model: Isolator, scales: Scales, absent: tuple[AbstractElement, ...]
+    campaign: Campaign,
+    model: Isolator,
+    scales: Scales,
+    absent: tuple[AbstractElement, ...],
+    rules: Rules,
 ) -> BalanceStart | None:
     """Find the absent effect without which the measured forces do not balance, if there is one.
 
@@ -48,11 +50,11 @@ def find_balance_start(
         campaign: the measurements; only records to fit are looked at.
         model: the fitted model, for its structure.
         scales: magnitudes of the records.
-        absent: absent effects; those without memory take part.
+        absent: absent effects; those without internal states take part.
+        rules: how much less an effect must leave unbalanced than the structure alone; what is no dwell.
 
     Returns:
-        The effect that leaves least unbalanced, or None if none leaves less than half of what the structure
-        alone does.
+        The effect that leaves least unbalanced, or None if none leaves so little.
 
     Source: Masri & Caughey 1979.
     """
@@ -61,7 +63,7 @@ def find_balance_start(
     records = campaign.fit_records
     names = tuple(element.name for element in model.elements)
     if all(record.dwells for record in records):
-        responses = tuple(measured_receptance(campaign, record) for record in records)
+        responses = tuple(measured_receptance(campaign, record, rules) for record in records)
 
         def balance(structure: Isolator, fitted: tuple[str, ...]) -> BalanceFit:
             return fit_all_dwells(structure, fitted, responses, mass_free=campaign.mass_free)
@@ -97,4 +99,4 @@ def find_balance_start(
             if (element.signed or strength > 0.0) and strength > lower:
                 found.append(BalanceStart(element, tried.model, tried.unexplained, before))
     best = min(found, key=lambda one: one.unexplained, default=None)
-    return best if best is not None and best.unexplained < MUCH_BETTER * before else None
+    return best if best is not None and best.unexplained < rules.much_better * before else None

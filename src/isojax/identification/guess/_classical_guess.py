@@ -7,6 +7,7 @@ from ..._parameters import list_parameters
 from ..._types import check_float64
 from ...models import Isolator
 from ...records import Campaign
+from .._rules import Rules
 from ._declared_model import base_model, declared_names
 from ._force_balance import BalanceFit
 from ._linear_response import LinearResponse
@@ -93,6 +94,7 @@ def classical_guess(
     *,
     damping: Literal["half_power", "circle"] = "half_power",
     resonance: Literal["peak", "phase"] = "peak",
+    rules: Rules = Rules(),
 ) -> ClassicalGuess:
     """Guess the coefficients of the declared structure by classical analysis.
 
@@ -104,6 +106,7 @@ def classical_guess(
         campaign: the campaign; only records with role "fit" are looked at.
         damping: where the paper's route takes its damping ratio from.
         resonance: which resonance the paper's route takes.
+        rules: which dwells are not steady or not driven.
 
     Returns:
         The start of a fit, and what led to it.
@@ -117,7 +120,7 @@ def classical_guess(
     names = declared_names(campaign, extra=False)
     mass_free = campaign.mass_free and not campaign.input.gain_free
     dwelling = [record for record in campaign.fit_records if record.dwells]
-    responses = tuple(measured_receptance(campaign, record) for record in dwelling)
+    responses = tuple(measured_receptance(campaign, record, rules) for record in dwelling)
     others = tuple(record for record in campaign.fit_records if not record.dwells)
     in_time = start_from_time(campaign, base, names, others, mass_free) if others else None
     if responses:

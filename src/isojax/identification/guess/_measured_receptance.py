@@ -6,16 +6,8 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from ...records import Campaign, Record, dwell_harmonics
+from .._rules import Rules
 from ._motion import is_absolute
-
-_DROP_OUT = 1e-3
-"""A dwell driven with less than this share of the strongest is no dwell."""
-
-_UNSTEADY = 0.05
-"""A dwell is unsteady where its harmonics leave more than this share of the first."""
-
-_USUAL = 6.0
-"""... and more than this many times what they leave in the dwells of the record as a rule, which is noise."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -51,12 +43,15 @@ class MeasuredResponse:
         return self.displacement[:, 0] / self.force[:, 0]
 
 
-def measured_receptance(campaign: Campaign, record: Record, harmonics: int = 7) -> MeasuredResponse:
+def measured_receptance(
+    campaign: Campaign, record: Record, rules: Rules, harmonics: int = 7
+) -> MeasuredResponse:
     """Measure the receptance of a stepped-sine record at each dwell.
 
     Args:
         campaign: says what the channels measure.
         record: a record with dwells.
+        rules: which dwells are not steady or not driven.
         harmonics: how many harmonics to keep.
 
     Returns:
@@ -75,8 +70,9 @@ def measured_receptance(campaign: Campaign, record: Record, harmonics: int = 7) 
     output = np.stack([one.output[1:] for one in measured])
     rest = np.array([(one.input_residual, one.output_residual) for one in measured])
     size = np.abs(np.stack([drive[:, 0], output[:, 0]], axis=1))
-    steady = np.all((rest <= _UNSTEADY * size) | (rest <= _USUAL * np.median(rest, axis=0)), axis=1)
-    kept = steady & (size[:, 0] > _DROP_OUT * np.max(size[:, 0])) & (size[:, 1] > 0)
+    noise = np.median(rest, axis=0)
+    steady = np.all((rest <= rules.unsteady * size) | (rest <= rules.unsteady_noise * noise), axis=1)
+    kept = steady & (size[:, 0] > rules.drop_out * np.max(size[:, 0])) & (size[:, 1] > 0)
     if is_absolute(campaign):
         output = output - drive
     if campaign.input.quantity == "base_acceleration":

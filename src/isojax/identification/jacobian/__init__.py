@@ -1,8 +1,13 @@
-"""isojax.identification.jacobian."""
+"""A simulated record and its exact derivatives: by coefficients, initial states and absent effects.
+
+In: a model and records cut into segments. Out: information matrices J'J with J'r, one a segment.
+Read `_segments` (where records are cut) and `_batch` (segments side by side), then `_information` (the
+matrices of a model) with `_families`, `_internal_states` and `_channels`, then `_score_columns` (the
+columns of absent effects) with `_effect_inputs`, `_slopes`, `_transitions` and `_propagation`.
+"""
 
 from ._batch import Prepared as Prepared
 from ._batch import coordinate_motion as coordinate_motion
-from ._batch import drive_table as drive_table
 from ._batch import prepare as prepare
 from ._batch import workers as workers
 from ._channels import carries as carries

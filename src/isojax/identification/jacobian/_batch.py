@@ -3,7 +3,6 @@
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import equinox as eqx
 import jax
@@ -103,29 +102,6 @@ def workers() -> int:
 
 
 _Table = tuple[Float[np.ndarray, "time stage"], Float[np.ndarray, "time stage"]]
-_TABLES: WeakKeyDictionary[Record, dict[tuple[Hold, int, float], _Table]] = WeakKeyDictionary()
-_KEPT_TABLES = 1
-
-
-def drive_table(record: Record, hold: Hold, substeps: int, shift: float) -> _Table:
-    """Give a record's drive and its derivative at the stages of the steps; the last few tables are kept.
-
-    Args:
-        record: the record.
-        hold: what the drive does between samples.
-        substeps: integration steps a sample.
-        shift: time by which the drive acts later than it was recorded [s].
-
-    Returns:
-        As `tabulate`.
-    """
-    known = _TABLES.setdefault(record, {})
-    key = (hold, substeps, shift)
-    if key not in known:
-        while len(known) >= _KEPT_TABLES:
-            del known[next(iter(known))]
-        known[key] = tabulate(record.input, record.rate, hold, substeps, shift)
-    return known[key]
 
 
 def prepare(
@@ -171,7 +147,8 @@ def prepare(
     def known(place: int) -> tuple[_Table, tuple[np.ndarray, ...], dict[str, np.ndarray]]:
         record = records[place]
         extra = {name: channel_table(name, record, hold, substeps, shift) for name in channels}
-        return drive_table(record, hold, substeps, shift), coordinate_motion(record, quantity, based), extra
+        table = tabulate(record.input, record.rate, hold, substeps, shift)
+        return table, coordinate_motion(record, quantity, based), extra
 
     with ThreadPoolExecutor(workers()) as pool:
         used = sorted({segment.record for segment in segments})

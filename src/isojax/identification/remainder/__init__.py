@@ -11,4 +11,3 @@ from ._matching_pursuit import Pursuit as Pursuit
 from ._remainder import ForceMap as ForceMap
 from ._remainder import Remainder as Remainder
 from ._remainder import explain_remainder as explain_remainder
-from ._remainder import loop_remainder as loop_remainder

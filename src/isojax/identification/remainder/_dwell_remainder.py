@@ -67,10 +67,8 @@ def dwell_remainders(fit: Fit, residuals: tuple[ForceResidual, ...]) -> tuple[Dw
     Returns:
         One per dwell whose integrals are reliable; none without dwells.
     """
-    runs = {id(run.record): run for run in fit.restarts.runs}
     dwells = []
-    for one in residuals:
-        run = runs[id(one.record)]
+    for one, run in zip(residuals, fit.restarts.runs, strict=True):
         for dwell in one.record.dwells:
             window = _window(one, dwell)
             orders = min(HARMONICS, int(one.highest / dwell.frequency))

@@ -13,13 +13,13 @@ from scipy.signal import butter, sosfiltfilt
 
 from ..._parameters import list_parameters
 from ...elements import Channels
-from ...excitations import Hold
+from ...excitations import Hold, tabulate
 from ...models import RK4, Instant, Isolator, State, share_internal
 from ...records import Band, Campaign, Record, measured_state
 from ...records.spectrum import shift_order
 from ..fitting import Fit, Run
 from ..guess import Motion, is_absolute, measured_motion
-from ..jacobian import channel_table, drive_table, follow_motion, scaled_model
+from ..jacobian import channel_table, follow_motion, scaled_model
 
 _STEPS = 2
 """Integration steps per sample for internal states that follow the measured motion."""
@@ -152,11 +152,10 @@ def force_residuals(fit: Fit) -> tuple[ForceResidual, ...]:
     restarts = fit.restarts
     # One band for all records, so that they show the same harmonics of a law.
     common = max(measured_motion(fit.campaign, record).band.highest for record in fit.campaign.records)
-    residuals = {
-        id(run.record): _force_residual(fit, run, 1.0 + deviation, place, common)
+    return tuple(
+        _force_residual(fit, run, 1.0 + deviation, place, common)
         for place, (run, deviation) in enumerate(zip(restarts.runs, restarts.deviations, strict=True))
-    }
-    return tuple(residuals[id(record)] for record in fit.campaign.records)
+    )
 
 
 def _force_residual(
@@ -165,7 +164,7 @@ def _force_residual(
     model, campaign, record = fit.model, fit.campaign, run.record
     hold: Hold = campaign.input.hold
     shift = float(model.shift())
-    table, slopes = drive_table(record, hold, 1, shift)
+    table, slopes = tabulate(record.input, record.rate, hold, 1, shift)
     u, du = jnp.asarray(table[:, 0]), jnp.asarray(slopes[:, 0])
     channels = {
         name: jnp.asarray(channel_table(name, record, hold, 1, shift)[:, 0]) for name in model.channels

@@ -1,7 +1,6 @@
 """Matching pursuit: which force laws outside the catalogue would explain what a fitted model leaves."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -11,23 +10,11 @@ from scipy import stats
 
 from ..._parameters import list_parameters, replace_parameters
 from ..._results import is_successful
-from ...elements import Scales
 from ...models import Isolator
-from ..diagnosis import CLOSE_LIKENESS, SMALLEST_GAIN, Projection, project, refit_from
-from ..fitting import Estimate
+from .._rules import Rules
+from ..diagnosis import Projection, project, refit_from
+from ..fitting import Estimate, Search, silent
 from ._free_laws import AbstractFreeForce, free_laws
-
-MOST_LAWS = 4
-"""Largest number of laws."""
-
-_CHANCE = 0.01
-"""Family-wise p-value above which a law is not selected."""
-
-_SHARE = 0.02
-"""Share of the excess below which a law is not selected."""
-
-_TIE = 0.03
-"""Share of the best law's gain that a plainer one may lack and still be selected."""
 
 
 class PursuedLaw(NamedTuple):
@@ -82,15 +69,16 @@ class _Selection(NamedTuple):
 
 
 def _pursue(
-    traces: Projection, ranks: Float[np.ndarray, " law"], chi2: float, dof: float
+    traces: Projection, ranks: Float[np.ndarray, " law"], fitted: Estimate, rules: Rules
 ) -> tuple[_Selection, ...]:
     """Select laws one after the other, each projected out of the residual and of the other laws."""
     information, score = traces.information.copy(), traces.score.copy()
     whole = np.diag(traces.information).copy()
-    free = traces.seen.copy()
-    excess, tests = max(chi2 - dof, 1.0), max(1, int(traces.seen.sum()))
+    free = traces.visibility > rules.smallest_visibility
+    chi2, dof = fitted.chi2, fitted.dof
+    excess, tests = max(chi2 - dof, 1.0), max(1, int(free.sum()))
     selected: list[_Selection] = []
-    while len(selected) < MOST_LAWS and np.any(free):
+    while len(selected) < rules.pursuit_laws and np.any(free):
         own = np.diag(information)
         # A law that the selected ones imitate counts as unseen, like one that the coefficients imitate.
         free &= own > 1e-3 * whole
@@ -99,16 +87,19 @@ def _pursue(
         gains = np.where(free, score**2 / np.where(free, own, 1.0), 0.0)
         inflation = max(1.0, chi2 / dof)
         best = int(np.argmax(gains))
-        close = free & (gains >= gains[best] - max(10.0 * inflation, _TIE * gains[best]))
+        tie = max(rules.close_bic * inflation, rules.pursuit_tie * gains[best])
+        close = free & (gains >= gains[best] - tie)
         order = np.lexsort((-gains, np.where(close, ranks, np.inf)))
         place = int(order[0])
         gain = float(gains[place])
         chance = tests * 2.0 * stats.norm.sf(np.sqrt(gain / inflation))
-        if chance > _CHANCE or gain < max(_SHARE * excess, SMALLEST_GAIN * dof):
+        smallest = max(rules.pursuit_share * excess, rules.smallest_gain * dof)
+        if chance > rules.pursuit_significance or gain < smallest:
             break
         size = np.sqrt(np.where(free, own, np.inf))
         likeness = np.abs(information[place]) / (size * size[place])
-        alike = tuple(int(k) for k in np.argsort(-likeness) if likeness[k] > CLOSE_LIKENESS and k != place)
+        near = np.argsort(-likeness)
+        alike = tuple(int(k) for k in near if likeness[k] > rules.close_likeness and k != place)
         selected.append(_Selection(place, float(score[place] / size[place]), gain, alike))
         column = information[:, place].copy()
         score = score - column * score[place] / column[place]
@@ -118,14 +109,7 @@ def _pursue(
     return tuple(selected)
 
 
-def pursue_laws(
-    fitted: Estimate,
-    scales: Scales,
-    *,
-    refit: bool,
-    solver: Any,
-    progress: Callable[[str], None],
-) -> Pursuit:
+def pursue_laws(fitted: Estimate, search: Search, *, refit: bool) -> Pursuit:
     """Select free force laws that explain what a fit leaves: orthogonal matching pursuit on exact columns.
 
     The law of the largest score is selected and projected out of the residual and of all other laws, as the
@@ -134,22 +118,20 @@ def pursue_laws(
 
     Args:
         fitted: the estimate.
-        scales: magnitudes of the records.
+        search: how to search.
         refit: whether to refit all coefficients with the laws, which checks the linear step.
-        solver: an optimistix least-squares solver for the refit.
-        progress: called with one line per step.
 
     Returns:
         The laws.
 
     Source: Pati, Rezaiifar & Krishnaprasad 1993 (orthogonal matching pursuit).
     """
-    laws = free_laws(scales)
-    progress(f"pursuit among {len(laws)} free force laws")
-    units = np.array([1e-3 * law.typical_strength(scales) for law in laws])
+    laws = free_laws(search.scales)
+    search.progress(f"pursuit among {len(laws)} free force laws")
+    units = np.array([1e-3 * law.typical_strength(search.scales) for law in laws])
     traces = project(fitted, laws, units)
     wordings = [law.wording() for law in laws]
-    selected = _pursue(traces, np.array([one.rank for one in wordings]), fitted.chi2, fitted.dof)
+    selected = _pursue(traces, np.array([one.rank for one in wordings]), fitted, search.rules)
     chi2_per_dof = fitted.chi2 / fitted.dof
     if not selected:
         return Pursuit((), len(laws), chi2_per_dof, chi2_per_dof, float("nan"))
@@ -177,22 +159,18 @@ def pursue_laws(
         )
     refitted = float("nan")
     if refit:
-        progress("refit with " + ", ".join(law.formula for law in pursued))
+        search.progress("refit with " + ", ".join(law.formula for law in pursued))
         chosen = [
             eqx.tree_at(lambda e: getattr(e, e.strength), laws[place], jnp.asarray(float(strength)))
             for place, strength in zip(places, amount * units[places], strict=True)
         ]
         step = traces.step[:, -1] - traces.step[:, places] @ amount
-        refitted = _refitted_goodness(fitted, scales, chosen, step, solver)
+        refitted = _refitted_goodness(fitted, chosen, step, search)
     return Pursuit(tuple(pursued), len(laws), chi2_per_dof, float(linear), refitted)
 
 
 def _refitted_goodness(
-    fitted: Estimate,
-    scales: Scales,
-    laws: list[AbstractFreeForce],
-    step: Float[np.ndarray, " coefficient"],
-    solver: Any,
+    fitted: Estimate, laws: list[AbstractFreeForce], step: Float[np.ndarray, " coefficient"], search: Search
 ) -> float:
     """Give chi2/dof of a refit with the laws, started from the linear step of the coefficients."""
     model = Isolator(fitted.model.mass, (*fitted.model.elements, *laws), fitted.model.excitation)
@@ -202,5 +180,6 @@ def _refitted_goodness(
         moved = float(numbers[place]) + float(change)
         if listed[place].spec.lower < moved < listed[place].spec.upper:
             numbers[place] = numbers[place] + float(change)
-    found = refit_from(fitted, replace_parameters(model, numbers), scales, solver, 12, lambda line: None)
+    search = search._replace(max_steps=search.rules.description_evaluations, progress=silent)
+    found = refit_from(fitted, replace_parameters(model, numbers), search)
     return found.chi2 / found.dof if is_successful(found.result) and np.isfinite(found.chi2) else float("nan")

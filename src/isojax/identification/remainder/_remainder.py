@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float
 
 from ..._results import is_successful
-from ..diagnosis import Loop
-from ..fitting import DEFAULT_SOLVER, Evaluation, Fit, silent
-from ..guess import scales as campaign_scales
+from .._rules import Rules
+from ..fitting import DEFAULT_SOLVER, Fit, search_of, silent
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 from ._matching_pursuit import Pursuit, pursue_laws
@@ -56,6 +54,7 @@ def explain_remainder(
     refit: bool = True,
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
+    rules: Rules = Rules(),
 ) -> Remainder:
     """Describe what a fitted model leaves of its records, where no known effect explains it.
 
@@ -66,6 +65,7 @@ def explain_remainder(
         refit: whether to refit with the pursued laws, which checks their linear step.
         solver: an optimistix least-squares solver for the refit.
         progress: called with one line per step.
+        rules: which laws stand out of the noise.
 
     Returns:
         The description.
@@ -75,33 +75,11 @@ def explain_remainder(
     """
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
-    scales = campaign_scales(fit.campaign)
-    pursuit = pursue_laws(fit.estimate, scales, refit=refit, solver=solver, progress=progress)
+    search = search_of(fit.campaign, rules, solver, progress)
+    pursuit = pursue_laws(fit.estimate, search, refit=refit)
     progress("force residual")
     residuals = force_residuals(fit)
     return Remainder(pursuit, dwell_remainders(fit, residuals), _force_map(residuals))
-
-
-_KNOWN: WeakKeyDictionary[Evaluation, Remainder] = WeakKeyDictionary()
-"""Remainders already described: a report asks for one several times."""
-
-
-def loop_remainder(loop: Loop) -> Remainder | None:
-    """Describe what a closed loop leaves unexplained; worked out once.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        The description; None where the verdict is another, or the last fit failed.
-    """
-    after = loop.after
-    asked = loop.verdict in ("unexplained", "partly_explained")
-    if not (asked and is_successful(after.result) and after.estimate.point.is_finite):
-        return None
-    if after.evaluation not in _KNOWN:
-        _KNOWN[after.evaluation] = explain_remainder(after)
-    return _KNOWN[after.evaluation]
 
 
 def _force_map(residuals: tuple[ForceResidual, ...]) -> ForceMap:

@@ -8,7 +8,7 @@ import jinja2
 
 from ..._parameters import list_parameters
 from ...health import CampaignHealth, campaign_health
-from ...identification import OUTPUT_UNITS, Candidate, Fit, Loop, loop_remainder, plain_unit
+from ...identification import OUTPUT_UNITS, Candidate, Fit, Loop, plain_unit
 from ...records import Campaign
 from ..words import (
     budget_rows,
@@ -62,7 +62,7 @@ def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
     same = before is after
     campaign = loop.campaign
     quantity = campaign.output.quantity
-    remainder = loop_remainder(loop)
+    remainder = loop.remainder
     return {
         "title": campaign.title,
         "verdict": loop.verdict,

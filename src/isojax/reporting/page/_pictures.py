@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..._results import is_successful
 from ...health import CampaignHealth
-from ...identification import ClassicalGuess, Fit, Loop, loop_remainder, residual
+from ...identification import ClassicalGuess, Fit, Loop, residual
 from ..plots import (
     centre_frequency,
     effect_on_its_own,
@@ -149,7 +149,7 @@ def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tup
 
 def _remainder_pictures(loop: Loop) -> tuple[Picture, ...]:
     """Draw the unexplained residual, where there is one."""
-    remainder = loop_remainder(loop)
+    remainder = loop.remainder
     if remainder is None:
         return ()
     pictures: tuple[Picture, ...] = ()

@@ -6,7 +6,7 @@ from typing import Any
 from ..._parameters import list_parameters
 from ..._results import is_successful
 from ...health import CampaignHealth
-from ...identification import Errors, Finding, Fit, Loop, loop_remainder, plain_unit
+from ...identification import Errors, Finding, Fit, Loop, plain_unit
 from ..words import health_dict, remainder_dict
 
 SCHEMA = 1
@@ -25,7 +25,7 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
         Numbers, words, lists and dictionaries that JSON holds; None where a number is not finite, and for the
         coefficients of a fit that failed.
     """
-    remainder = loop_remainder(loop)
+    remainder = loop.remainder
     return {
         "schema": SCHEMA,
         "campaign": loop.campaign.title,

@@ -4,7 +4,7 @@ import math
 import re
 from typing import Any
 
-from ...identification import Loop, Pursuit, Remainder, loop_remainder
+from ...identification import Loop, Pursuit, Remainder
 from ._quantities import typeset_goodness, typeset_number, typeset_share, typeset_unit
 from ._quantities import typeset_with_error as with_error
 
@@ -20,7 +20,7 @@ def remainder_summary(loop: Loop) -> tuple[str, ...]:
     Returns:
         The lines; none where nothing is left to describe.
     """
-    remainder = loop_remainder(loop)
+    remainder = loop.remainder
     return () if remainder is None else (f"Unexplained residual: {pursuit_words(remainder.pursuit)}",)
 
 

@@ -7,7 +7,7 @@ import scipy.stats
 from ..._parameters import Parameter, list_parameters
 from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE
-from ...identification import GOOD, OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
+from ...identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
 from ...records import DataHealth
 from ._quantities import (
     typeset_goodness,
@@ -117,7 +117,7 @@ def doubt_words(loop: Loop) -> str:
     last, rise = after.chi2_per_dof, after.chi2_per_dof - before.chi2_per_dof
     if not math.isfinite(last):
         return "The held-out records speak against it: the model runs away on them."
-    if last <= GOOD or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
+    if last <= loop.rules.good or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
         return ""
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
     if rise > WORSE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):

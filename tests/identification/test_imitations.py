@@ -7,12 +7,11 @@ import pytest
 
 from isojax import rig
 from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
-from isojax.identification import close_loop, diagnose, fit, scales, silent
-from isojax.identification.diagnosis._diagnose import GOOD
+from isojax.identification import Rules, close_loop, diagnose, fit, scales
 from isojax.identification.diagnosis._imitations import find_simpler_pair, find_superfluous
 from isojax.identification.diagnosis._refit import Refit, refit_candidate
 from isojax.identification.diagnosis._score import absent_effects, score_test
-from isojax.identification.fitting._fit import DEFAULT_SOLVER
+from isojax.identification.fitting import Search
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
@@ -38,14 +37,14 @@ def thin(simulated):
 
 def _superfluous(campaign, start, *names):
     found = fit(start, campaign, integrator=Integrator())
-    return find_superfluous(found.estimate, names, campaign, scales(campaign), DEFAULT_SOLVER, silent)
+    return find_superfluous(found.estimate, names, Search(scales(campaign)))
 
 
 @pytest.mark.slow
 def test_both_effects_are_named_although_the_first_makes_the_fit_good(thin):
     loop = close_loop(thin)
     first = loop.extensions[0].after.estimate
-    assert first.chi2 / first.dof < GOOD
+    assert first.chi2 / first.dof < Rules.good
     assert {finding.effect for finding in loop.findings} == {"coulomb_friction", "cubic_stiffness"}
     assert loop.verdict == "found"
     found = {entry.name: float(entry.value) for entry in loop.after.model.parameters}
@@ -67,18 +66,18 @@ def test_what_the_plant_lacks_is_superfluous(thin):
 def _outdone(campaign, law, rival):
     """Which two effects outdo a law that a rival candidate stands behind."""
     found = fit(START, campaign, integrator=Integrator())
-    magnitudes = scales(campaign)
-    test = score_test(found.estimate, magnitudes, absent_effects(found.model, magnitudes))
+    search = Search(scales(campaign), max_steps=40)
+    test = score_test(found.estimate, search, absent_effects(found.model, search.scales))
     place = {score.element.name: index for index, score in enumerate(test.scores)}
     usable = [
         Refit(
             test.scores[place[name]],
-            refit_candidate(test, place[name], magnitudes, DEFAULT_SOLVER, 40, silent),
+            refit_candidate(test, place[name], search),
             None,
         )
         for name in (law, rival)
     ]
-    return find_simpler_pair(found.estimate, usable, campaign, magnitudes, DEFAULT_SOLVER, silent)
+    return find_simpler_pair(found.estimate, usable, search)
 
 
 @pytest.mark.slow
@@ -117,7 +116,7 @@ def test_a_spring_that_the_declared_model_lacks_is_found_from_afar(plan, bench, 
     assert verdict.ranking[0].admissible
     best = verdict.ranking[0]
     assert abs(best.strength - 1.08e6) < 3.5 * best.strength_error
-    assert verdict.refit.chi2 / verdict.refit.dof == pytest.approx(1.0, abs=GOOD - 1.0)
+    assert verdict.refit.chi2 / verdict.refit.dof == pytest.approx(1.0, abs=Rules.good - 1.0)
 
 
 @pytest.mark.slow
@@ -126,7 +125,7 @@ def test_no_bound_is_given_beside_a_fit_that_is_not_good(simulated):
         LINEAR.plus(rig.CoulombFriction(8.0)), PLAN, 3, BENCH, stiffness=("linear",), damping=("linear",)
     )
     found = fit(START, campaign, integrator=Integrator())
-    assert found.estimate.chi2 / found.estimate.dof > GOOD
+    assert found.estimate.chi2 / found.estimate.dof > Rules.good
     verdict = diagnose(found, excluded=("coulomb_friction", "dahl_friction", "bouc_wen"))
     assert verdict.bounds == {}
     assert np.isfinite(verdict.unexplained)

@@ -1,0 +1,189 @@
+"""Which absent effects are refitted, and what speaks against each refit."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from ..._results import RESULTS
+from .._rules import Rules
+from ..fitting import Estimate, Fit, Rival, Search
+from ..guess import find_balance_start
+from ._admissibility import find_violation
+from ._evidence import by_evidence, least_difference
+from ._imitations import find_simpler_pair
+from ._refit import Refit, follows_freely, is_determined, refit_candidate, refit_from
+from ._score import Score, ScoreTest
+
+
+class Case(NamedTuple):
+    """A fit under diagnosis.
+
+    Attributes:
+        fit: the fit.
+        test: scores of the absent effects.
+        first_excess: chi2 - dof of the first fit of the loop.
+        significance: family-wise level of the score test.
+        search: how to search.
+    """
+
+    fit: Fit
+    test: ScoreTest
+    first_excess: float
+    significance: float
+    search: Search
+
+    @property
+    def rules(self) -> Rules:
+        """The numbers that decide."""
+        return self.search.rules
+
+    @property
+    def fitted(self) -> Estimate:
+        """The estimate of the fit."""
+        return self.fit.estimate
+
+    @property
+    def chi2_per_dof(self) -> float:
+        """chi2/dof of the fit."""
+        return self.fitted.chi2 / self.fitted.dof
+
+
+def refit_candidates(case: Case) -> list[Refit]:
+    """Refit the absent effects that are worth it, strongest score first.
+
+    Args:
+        case: the fit under diagnosis.
+
+    Returns:
+        The refits, in the order in which they were made, with what speaks against each.
+    """
+    rules, test = case.rules, case.test
+    is_far = case.chi2_per_dof > rules.far
+    leading = _refit_from_balance(case) if is_far else None
+    refits: list[Refit] = [] if leading is None else [leading]
+    strongest = None
+    for index, score in enumerate(test.scores):
+        if len(refits) == rules.survivors:
+            break
+        if not score.admissible or score.p_value > case.significance:
+            continue
+        if leading is not None and (_explains(leading, case) or leading.score.column == score.column):
+            continue
+        if strongest is not None and score.z**2 < rules.worth_refit * strongest**2:
+            break
+        # The score says what one linear step could gain at most when the model is near; far away it only
+        # ranks.
+        largest_gain = rules.smallest_gain / rules.score_optimism
+        if case.chi2_per_dof <= rules.good and score.z**2 / case.fitted.dof < largest_gain:
+            continue
+        strongest = score.z if strongest is None else strongest
+        refits.append(_refit(case, index, refits, ""))
+    refits = _without_imitations(case, refits)
+    if is_far:
+        for index in _correlated(case, refits):
+            refits.append(_refit(case, index, refits, ", which resembles the best"))
+    return refits
+
+
+def _refit(case: Case, index: int, refits: list[Refit], why: str) -> Refit:
+    """Refit a candidate, beside those that were refitted before."""
+    score = case.test.scores[index]
+    case.search.progress(f"refit with {score.element.name}{why}")
+    search = case.search._replace(rival=_rival(refits, case.rules))
+    found = refit_candidate(case.test, index, search)
+    return Refit(score, found, _violation(case, found, score))
+
+
+def _correlated(case: Case, refits: list[Refit]) -> list[int]:
+    """List the effects that resemble the best one and were not refitted, as far as so many are worth it.
+
+    Near the records derivatives that agree show that two laws do. Far from them only a refit does.
+    """
+    usable = by_evidence(refits, case.rules)
+    if not usable:
+        return []
+    scores = case.test.scores
+    names = [score.element.name for score in scores]
+    likeness = np.abs(case.test.likeness[names.index(usable[0].score.element.name)])
+    done = {refit.score.element.name for refit in refits}
+    open_still = [
+        index
+        for index, score in enumerate(scores)
+        if score.element.name not in done
+        and score.admissible
+        and score.p_value <= case.significance
+        and likeness[index] > case.rules.close_likeness
+    ]
+    return sorted(open_still, key=lambda index: -likeness[index])[: case.rules.survivors]
+
+
+def _rival(refits: list[Refit], rules: Rules) -> Rival | None:
+    """Give what a further candidate must not stay far behind.
+
+    One that leaves nothing to explain could only be equalled: what comes no nearer at once never will.
+    """
+    best = min(
+        (one.estimate for one in refits if one.violation is None), key=lambda one: one.chi2, default=None
+    )
+    if best is None:
+        return None
+    far = rules.rival_distance * least_difference(best, rules)
+    if best.chi2 / best.dof < 1.0 + rules.spotless_gain * rules.smallest_gain:
+        return Rival(best.chi2, far, rules.spotless_patience, rules.spotless_share)
+    return Rival(best.chi2, far, rules.rival_patience, rules.rival_share)
+
+
+def _violation(case: Case, found: Estimate, score: Score) -> str | None:
+    """Say what speaks against a refit, whatever it gains."""
+    fitted = case.fitted
+    if found.result == RESULTS.outdone:
+        return "its search came no nearer to that of another effect"
+    if found.result != RESULTS.successful or found.excess >= fitted.excess:
+        return "its refit did not converge"
+    if not is_determined(found, score, case.rules.determined):
+        return "its strength is not determined"
+    element = found.model.element(score.element.name)
+    if element is not None and not element.signed and float(getattr(element, element.strength)) < 0.0:
+        return "its refit ends at a strength below zero"
+    if not follows_freely(fitted, found):
+        return "its free run is worse than without it"
+    return find_violation(found.model, fitted.problem.records, fitted.problem.quantity, case.rules)
+
+
+def _explains(refit: Refit, case: Case) -> bool:
+    """Say whether a candidate alone explains most of the excess."""
+    left = (1.0 - case.rules.most_of_it) * case.fitted.excess
+    return refit.violation is None and refit.estimate.excess < left
+
+
+def _refit_from_balance(case: Case) -> Refit | None:
+    """Refit the effect that the balance of measured forces asks for, if there is one."""
+    fit, test, search = case.fit, case.test, case.search
+    absent = tuple(score.element for score in test.scores)
+    start = find_balance_start(fit.campaign, fit.model, search.scales, absent, case.rules)
+    if start is None:
+        return None
+    search.progress(f"refit with {start.element.name}, from the balance of measured forces")
+    found = refit_from(fit.estimate, start.model, search, far=True)
+    score = next(one for one in test.scores if one.element.name == start.element.name)
+    # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
+    drop = max(0.0, fit.estimate.chi2 - found.chi2) / max(1.0, found.chi2 / found.dof)
+    extra = max(1, len(found.places) - len(fit.estimate.places))
+    p_value = float(min(1.0, len(absent) * stats.chi2.sf(drop, extra)))
+    score = score._replace(element=start.element, p_value=p_value, admissible=True)
+    return Refit(score, found, _violation(case, found, score))
+
+
+def _without_imitations(case: Case, refits: list[Refit]) -> list[Refit]:
+    """Strike out a best candidate that two simpler effects outdo, until the best stands."""
+    refits = list(refits)
+    while True:
+        usable = by_evidence(refits, case.rules)
+        if not usable:
+            return refits
+        pair = find_simpler_pair(case.fitted, usable, case.search)
+        if pair is None:
+            return refits
+        place = next(index for index, one in enumerate(refits) if one is usable[0])
+        refits[place] = usable[0]._replace(violation=f"{pair} explain more with as many coefficients")

@@ -1,0 +1,191 @@
+"""A model simulated against records: everything that stays the same while coefficients are sought."""
+
+import numpy as np
+from jaxtyping import Float
+
+from ..._parameters import element_names, list_parameters
+from ...models import Isolator
+from ..jacobian import (
+    Prepared,
+    Unknowns,
+    information,
+    internal_starts,
+    prepare,
+    score_information,
+)
+from ._elimination import Nuisances, Spread, eliminate
+from ._problem import Point, Problem
+
+HUGE = 1e150
+"""A product of residuals or derivatives above this comes of a simulation that ran away, finite or not."""
+
+
+class Simulator:
+    """Simulates a model against a problem; keeps the batches and start states that do not change.
+
+    The batches depend on the delay and on the steps a sample only, the start states on the memories of the
+    model only; both are remade when those change and at no other time.
+    """
+
+    def __init__(self, problem: Problem, at_rest: bool = False, like: "Simulator | None" = None):
+        """Keep the problem; nothing is simulated yet.
+
+        Args:
+            problem: the records.
+            at_rest: whether internal states start at zero and are no nuisances.
+            like: simulator whose shapes are taken where they are large enough, so that compiled code serves
+                both.
+        """
+        self._segments = problem.segments if like is None else like._segments
+        self.problem = problem
+        self.at_rest = at_rest
+        self._heads = Simulator(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
+        self._prepared: dict[tuple[int, float], Prepared] = {}
+        self._internal: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
+        self._last: tuple[tuple[np.ndarray, ...], Float[np.ndarray, "lanes column column"]] | None = None
+
+    def prepared(self, model: Isolator, carried: int) -> Prepared:
+        """Give the batches for a model.
+
+        Args:
+            model: the isolator.
+            carried: count of its elements that move the state (probes need no finer steps).
+
+        Returns:
+            The batches.
+        """
+        problem = self.problem
+        steps = problem.integrator.record_steps(
+            Isolator(model.mass, model.elements[:carried], model.excitation)
+        )
+        key = (steps, float(model.shift()))
+        channels = set(model.channels)
+        known = set(self._prepared[key].batches[0].channels) if key in self._prepared else set()
+        if key not in self._prepared or not channels <= known:
+            # What is known already stays known: the tables serve models with and without their followers.
+            self._prepared.clear()
+            self._prepared[key] = prepare(
+                problem.records,
+                problem.segments,
+                quantity=problem.quantity,
+                hold=problem.hold,
+                substeps=steps,
+                shift=key[1],
+                based=model.excitation == "base_acceleration",
+                channels=tuple(sorted(channels | known)),
+                room=self._segments,
+            )
+        return self._prepared[key]
+
+    def starts(
+        self, model: Isolator, prepared: Prepared, carried: int | None = None
+    ) -> tuple[Float[np.ndarray, "state lanes"], Float[np.ndarray, "state lanes"]]:
+        """Give measured start states and their scales.
+
+        Args:
+            model: the isolator; the memories of its elements follow the measured motion.
+            prepared: the batches.
+            carried: count of its elements that move the state; all if omitted.
+
+        Returns:
+            States and scales, one row a state.
+        """
+        carried = len(model.elements) if carried is None else carried
+        names = element_names(model)
+        known = [self._internal.get(name) for name in names[:carried]] + [None] * len(names[carried:])
+        if any(memory is None for memory in known):
+            memories = np.stack(internal_starts(model, self.problem.records, prepared, carried))
+            ends = np.cumsum([element.internal_states for element in model.elements])
+            fresh = np.split(memories, ends[:-1], axis=1)
+            # Nuisances are deviations from the starts, which must therefore stay while they are carried on.
+            known = [new if old is None else old for old, new in zip(known, fresh, strict=True)]
+            self._internal.update(zip(names[:carried], known[:carried], strict=True))
+        rows = np.concatenate(
+            [np.stack([prepared.starts, prepared.spread]), *(one for one in known if one is not None)], axis=1
+        )
+        if self.at_rest:
+            rows[:, 2:] = 0.0
+        return rows[0], rows[1]
+
+    def settle(self, nuisances: Nuisances | None, model: Isolator, carried: int, spread: Spread) -> Nuisances:
+        """Give nuisances to begin with: those given, else none but the measured states.
+
+        Args:
+            nuisances: known ones, or None.
+            model: the isolator.
+            carried: count of its elements that move the state.
+            spread: prior standard deviations of the stiffness scales.
+
+        Returns:
+            The nuisances.
+        """
+        lanes = self.prepared(model, carried).record.size
+        states = 2 + sum(element.internal_states for element in model.elements[:carried])
+        if nuisances is not None and nuisances.states.shape == (lanes, states):
+            return nuisances
+        stiffness = np.zeros(len(self.problem.records)) if nuisances is None else nuisances.stiffness
+        spread = spread if nuisances is None else nuisances.spread
+        known = nuisances is not None and nuisances.segments.size == lanes
+        segments = nuisances.segments if nuisances is not None and known else np.zeros(lanes)
+        return Nuisances(np.zeros((lanes, states)), stiffness, segments, spread)
+
+    def evaluate(
+        self,
+        model: Isolator,
+        directions: Float[np.ndarray, "parameter column"],
+        nuisances: Nuisances,
+        carried: int | None = None,
+    ) -> Point:
+        """Simulate, differentiate, and eliminate the nuisances.
+
+        Args:
+            model: the isolator; elements beyond `carried` are probes at zero strength.
+            directions: changes of the parameters, one column each.
+            nuisances: where they stand.
+            carried: count of elements that move the state; all if omitted.
+
+        Returns:
+            The point.
+        """
+        carried = len(model.elements) if carried is None else carried
+        prepared = self.prepared(model, carried)
+        starts, scales = self.starts(model, prepared, carried)
+        own = nuisances.states.shape[1]
+        states = starts.copy()
+        states[:own] += scales[:own] * nuisances.states.T
+        factor = nuisances.factor(prepared.record)
+        unknowns = Unknowns(model, directions, factor, states, scales)
+        used = len(prepared.segments)
+        matrices = self._matrices(unknowns, carried, prepared)[:used]
+        heads = None
+        if self._heads is not None:
+            heads = _matrices(unknowns, carried, self._heads.prepared(model, carried))[:used]
+        owner = prepared.record[:used]
+        reduced = eliminate(matrices, self.problem.noise, owner, directions.shape[1], nuisances, heads)
+        return Point(model, nuisances, reduced, prepared.samples * self.problem.share)
+
+    def _matrices(
+        self, unknowns: Unknowns, carried: int, prepared: Prepared
+    ) -> Float[np.ndarray, "lanes column column"]:
+        """Give the information matrices, worked out anew only where something moved."""
+        values = np.array([float(entry.value) for entry in list_parameters(unknowns.model)])
+        at = (values, unknowns.directions, unknowns.stiffness_scale, unknowns.states, np.array([carried]))
+        if self._last is not None and all(
+            old.shape == new.shape and np.allclose(old, new, rtol=1e-13, atol=0.0)
+            for old, new in zip(self._last[0], at, strict=True)
+        ):
+            return self._last[1]
+        matrices = _matrices(unknowns, carried, prepared)
+        self._last = (at, matrices)
+        return matrices
+
+
+def _matrices(
+    unknowns: Unknowns, carried: int, prepared: Prepared
+) -> Float[np.ndarray, "lanes column column"]:
+    """Give the information matrices, NaN where a simulation left every bound."""
+    if carried == len(unknowns.model.elements):
+        matrices = information(unknowns, prepared)
+    else:
+        matrices = score_information(unknowns, carried, prepared)
+    return np.where(np.abs(matrices) < HUGE, matrices, np.nan)
