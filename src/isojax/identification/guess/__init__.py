@@ -1,4 +1,11 @@
-"""isojax.identification.guess."""
+"""The classical route: coefficients to start a fit from, without a simulation.
+
+In: a campaign.toml or a `Campaign`. Out: a `ClassicalGuess`, whose model the fit starts from; `scales` of
+motion and force.
+Read `_classical_guess.py` first, then `_start_coefficients.py` and the two balances that it calls:
+`_dwell_balance.py` and `_restoring_force.py`, both by `_force_balance.py`. The paper's own route is
+`_paper_table.py`, with `_equivalent_law.py`, `_half_power.py` and `_circle_fit.py`.
+"""
 
 from ._balance_start import find_balance_start as find_balance_start
 from ._circle_fit import CircleFit as CircleFit

@@ -5,22 +5,22 @@ import dataclasses
 import numpy as np
 from jaxtyping import Complex, Float
 
-from ...records import Campaign, Record, dwell_harmonics
+from ...records import TIME_DERIVATIVES, Campaign, Record, dwell_harmonics
 from ._motion import is_absolute
 
 _DROP_OUT = 1e-3
-"""A dwell driven with less than this share of the strongest is no dwell."""
+"""A dwell driven with less than this share of the strongest is left out."""
 
 _UNSTEADY = 0.05
-"""A dwell is unsteady where its harmonics leave more than this share of the first."""
+"""A dwell is unsteady where its residual without harmonics exceeds this share of the first harmonic ..."""
 
-_USUAL = 6.0
-"""... and more than this many times what they leave in the dwells of the record as a rule, which is noise."""
+_ABOVE_NOISE = 6.0
+"""... and this many times the median residual of the record's dwells, which is noise."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MeasuredResponse:
-    """What one stepped-sine record says, dwell by dwell in order of frequency.
+    """Harmonics of one stepped-sine record, dwell by dwell in order of frequency.
 
     A signal is the real part of the sum of `amplitude_h exp(i h omega t)`, h = 1, 2, ...
 
@@ -34,7 +34,7 @@ class MeasuredResponse:
         left_out: frequencies of the dwells that were not steady or not driven [Hz].
 
     Source: the paper, sec. 4; every line is divided by its own measured force, since a shaker near resonance
-    does not hold the force that it was told to.
+    does not hold its nominal force.
     """
 
     record: str
@@ -68,14 +68,14 @@ def measured_receptance(campaign: Campaign, record: Record, harmonics: int = 7) 
     """
     if not record.dwells:
         raise ValueError(f"Argument `record` must have dwells, but {record.name} has none.")
-    order = {"displacement": 0, "velocity": 1, "acceleration": 2}[campaign.output.quantity]
+    order = TIME_DERIVATIVES[campaign.output.quantity]
     frequency = np.array([dwell.frequency for dwell in record.dwells])
     measured = [dwell_harmonics(record, dwell, harmonics) for dwell in record.dwells]
     drive = np.stack([one.input[1:] for one in measured])
     output = np.stack([one.output[1:] for one in measured])
     rest = np.array([(one.input_residual, one.output_residual) for one in measured])
     size = np.abs(np.stack([drive[:, 0], output[:, 0]], axis=1))
-    steady = np.all((rest <= _UNSTEADY * size) | (rest <= _USUAL * np.median(rest, axis=0)), axis=1)
+    steady = np.all((rest <= _UNSTEADY * size) | (rest <= _ABOVE_NOISE * np.median(rest, axis=0)), axis=1)
     kept = steady & (size[:, 0] > _DROP_OUT * np.max(size[:, 0])) & (size[:, 1] > 0)
     if is_absolute(campaign):
         output = output - drive
