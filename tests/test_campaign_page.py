@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from isojax.elements import CATALOGUE
-from isojax.records.reading._declaration import _RECORD, _SECTIONS, read_declaration
+from isojax.records.reading._declaration import RECORD, SECTIONS, read_declaration
 
 PAGE = (Path(__file__).parents[1] / "docs" / "campaign.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^### ([^\n]+)\n.*?^```toml\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
-KNOWN = {(section, name): field for section, fields in _SECTIONS.items() for name, field in fields.items()}
-KNOWN |= {("record", name): field for name, field in _RECORD.items()}
+KNOWN = {(section, name): field for section, fields in SECTIONS.items() for name, field in fields.items()}
+KNOWN |= {("record", name): field for name, field in RECORD.items()}
 
 
 def described() -> dict[tuple[str, str], list[str]]:

@@ -18,7 +18,7 @@ from isojax.records import (
     data_health,
     estimate_noise,
 )
-from isojax.records._record import Kind
+from isojax.records._record import ExcitationKind
 from isojax.records.spectrum._filter import compensate_butterworth
 from isojax.records.spectrum._noise_band import NoiseBand
 
@@ -35,7 +35,7 @@ def found_in(output: Float[np.ndarray, " time"], low: Filter | None = None) -> f
 def campaign_of(
     output: Float[np.ndarray, " time"],
     drive: Float[np.ndarray, " time"],
-    kind: Kind,
+    kind: ExcitationKind,
     low: Filter | None = None,
 ) -> Campaign:
     time = np.arange(output.size) / RATE

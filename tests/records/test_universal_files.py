@@ -60,7 +60,7 @@ def test_the_sine_of_the_file_is_one_of_five_hertz(shared_data: Path) -> None:
 
 def test_a_name_that_two_channels_share_is_refused_with_names_that_do_not(shared_data: Path) -> None:
     with pytest.raises(
-        ValueError, match=r"2 channels are called `1\+Z`; use `MPS set1 Dof1`, `MPS set1 Dof4`"
+        ValueError, match=r"2 channels are called `1\+Z`; use one of `MPS set1 Dof1`, `MPS set1 Dof4`"
     ):
         read_columns(shared_data / "uff" / "mpstd_set001.uff", ["1+Z"])
 

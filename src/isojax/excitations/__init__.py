@@ -1,4 +1,9 @@
-"""What drives the isolator."""
+"""What drives the isolator: closed-form excitations and recorded ones.
+
+In: amplitudes, frequencies and times, or the samples of a drive. Out: a function of time, with its
+derivative.
+Read `_base.py` first, then `_harmonic.py` as the shortest example and `_sampled.py` for measured drives.
+"""
 
 from ._base import AbstractExcitation as AbstractExcitation
 from ._harmonic import Harmonic as Harmonic

@@ -1,6 +1,11 @@
-"""What was measured: campaign.toml, readers of data files, dwells, spectra and the noise estimate."""
+"""What was measured: campaign.toml, readers of data files, dwells, spectra and the noise estimate.
+
+In: the path of a campaign.toml. Out: a `Campaign` of `Record`s in SI, its noise and the health of its data.
+Read `_record.py` and `_campaign.py` first, then `reading/` (with `formats/`), `spectrum/` and `noise/`.
+"""
 
 from ._blow import driven_samples as driven_samples
+from ._campaign import TIME_DERIVATIVES as TIME_DERIVATIVES
 from ._campaign import Campaign as Campaign
 from ._campaign import Filter as Filter
 from ._campaign import FloorChannel as FloorChannel

@@ -1,4 +1,4 @@
-"""When a drive that is brief is on, and the stretch of a record in which nothing but its noise drives it."""
+"""The samples at which a brief drive acts, and the free motion after a release or a blow."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -6,24 +6,23 @@ from jaxtyping import Bool, Float
 from ._record import Record
 
 ABOVE_NOISE = 5.0
-"""What exceeds so many standard deviations of the noise is no noise."""
+"""Standard deviations of the noise above which a sample is no noise."""
 
 BRIEF = 0.05
-"""Share of a record that a blow takes at most, and share of its peak below which the drive is off."""
+"""Largest share of a record that a blow takes, and share of its peak below which the drive is off."""
 
-_PARTS = 10
-"""The mean of the last of so many parts is where the motion comes to rest."""
+_END = 10
+"""The mean of the last tenth of a record is taken for the position at rest."""
 
-_FALLEN = 0.5
-"""Share of its largest size below which a motion has surely been let go."""
+_RELEASED = 0.5
+"""Share of its largest amplitude below which a motion has surely been released."""
 
-_SHORTEST = 256
-"""Samples without which no floor can be read off a spectrum."""
+_FEWEST_FREE_SAMPLES = 256
+"""Samples without which no floor can be estimated from a spectrum."""
 
 
 def driven_samples(drive: Float[np.ndarray, " time"]) -> Bool[np.ndarray, " time"]:
-    """Gives the samples at which a drive that rests most of the time stands above its noise and 5 % of its
-    peak.
+    """Gives the samples at which a mostly resting drive exceeds its noise and 5 % of its peak.
 
     Args:
         drive: Input, (time,).
@@ -47,7 +46,7 @@ def blow_samples(drive: Float[np.ndarray, " time"]) -> int:
         drive: Input, (time,).
 
     Returns:
-        Samples in a row that stand above the noise and 5 % of the peak.
+        Samples in a row that exceed the noise and 5 % of the peak.
     """
     on = driven_samples(drive)
     peak = int(np.argmax(np.abs(drive - np.median(drive))))
@@ -56,11 +55,16 @@ def blow_samples(drive: Float[np.ndarray, " time"]) -> int:
     return max(run[0] + run[1] - 1, 0)
 
 
-def ring_down(record: Record) -> Float[np.ndarray, " time"]:
-    """Gives the output after the release or the last blow; the whole of it where little would be left, or
-    where the record does not ring down.
+def rest_position(signal: Float[np.ndarray, " time"]) -> float:
+    """Gives the value at which a motion ends: the mean over the last tenth of a record."""
+    return float(np.mean(signal[-max(signal.size // _END, 1) :]))
 
-    A blow, and the jump of a release, reach far above the band of the motion: there they pass for noise.
+
+def ring_down(record: Record) -> Float[np.ndarray, " time"]:
+    """Gives the output after the release or the last blow; all of it where too few samples follow, or where
+    the record does not ring down.
+
+    The spectra of a blow and of a release reach far above the band of the motion, where they look like noise.
 
     Args:
         record: The record.
@@ -70,15 +74,15 @@ def ring_down(record: Record) -> Float[np.ndarray, " time"]:
     """
     if not record.rings_down:
         return record.output
-    size = np.abs(record.output - np.mean(record.output[-max(record.output.size // _PARTS, 1) :]))
-    begin = _end_of(size > _FALLEN * np.max(size))
+    size = np.abs(record.output - rest_position(record.output))
+    start = _end_of(size > _RELEASED * np.max(size))
     if record.kind == "impulse":
-        # a filter before the converter draws a blow out by less than its own length
+        # A filter before the converter lengthens a blow by less than the blow's own length.
         on = np.flatnonzero(driven_samples(record.input))
-        begin = max(begin, int(on[-1]) + 1 + blow_samples(record.input)) if on.size else begin
-    return record.output[begin:] if record.output.size - begin >= _SHORTEST else record.output
+        start = max(start, int(on[-1]) + 1 + blow_samples(record.input)) if on.size else start
+    return record.output[start:] if record.output.size - start >= _FEWEST_FREE_SAMPLES else record.output
 
 
 def _end_of(on: Bool[np.ndarray, " time"]) -> int:
-    """Gives the place after the last true sample."""
+    """Gives the index after the last true sample."""
     return int(np.flatnonzero(on)[-1]) + 1 if np.any(on) else 0

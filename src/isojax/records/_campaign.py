@@ -1,5 +1,6 @@
 """A measurement campaign: its channels, its filter, the model named for it, and its records in test order."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -9,6 +10,10 @@ from ._record import Record
 InputQuantity = Literal["force", "base_acceleration", "reaction_mass_acceleration", "command"]
 OutputQuantity = Literal["acceleration", "velocity", "displacement"]
 Hold = Literal["band_limited", "linear", "zero_order"]
+"""As in `isojax.excitations`, which stands beside this room: neither imports the other."""
+
+TIME_DERIVATIVES: Mapping[OutputQuantity, int] = {"displacement": 0, "velocity": 1, "acceleration": 2}
+"""How often the displacement is differentiated to give each quantity."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +85,8 @@ class Filter:
         kind: "butterworth".
         order: Order of the filter; run forwards and backwards it acts twice.
         cutoff_hz: Cut-off frequency [Hz].
-        applied: True: the bench did it; False: the reader does, with zero phase.
-        compensate: Whether the reader takes out again what the bench did, a digital filter that ran once.
+        applied: True: the test rig filtered; False: the reader does, with zero phase.
+        compensate: Whether the reader inverts the filter of the test rig, a digital one that ran once.
     """
 
     kind: Literal["butterworth"]
@@ -132,5 +137,5 @@ class Campaign:
 
     @property
     def holdout_records(self) -> tuple[Record, ...]:
-        """Records that only judge."""
+        """Records that only evaluate a fit."""
         return tuple(record for record in self.records if record.role == "holdout")

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 Direction = Literal["forward", "backward", "none"]
 Role = Literal["fit", "holdout"]
-Kind = Literal["stepped_sine", "periodic", "swept", "free_decay", "impulse", "broadband"]
+ExcitationKind = Literal["stepped_sine", "periodic", "swept", "free_decay", "impulse", "broadband"]
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Record:
         settle: Samples at the start that count in no error.
         dwells: Dwells of a stepped sine, else empty.
         kind: What the excitation is.
-        clock: Beginning and end of the record as shares of the whole test, 0 to 1.
+        clock: Start and end of the record as shares of the whole test, 0 to 1.
         floor: Measured acceleration of the floor about its mean [m/s^2], or None.
     """
 
@@ -71,11 +71,18 @@ class Record:
     period: int | None = None
     settle: int = 0
     dwells: tuple[Dwell, ...] = ()
-    kind: Kind = "broadband"
+    kind: ExcitationKind = "broadband"
     clock: tuple[float, float] = (0.0, 1.0)
     floor: Float[np.ndarray, " time"] | None = None
 
     @property
     def rings_down(self) -> bool:
-        """Whether the motion, once begun, is left to itself: after a release or a blow."""
+        """Whether the motion decays freely, after a release or a blow."""
         return self.kind in ("free_decay", "impulse")
+
+    @property
+    def periods(self) -> Float[np.ndarray, "period time"]:
+        """The output's whole periods after the settle samples, up to the end; none without a period."""
+        length = self.period or self.output.size + 1
+        count = max(self.output.size - self.settle, 0) // length
+        return self.output[self.output.size - count * length :].reshape(count, length)

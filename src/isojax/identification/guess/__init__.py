@@ -1,10 +1,10 @@
-"""Classical analysis: coefficients to start from, and typical magnitudes, without a simulation.
+"""The classical route: coefficients to start a fit from, without a simulation.
 
-In: a campaign. Out: a `ClassicalGuess` with the start of a fit, and the `Scales` of the campaign.
-Read `_read_campaign` and `_declared_model`, then `_classical_guess` (the door) and `_start_coefficients`
-(dwells or time?), then `_dwell_balance`, `_restoring_force` and `_force_balance` (the regression).
-`_paper_table` is the paper's route: `_half_power`, `_circle_fit`, `_equivalent_law`. `_scales` and
-`_motion` serve all rooms above.
+In: a campaign.toml or a `Campaign`. Out: a `ClassicalGuess`, whose model the fit starts from; `scales` of
+motion and force.
+Read `_classical_guess.py` first, then `_start_coefficients.py` and the two balances that it calls:
+`_dwell_balance.py` and `_restoring_force.py`, both by `_force_balance.py`. The paper's own route is
+`_paper_table.py`, with `_equivalent_law.py`, `_half_power.py` and `_circle_fit.py`.
 """
 
 from ._balance_start import find_balance_start as find_balance_start

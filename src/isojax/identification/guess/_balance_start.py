@@ -1,8 +1,7 @@
-"""Starts far from a good fit: the absent effect that balances the measured forces best."""
+"""The absent effect that balances the measured forces best: a start far from the fitted model."""
 
+from collections.abc import Callable
 from typing import NamedTuple
-
-import numpy as np
 
 from ..._parameters import own_parameters
 from ...elements import AbstractElement, Scales
@@ -10,18 +9,17 @@ from ...models import Isolator
 from ...records import Campaign
 from .._rules import Rules
 from ._dwell_balance import fit_all_dwells
-from ._force_balance import BalanceFit
+from ._force_balance import BalanceFit, fit_balance
 from ._measured_receptance import measured_receptance
 from ._motion import measured_motion
-from ._restoring_force import fit_restoring_force
-from ._scales import excited_centre
+from ._restoring_force import band_projections
 
 
 class BalanceStart(NamedTuple):
-    """An absent effect that the balance of measured forces asks for.
+    """An absent effect without which the measured forces do not balance.
 
     Attributes:
-        element: the effect, at the strength found.
+        element: the effect, at its estimated strength.
         model: the model with it, every coefficient from the balance.
         unexplained: rms of the force that it leaves unbalanced, as a share of the measured force [1].
         before: the same without it.
@@ -42,51 +40,25 @@ def find_balance_start(
 ) -> BalanceStart | None:
     """Find the absent effect without which the measured forces do not balance, if there is one.
 
-    A score is a derivative at the fitted model. Where that is far from the records (a mass on a spring that
-    the model does not have) the derivative says little, and the descent from it ends anywhere. The balance of
-    measured motion and drive needs no simulation and is linear in the strengths, however large.
+    A score is a derivative at the fitted model. Where the model is far from the records (it may lack the
+    spring that carries the mass), a search that starts from such a derivative is unreliable. The balance of
+    measured motion and drive needs no simulation, and is linear in the strengths, however large they are.
 
     Args:
-        campaign: the measurements; only records to fit are looked at.
+        campaign: the measurements; only records to fit are used.
         model: the fitted model, for its structure.
         scales: magnitudes of the records.
         absent: absent effects; those without internal states take part.
         rules: how much less an effect must leave unbalanced than the structure alone; what is no dwell.
 
     Returns:
-        The effect that leaves least unbalanced, or None if none leaves so little.
+        The effect that leaves the smallest unbalanced force, or None if none leaves so little.
 
     Source: Masri & Caughey 1979.
     """
     if any(element.internal_states for element in model.elements):
         return None
-    records = campaign.fit_records
-    names = tuple(element.name for element in model.elements)
-    if all(record.dwells for record in records):
-        responses = tuple(measured_receptance(campaign, record, rules) for record in records)
-
-        def balance(structure: Isolator, fitted: tuple[str, ...]) -> BalanceFit:
-            return fit_all_dwells(structure, fitted, responses, mass_free=campaign.mass_free)
-    else:
-        motions = tuple(measured_motion(campaign, record) for record in records)
-        centres = tuple(
-            excited_centre(record, motion) / (2 * np.pi)
-            for record, motion in zip(records, motions, strict=True)
-        )
-        offset_free = campaign.input.offset_free or campaign.output.offset_free
-
-        def balance(structure: Isolator, fitted: tuple[str, ...]) -> BalanceFit:
-            return fit_restoring_force(
-                structure,
-                fitted,
-                motions,
-                centres,
-                campaign.rate,
-                campaign.output.quantity,
-                offset_free,
-                campaign.mass_free,
-            )
-
+    balance, names = _regression(campaign, rules), tuple(element.name for element in model.elements)
     before = balance(model, names).unexplained
     found: list[BalanceStart] = []
     for name in dict.fromkeys(probe.name for probe in absent):
@@ -100,3 +72,14 @@ def find_balance_start(
                 found.append(BalanceStart(element, tried.model, tried.unexplained, before))
     best = min(found, key=lambda one: one.unexplained, default=None)
     return best if best is not None and best.unexplained < rules.much_better * before else None
+
+
+def _regression(campaign: Campaign, rules: Rules) -> Callable[[Isolator, tuple[str, ...]], BalanceFit]:
+    """Give the balance that suits the records: of every dwell, or in time where a record has none."""
+    records = campaign.fit_records
+    if all(record.dwells for record in records):
+        responses = tuple(measured_receptance(campaign, record, rules) for record in records)
+        return lambda model, names: fit_all_dwells(model, names, responses, mass_free=campaign.mass_free)
+    motions = tuple(measured_motion(campaign, record) for record in records)
+    projections = band_projections(campaign, records, motions)
+    return lambda model, names: fit_balance(model, names, motions, projections, campaign.mass_free)

@@ -15,7 +15,7 @@ class CircleFit:
         damping_ratio: viscous damping ratio [1]; NaN where no circle fits.
         diameter: of the circle, 1/C_eq where the mode stands alone [m/(N s)].
         scatter: rms distance of the points from the circle, as a share of its radius.
-        lines: how many lines took part.
+        lines: how many lines were used.
     """
 
     natural_frequency: float
@@ -24,6 +24,15 @@ class CircleFit:
     scatter: float
     lines: int
 
+
+_FEWEST_LINES = 4
+"""Lines of large mobility without which no circle is fitted."""
+
+_FEWEST_NEAR = 3
+"""Lines near the resonance without which it has no damping ratio."""
+
+_NEAR = 2.5
+"""Angle from the diameter up to which a line is near the resonance [rad]: beyond, noise dominates it."""
 
 _NO_CIRCLE = CircleFit(float("nan"), float("nan"), float("nan"), float("nan"), 0)
 
@@ -42,35 +51,35 @@ def fit_circle(
     Args:
         frequency: lines, increasing [Hz].
         receptance: displacement over force [m/N].
-        share: lines with at least this share of the largest mobility take part.
+        share: lines with at least this share of the largest mobility are used.
 
     Returns:
-        The circle and what it says; NaN with fewer than four lines or where the points draw no circle.
+        The circle with its resonance; NaN with fewer than four lines or where the points lie on no circle.
 
     Source: D. J. Ewins, Modal Testing, 2nd ed., sec. 4.3 (circle-fit method); named before eq. (9) of the
     paper.
     """
-    if frequency.size < 4:
+    if frequency.size < _FEWEST_LINES:
         return _NO_CIRCLE
     omega = 2 * np.pi * frequency
     mobility = 1j * omega * receptance
     chosen = np.abs(mobility) >= share * np.max(np.abs(mobility))
-    if np.count_nonzero(chosen) < 4:
+    if np.count_nonzero(chosen) < _FEWEST_LINES:
         return _NO_CIRCLE
     omega, mobility = omega[chosen], mobility[chosen]
     unit = float(np.max(np.abs(mobility)))
     x, y = mobility.real / unit, mobility.imag / unit
-    columns = np.stack([x, y, np.ones_like(x)], axis=1)
-    (a, b, c), *_ = np.linalg.lstsq(columns, x**2 + y**2, rcond=None)
+    design = np.stack([x, y, np.ones_like(x)], axis=1)
+    (a, b, c), *_ = np.linalg.lstsq(design, x**2 + y**2, rcond=None)
     centre, radius = complex(a, b) / 2, float(np.sqrt(max(c + (a * a + b * b) / 4, 0.0)))
     if radius == 0 or centre == 0:
         return _NO_CIRCLE
     spokes = (x + 1j * y) - centre
     theta = -np.angle(spokes / (centre / abs(centre)))
-    near = np.abs(theta) < 2.5
-    if np.count_nonzero(near) < 3:
+    near = np.abs(theta) < _NEAR
+    if np.count_nonzero(near) < _FEWEST_NEAR:
         return _NO_CIRCLE
-    # The half tangent grows without bound away from resonance: weigh each line by its derivative there.
+    # The half tangent grows without bound away from resonance: its derivative there weights each line.
     weight = np.cos(theta[near] / 2) ** 2
     line = np.stack([omega[near] ** 2, np.ones(np.count_nonzero(near))], axis=1)
     scale = np.array([np.mean(line[:, 0]), 1.0])

@@ -18,14 +18,15 @@ from ._sensor_offset_start import with_sensor_zero
 from ._start_coefficients import start_from_dwells, start_from_time
 
 _HARDLY_BALANCED = 0.7
+"""Share of the force left unbalanced above which the reader is asked to check sign, unit, timing and mass."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ClassicalGuess:
-    """What classical analysis says of a campaign.
+    """The result of classical analysis of a campaign.
 
     Attributes:
-        model: the declared structure with the coefficients found; where the fit starts.
+        model: the declared structure with the estimated coefficients; where the fit starts.
         route: where they come from: "all_dwells" (harmonic balance of every dwell) or "restoring_force"
             (force balance in time).
         unexplained: rms of the force that `model` leaves unbalanced, as a share of the measured force [1].
@@ -51,7 +52,7 @@ class ClassicalGuess:
 
     @property
     def paper_model(self) -> Isolator | None:
-        """The isolator of the paper's own route, averaged over sweep directions; None if not to be had."""
+        """The isolator of the paper's own route, averaged over sweep directions; None if it gives none."""
         return None if self.table is None else self.table.model
 
 
@@ -70,17 +71,21 @@ def _bias(paper: Isolator | None, model: Isolator) -> dict[str, float]:
 def _cautions(
     campaign: Campaign, found: BalanceFit, responses: tuple[MeasuredResponse, ...]
 ) -> tuple[str, ...]:
-    """Give a sentence for each thing that the declaration leaves open or that the balance says against it."""
+    """Give a sentence for each ambiguity of the declaration and each doubt that the balance raises."""
     left_out = [
         f"{response.record} at {', '.join(f'{frequency:.4g}' for frequency in response.left_out)} Hz"
         for response in responses
         if response.left_out.size
     ]
-    notes = [f"Dwells left out as not steady or not driven: {'; '.join(left_out)}."] if left_out else []
+    notes = (
+        [f"Dwells left out because they were not steady or not driven: {'; '.join(left_out)}."]
+        if left_out
+        else []
+    )
     if campaign.mass_free and campaign.input.gain_free:
-        notes.append("Mass and input gain are not to be told apart: the mass stays as declared.")
+        notes.append("Mass and input gain cannot be separated: the mass stays as declared.")
     if campaign.mass_free and found.model.excitation == "base_acceleration":
-        notes.append("Base excitation tells of ratios to the mass only: the mass stays as declared.")
+        notes.append("Base excitation determines ratios to the mass only: the mass stays as declared.")
     if found.unexplained > _HARDLY_BALANCED:
         notes.append(
             f"The start leaves {found.unexplained:.0%} of the force unbalanced: check sign, unit and timing "
@@ -99,17 +104,17 @@ def classical_guess(
     """Guess the coefficients of the declared structure by classical analysis.
 
     Stepped-sine records give the harmonic balance of every dwell; where there are none, the force balance in
-    time. The paper's own route, by resonance points and half power, is kept beside it with its bias. Further
+    time. The paper's own route, by resonance points and half power, is reported with its bias. Further
     elements of the campaign (`elements = [...]`) start absent.
 
     Args:
-        campaign: the campaign; only records with role "fit" are looked at.
+        campaign: the campaign; only records with role "fit" are used.
         damping: where the paper's route takes its damping ratio from.
         resonance: which resonance the paper's route takes.
         rules: which dwells are not steady or not driven.
 
     Returns:
-        The start of a fit, and what led to it.
+        The start of a fit, with the measurements that it comes from.
 
     Raises:
         ValueError: if the campaign names an effect that is not in the catalogue, or has no record to fit.

@@ -1,4 +1,4 @@
-"""Start from every dwell at once: the harmonic balance as a linear regression."""
+"""The harmonic balance of every dwell at once, as a linear regression."""
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -10,6 +10,7 @@ from ._measured_receptance import MeasuredResponse
 from ._motion import Motion
 
 _PHASES = 128
+"""Samples of a cycle over which the force of a law is evaluated."""
 
 
 def _over_a_cycle(
@@ -56,18 +57,18 @@ def fit_all_dwells(
     """Fit the coefficients to the harmonic balance of every dwell, on and off resonance.
 
     At each dwell `(K_eq(X) - m omega^2) X = F cos(phi)` and `C_eq(X omega) omega X = F sin(phi)`; both are
-    linear in the coefficients. The force of each law is worked out over the measured motion with its
+    linear in the coefficients. The force of each law is evaluated over the measured motion with its
     harmonics, not over a pure sine.
 
     Args:
         model: the structure; its present strengths do not matter.
         names: catalogue names of the elements to fit.
         responses: measured harmonics of the records.
-        harmonics: how many harmonics shall balance.
+        harmonics: how many harmonics must balance.
         mass_free: whether the mass is unknown too.
 
     Returns:
-        The model found.
+        The fitted model.
 
     Source: the paper, eqs. (5)-(8), used at every dwell instead of at resonance alone.
     """

@@ -14,7 +14,7 @@ from ._measured_receptance import MeasuredResponse
 
 @dataclasses.dataclass(frozen=True)
 class Resonance:
-    """What one record says at its resonance.
+    """Equivalent stiffness and damping of one record at its resonance.
 
     Attributes:
         record: name of the record.
@@ -133,10 +133,14 @@ def average_law(
     return EquivalentLaw(directions, polynomials, average, invert_equivalent(average), points)
 
 
-def _distinct(amplitude: Float[np.ndarray, " point"], apart: float = 0.03) -> int:
+_REPEATED = 0.03
+"""Relative difference of two amplitudes up to which they repeat each other."""
+
+
+def _distinct(amplitude: Float[np.ndarray, " point"]) -> int:
     """Count amplitudes that differ by more than their repeats do."""
     ordered = np.sort(amplitude)
-    return 1 + int(np.count_nonzero(np.diff(ordered) > apart * ordered[1:])) if ordered.size else 0
+    return 1 + int(np.count_nonzero(np.diff(ordered) > _REPEATED * ordered[1:])) if ordered.size else 0
 
 
 def fit_equivalent_law(
@@ -150,7 +154,7 @@ def fit_equivalent_law(
         order: highest power of the amplitude.
 
     Returns:
-        The law, or None where no point is usable; and a sentence for each thing that the reader must know.
+        The law, or None where no point is usable; and a sentence for each limitation of the points.
 
     Source: the paper, eqs. (10)-(13).
     """
@@ -167,10 +171,10 @@ def fit_equivalent_law(
         if reached < order:
             notes.setdefault(f"{levels} distinct amplitudes allow no more than a {shape}.", []).append(name)
         elif levels == order + 1:
-            words = f"{levels} distinct amplitudes determine the {shape} exactly; its error cannot be told."
-            notes.setdefault(words, []).append(name)
+            note = f"{levels} distinct amplitudes determine the {shape} exactly: its error remains unknown."
+            notes.setdefault(note, []).append(name)
         scale = float(np.max(rows[:, 0]))
         fitted = np.polynomial.polynomial.polyfit(rows[:, 0] / scale, rows[:, 1], reached)
         polynomials.append(np.pad(fitted / scale ** np.arange(reached + 1), (0, order - reached)))
     law = average_law(np.stack(polynomials), tuple(usable), tuple(usable.values()))
-    return law, tuple(f"Equivalent {what}, {' and '.join(names)}: {words}" for words, names in notes.items())
+    return law, tuple(f"Equivalent {what}, {' and '.join(names)}: {note}" for note, names in notes.items())

@@ -7,16 +7,19 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-_FINER = 256
+_POINTS_A_GAP = 256
 """Points between two lines of the interpolated curve."""
 
 _ABRUPT = 1.5
-"""A receptance that changes by this many times what it does beside has jumped, or near enough."""
+"""A receptance has jumped where it changes by this many times its changes over the gaps beside."""
+
+_OVERSHOOT = 0.5
+"""A cubic through 1/|H|^2 that falls below this share of its smallest value is replaced by a monotone one."""
 
 
 @dataclasses.dataclass(frozen=True)
 class HalfPower:
-    """What the amplitude curve of one receptance says.
+    """Peak, half-power points and damping ratio of one receptance.
 
     Attributes:
         peak_frequency: where the receptance is largest [Hz].
@@ -27,8 +30,8 @@ class HalfPower:
         peak_inside: whether the peak lies inside the sweep, not at its end.
         jump_inside: whether a jump lies between the half-power points.
 
-    Source: the paper, eq. (9), first order in the damping ratio: for a linear isolator the ratio so found is
-    too large by about 2 zeta^2 of itself (0.02 % at zeta = 1 %, 6 % at zeta = 17 %).
+    Source: the paper, eq. (9), first order in the damping ratio: for a linear isolator this ratio is too
+    large by about 2 zeta^2 of itself (0.02 % at zeta = 1 %, 6 % at zeta = 17 %).
     """
 
     peak_frequency: float
@@ -49,14 +52,15 @@ def find_jumps(
     """Find the gaps between neighbouring lines where the motion jumped from one branch to another.
 
     With stiffness and damping frozen at either line, the receptance of the other follows. A jump is a gap
-    that both miss and over which the receptance changes far more than over the gaps beside it. Beside a fold
-    the motion may pass so steeply that the lines cannot tell it from a jump: that counts as one.
+    over which both predictions fail, and over which the receptance changes far more than over the gaps
+    beside it. Beside a fold the motion may change so steeply that the lines cannot distinguish it from a
+    jump: it counts as one.
 
     Args:
         frequency: lines, increasing [Hz].
         receptance: displacement over force [m/N].
         mass: moving mass [kg].
-        tolerance: share of the amplitude by which both must miss.
+        tolerance: share of the amplitude by which both predictions must be wrong.
 
     Returns:
         One flag a gap, one fewer than there are lines.
@@ -83,7 +87,7 @@ def _inverse_square(
     """Interpolate 1/|H|^2 against omega^2: a parabola for a linear isolator, so a cubic is exact there."""
     if square.size >= 4:
         curve = CubicSpline(square, value)(fine)
-        if np.min(curve) > 0.5 * np.min(value):
+        if np.min(curve) > _OVERSHOOT * np.min(value):
             return curve
     return PchipInterpolator(square, value)(fine)
 
@@ -115,7 +119,7 @@ def find_half_power(
     Args:
         frequency: lines, increasing [Hz].
         receptance: displacement over the measured force of the same line [m/N].
-        jumps: gaps across which nothing smooth may be assumed, as `find_jumps` gives them; none if omitted.
+        jumps: gaps across which the curve is not smooth, as `find_jumps` gives them; none if omitted.
 
     Returns:
         Peak, half-power points and damping ratio; NaN for what the sweep does not reach.
@@ -134,7 +138,7 @@ def find_half_power(
             f"{frequency[place + 1]} follows {frequency[place]}."
         )
     square, value = frequency**2, 1.0 / np.abs(receptance) ** 2
-    places = np.arange(_FINER * (frequency.size - 1) + 1) / _FINER
+    places = np.arange(_POINTS_A_GAP * (frequency.size - 1) + 1) / _POINTS_A_GAP
     fine = np.interp(places, np.arange(frequency.size), square)
     curve = np.interp(fine, square, value)
     flags = np.zeros(frequency.size - 1, dtype=bool) if jumps is None else jumps

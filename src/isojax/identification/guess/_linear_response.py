@@ -6,10 +6,12 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy import signal
 
+from ...records import Record
 from ._circle_fit import CircleFit, fit_circle
 from ._motion import Motion
 
 _DRIVEN = 1e-3
+"""Power density of the drive, over its largest, below which a line is not driven."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -32,27 +34,23 @@ class LinearResponse:
 
 
 def linear_response(
-    record: str,
+    record: Record,
     motion: Motion,
     force: Float[np.ndarray, " time"],
-    rate: float,
-    period: int | None = None,
     segments: int = 8,
     coherent: float = 0.8,
 ) -> LinearResponse:
     """Estimate the linear receptance of a record by Welch's method.
 
-    H1 = S_FX/S_FF: noise in the response averages out of it, noise in the force does not. It is taken from
-    the acceleration and divided by -omega^2, which keeps the drift of an integrated displacement out.
+    H1 = S_FX/S_FF: noise in the response averages out, noise in the force does not. It comes from the
+    acceleration, divided by -omega^2, which avoids the drift of an integrated displacement.
 
     Args:
-        record: name of the record.
-        motion: measured motion.
-        force: measured force [N].
-        rate: samples a second [Hz].
-        period: samples a period of a periodic drive: one segment each, no window, hence no leakage; else
-            None.
-        segments: how many half-overlapping segments about fit into the record.
+        record: the record; of a periodic drive each period is one segment without a window, hence without
+            leakage.
+        motion: its measured motion.
+        force: its measured force [N].
+        segments: how many half-overlapping segments about fit into another record.
         coherent: lines with at least this coherence count for the resonance.
 
     Returns:
@@ -60,11 +58,11 @@ def linear_response(
 
     Source: P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70; Ewins, Modal Testing, 2nd ed., sec. 3.
     """
-    if period is None:
+    if record.period is None:
         length = min(max(16, 2 * force.size // (segments + 1)), force.size)
-        options = {"fs": rate, "nperseg": length}
+        options = {"fs": record.rate, "nperseg": length}
     else:
-        options = {"fs": rate, "nperseg": period, "noverlap": 0, "window": "boxcar"}
+        options = {"fs": record.rate, "nperseg": record.period, "noverlap": 0, "window": "boxcar"}
     frequency, cross = signal.csd(force, motion.acceleration, **options)
     _, drive = signal.welch(force, **options)
     _, response = signal.welch(motion.acceleration, **options)
@@ -75,4 +73,4 @@ def linear_response(
     coherence = np.abs(cross) ** 2 / np.maximum(drive * response, tiny)
     good = coherence >= coherent
     circle = fit_circle(frequency[good], receptance[good])
-    return LinearResponse(record, frequency, receptance, coherence, circle)
+    return LinearResponse(record.name, frequency, receptance, coherence, circle)

@@ -6,21 +6,26 @@ import itertools
 import numpy as np
 from jaxtyping import Float
 
+_FEWEST = 3
+"""Half cycles without which no decrement is estimated."""
+
+_END = 5
+"""The mean of the last fifth of a decay is taken for the position at rest."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Decrement:
-    """What a free decay says.
+    """Amplitude and frequency of a free decay, by half cycle, and its damping ratio.
 
     Attributes:
-        amplitude: size of each half swing, first to last [unit of the response].
-        frequency: 1/(2 x duration) of each half swing [Hz].
-        natural_frequency: undamped natural frequency [Hz]; NaN with fewer than three half swings.
-        damping_ratio: from the slope of log amplitude over the swings [1]; NaN with fewer than three half
-            swings.
+        amplitude: amplitude of each half cycle, first to last [unit of the response].
+        frequency: 1/(2 x duration) of each half cycle [Hz].
+        natural_frequency: undamped natural frequency [Hz]; NaN with fewer than three half cycles.
+        damping_ratio: from the slope of log amplitude over the half cycles [1]; NaN with fewer than three.
     """
 
-    amplitude: Float[np.ndarray, " swing"]
-    frequency: Float[np.ndarray, " swing"]
+    amplitude: Float[np.ndarray, " half_cycle"]
+    frequency: Float[np.ndarray, " half_cycle"]
     natural_frequency: float
     damping_ratio: float
 
@@ -28,17 +33,17 @@ class Decrement:
 def logarithmic_decrement(
     response: Float[np.ndarray, " time"], rate: float, floor: float = 0.05
 ) -> Decrement:
-    """Find frequency and damping ratio of a free decay from its half swings.
+    """Find frequency and damping ratio of a free decay from its half cycles.
 
-    With `delta` the fall of log amplitude over a full swing, `zeta = delta/sqrt(4 pi^2 + delta^2)`.
+    With `delta` the decrease of log amplitude over a full cycle, `zeta = delta/sqrt(4 pi^2 + delta^2)`.
 
     Args:
         response: free decay about its rest value [m, m/s or m/s^2; the ratio is the same].
         rate: samples a second [Hz].
-        floor: half swings smaller than this share of the largest are noise.
+        floor: half cycles with an amplitude below this share of the largest are noise.
 
     Returns:
-        Half swings, natural frequency, damping ratio.
+        Half cycles, natural frequency, damping ratio.
 
     Source: Ewins, Modal Testing, 2nd ed., sec. 1.4; the mean over a quadratic law's amplitudes where it is
     not linear.
@@ -53,7 +58,7 @@ def logarithmic_decrement(
         small = np.flatnonzero(amplitude[start:] < floor * amplitude[start])
         stop = start + int(small[0]) if small.size else amplitude.size
         amplitude, frequency = amplitude[start:stop], frequency[start:stop]
-    if amplitude.size < 3:
+    if amplitude.size < _FEWEST:
         return Decrement(amplitude, frequency, float("nan"), float("nan"))
     slope = np.polynomial.polynomial.polyfit(np.arange(amplitude.size), np.log(amplitude), 1)[1]
     delta = -2.0 * float(slope)
@@ -63,7 +68,7 @@ def logarithmic_decrement(
 
 
 def about_rest(output: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
-    """Give a free decay about the place where it ends: the mean of its last fifth.
+    """Give a free decay about its position at rest: the mean of its last fifth.
 
     Args:
         output: the decay.
@@ -71,4 +76,4 @@ def about_rest(output: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]
     Returns:
         The decay less that mean.
     """
-    return output - np.mean(output[-max(1, output.size // 5) :])
+    return output - np.mean(output[-max(1, output.size // _END) :])

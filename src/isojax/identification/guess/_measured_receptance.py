@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 from jaxtyping import Complex, Float
 
-from ...records import Campaign, Record, dwell_harmonics
+from ...records import TIME_DERIVATIVES, Campaign, Record, dwell_harmonics
 from .._rules import Rules
 from ._motion import is_absolute
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MeasuredResponse:
-    """What one stepped-sine record says, dwell by dwell in order of frequency.
+    """Harmonics of one stepped-sine record, dwell by dwell in order of frequency.
 
     A signal is the real part of the sum of `amplitude_h exp(i h omega t)`, h = 1, 2, ...
 
@@ -26,7 +26,7 @@ class MeasuredResponse:
         left_out: frequencies of the dwells that were not steady or not driven [Hz].
 
     Source: the paper, sec. 4; every line is divided by its own measured force, since a shaker near resonance
-    does not hold the force that it was told to.
+    does not hold its nominal force.
     """
 
     record: str
@@ -63,7 +63,7 @@ def measured_receptance(
     """
     if not record.dwells:
         raise ValueError(f"Argument `record` must have dwells, but {record.name} has none.")
-    order = {"displacement": 0, "velocity": 1, "acceleration": 2}[campaign.output.quantity]
+    order = TIME_DERIVATIVES[campaign.output.quantity]
     frequency = np.array([dwell.frequency for dwell in record.dwells])
     measured = [dwell_harmonics(record, dwell, harmonics) for dwell in record.dwells]
     drive = np.stack([one.input[1:] for one in measured])

@@ -8,16 +8,16 @@ from jaxtyping import Float
 from ...records import Band, Campaign, Record, excited_band, measured_state
 
 _NEARER = 1.5
-"""Lowest frequency to integrate, over half the lowest excited one: the nearer, the shorter the stray ends."""
+"""Lowest frequency to integrate, over half the lowest excited one: the higher, the shorter the margins."""
 
-_PERIODS = 3.0
-"""Periods of that frequency at each end whose integrals still feel what lies beyond the record."""
+_MARGIN_PERIODS = 3.0
+"""Periods of that frequency at each end whose integrals depend on what lies beyond the record."""
 
-_SHARE = 0.2
-"""The ends never take more than this share of the record each."""
+_LARGEST_MARGIN = 0.2
+"""Largest share of the record that each margin may take."""
 
 _BROAD = 0.1
-"""Share of the highest excited frequency to which the lowest one to integrate is raised at most."""
+"""Share of the highest excited frequency up to which the lowest one to integrate may be raised."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,8 +29,8 @@ class Motion:
         velocity: [m/s].
         acceleration: [m/s^2].
         drive: the recorded drive [N, or m/s^2 for base excitation].
-        band: where the motion stands above its noise and, where it was integrated, has no drift.
-        margin: samples at each end whose integrals are not to be trusted.
+        band: where the motion exceeds its noise and, where it was integrated, has no drift.
+        margin: samples at each end whose integrals are unreliable.
     """
 
     displacement: Float[np.ndarray, " time"]
@@ -44,6 +44,14 @@ class Motion:
     def trusted(self) -> slice:
         """The samples between the margins."""
         return slice(self.margin, self.drive.size - self.margin)
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """Largest displacement [m] and velocity [m/s] between the margins."""
+        displacement, velocity = (
+            float(np.max(np.abs(signal[self.trusted]))) for signal in (self.displacement, self.velocity)
+        )
+        return displacement, velocity
 
 
 def is_absolute(campaign: Campaign) -> bool:
@@ -64,11 +72,11 @@ def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> 
     Args:
         campaign: says what the channels measure.
         record: the record.
-        origin: offset of the output to take off [its SI unit].
+        origin: offset of the output to subtract [its SI unit].
 
     Returns:
         Displacement, velocity, acceleration and drive. Where an absolute acceleration was measured under base
-        excitation, the motion of the base is taken off.
+        excitation, the motion of the base is subtracted.
     """
     own = record
     if is_absolute(campaign) or origin != 0.0:
@@ -79,10 +87,10 @@ def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> 
     if campaign.output.quantity != "displacement":
         lowest = min(_NEARER * band.lowest, 0.5 * band.highest)
         if record.kind == "broadband":
-            # Of a drive that reaches down to nothing: below this the record is all ends.
-            whole = _PERIODS * record.rate / (_SHARE * record.time.size)
+            # The drive may reach down to zero frequency, where the margins would take the whole record.
+            whole = _MARGIN_PERIODS * record.rate / (_LARGEST_MARGIN * record.time.size)
             lowest = max(lowest, min(whole, _BROAD * band.highest))
         band = Band(lowest, band.highest)
-        margin = round(min(_PERIODS * record.rate / lowest, _SHARE * record.time.size))
+        margin = round(min(_MARGIN_PERIODS * record.rate / lowest, _LARGEST_MARGIN * record.time.size))
     x, v, a = measured_state(own, campaign.output.quantity, band.lowest, band.highest)
     return Motion(x, v, a, record.input, band, margin)

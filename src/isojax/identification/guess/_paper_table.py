@@ -1,4 +1,4 @@
-"""The model that the paper's own route gives: resonance points, quadratic fits, averages, inversion."""
+"""The model of the paper's own route: resonance points, quadratic fits, averages, inversion."""
 
 import dataclasses
 from typing import Literal
@@ -22,8 +22,8 @@ class PaperTable:
         stiffness: equivalent stiffness [N/m] over displacement amplitude [m]; None without usable resonances.
         damping: equivalent damping [N s/m] over velocity amplitude [m/s]; None without usable half-power
             points.
-        model: the isolator with these laws, its order reduced until it is a spring and a damper; None if not
-            to be had.
+        model: the isolator with these laws, their order reduced until they are physical; None where they
+            never are.
         notes: what the reader must know of the fits, a sentence each.
 
     Source: the paper, sec. 4.
@@ -36,7 +36,7 @@ class PaperTable:
     notes: tuple[str, ...]
 
 
-def _points(resonances: tuple[Resonance, ...], side: str) -> dict[str, Float[np.ndarray, "_ 2"]]:
+def _resonance_points(resonances: tuple[Resonance, ...], side: str) -> dict[str, Float[np.ndarray, "_ 2"]]:
     """Give amplitude and equivalent coefficient by sweep direction."""
     rows: dict[str, list[tuple[float, float]]] = {}
     for one in resonances:
@@ -93,14 +93,14 @@ def paper_table(
     jumped = [one.record for one in resonances if one.half_power.jump_inside]
     if jumped:
         notes.append(
-            f"A jump lies between the half-power points of {', '.join(jumped)}: eq. (9) means little there."
+            f"A jump lies between the half-power points of {', '.join(jumped)}: eq. (9) does not apply there."
         )
     without = [one.record for one in resonances if not np.isfinite(one.damping_ratio)]
     if without:
-        notes.append(f"No damping ratio from {', '.join(without)}: the sweep does not reach what it needs.")
+        notes.append(f"No damping ratio from {', '.join(without)}: the sweep ends too early for it.")
     for order in (2, 1, 0):
         laws = {
-            side: fit_equivalent_law(_points(resonances, side), side, order)
+            side: fit_equivalent_law(_resonance_points(resonances, side), side, order)
             for side in ("stiffness", "damping")
         }
         (spring, spring_notes), (damper, damper_notes) = laws["stiffness"], laws["damping"]
@@ -115,6 +115,6 @@ def paper_table(
             return PaperTable(resonances, spring, damper, model, (*notes, *spring_notes, *damper_notes))
         notes.append(
             f"With polynomials of order {order} the paper's route gives a {side} law that is not physical "
-            "over the visited range."
+            "over the measured range."
         )
     return PaperTable(resonances, spring, damper, None, tuple(notes))

@@ -1,4 +1,4 @@
-"""Whether a set of coefficients is a spring and a damper over the motion that was measured."""
+"""Whether coefficients are physical, a spring and a damper, over the measured motion."""
 
 from collections.abc import Callable
 
@@ -11,27 +11,30 @@ from ...elements import AbstractElement
 from ...models import Isolator
 from ._force_balance import BalanceFit, with_strength
 
+_NONLINEAR = 1.01
+"""Power of the motion above which a force counts as nonlinear."""
+
 
 def _static(model: Isolator) -> Isolator:
-    """Give the model without effects that have a memory."""
-    memoryless = tuple(element for element in model.elements if element.internal_states == 0)
-    return Isolator(model.mass, memoryless, model.excitation)
+    """Give the model without effects that have internal states."""
+    static = tuple(element for element in model.elements if element.internal_states == 0)
+    return Isolator(model.mass, static, model.excitation)
 
 
 def unphysical_side(model: Isolator, displacement: float, velocity: float, points: int = 41) -> str | None:
-    """Say which side of a model is no spring, or no damper, over the visited range.
+    """Say which side of a model is no spring, or no damper, over the measured range.
 
-    A spring must push back more the farther it is taken, dk/dx > 0; a damper must take energy, (f(x, v) -
-    f(x, 0)) v >= 0. A model without a spring, or without a damper, has nothing to fail there.
+    A spring must have a positive tangent stiffness, df/dx > 0; a damper must dissipate energy, (f(x, v) -
+    f(x, 0)) v >= 0. A model without a spring, or without a damper, cannot fail there.
 
     Args:
         model: the model.
-        displacement: largest displacement visited [m].
-        velocity: largest velocity visited [m/s].
-        points: how many points of each range are looked at.
+        displacement: largest displacement measured [m].
+        velocity: largest velocity measured [m/s].
+        points: how many points of each range are checked.
 
     Returns:
-        "stiffness", "damping", or None where both are sane.
+        "stiffness", "damping", or None where both are physical.
     """
     static = _static(model)
 
@@ -52,15 +55,15 @@ def unphysical_side(model: Isolator, displacement: float, velocity: float, point
 
 
 def _degree(unit: AbstractElement, side: str, displacement: float, velocity: float) -> float:
-    """Give the power of the motion with which a force grows on one side; zero where it has no part there."""
+    """Give the power of the motion with which a force grows on one side; zero where it does not act there."""
 
-    def share(size: float) -> float:
+    def force(size: float) -> float:
         still = float(unit.force(jnp.asarray(size * displacement), jnp.asarray(0.0), ()))
         if side == "stiffness":
             return still
         return float(unit.force(jnp.asarray(size * displacement), jnp.asarray(size * velocity), ())) - still
 
-    small, large = share(0.5), share(1.0)
+    small, large = force(0.5), force(1.0)
     return float(np.log2(large / small)) if small * large > 0 else 0.0
 
 
@@ -70,12 +73,11 @@ def steepest(model: Isolator, side: str, displacement: float, velocity: float) -
     Args:
         model: the model.
         side: "stiffness" or "damping".
-        displacement: largest displacement visited [m].
-        velocity: largest velocity visited [m/s].
+        displacement: largest displacement measured [m].
+        velocity: largest velocity measured [m/s].
 
     Returns:
-        Catalogue name of the present effect of highest degree above one, or None where only linear ones are
-        left.
+        Catalogue name of the present effect of highest degree above one, or None where all are linear.
     """
     present = [
         element for element in _static(model).elements if float(getattr(element, element.strength)) != 0
@@ -85,19 +87,19 @@ def steepest(model: Isolator, side: str, displacement: float, velocity: float) -
         for element in present
     }
     name = max(degrees, key=lambda name: degrees[name], default=None)
-    return name if name is not None and degrees[name] > 1.01 else None
+    return name if name is not None and degrees[name] > _NONLINEAR else None
 
 
 def fit_physically(
     fit: Callable[[tuple[str, ...]], BalanceFit], names: tuple[str, ...], displacement: float, velocity: float
 ) -> tuple[BalanceFit, tuple[str, ...]]:
-    """Fit, and fit again without the steepest effect of the failing side, until spring and damper are sane.
+    """Fit, and fit again without the steepest effect of the failing side, until the result is physical.
 
     Args:
         fit: regression on given catalogue names.
-        names: catalogue names to begin with.
-        displacement: largest displacement visited [m].
-        velocity: largest velocity visited [m/s].
+        names: catalogue names to start with.
+        displacement: largest displacement measured [m].
+        velocity: largest velocity measured [m/s].
 
     Returns:
         The fit, and a sentence for each effect that was left out.
@@ -107,13 +109,11 @@ def fit_physically(
     while (side := unphysical_side(found.model, displacement, velocity)) is not None:
         dropped = steepest(found.model, side, displacement, velocity)
         reason = (
-            "a tangent stiffness that is not positive"
-            if side == "stiffness"
-            else "damping that feeds energy in"
+            "a tangent stiffness that is not positive" if side == "stiffness" else "damping that adds energy"
         )
         span = f"within {displacement:.3g} m" if side == "stiffness" else f"within {velocity:.3g} m/s"
         if dropped is None:
-            notes.append(f"The start has {reason} {span}, and no higher term is left to leave out.")
+            notes.append(f"The start has {reason} {span}, and no nonlinear term remains to be left out.")
             break
         notes.append(f"The regression gave {reason} {span}: {dropped} starts at zero instead.")
         names = tuple(name for name in names if name != dropped)

@@ -1,45 +1,37 @@
-"""Start from records without dwells: the force balance in time, summarised by its low-frequency lines."""
+"""The force balance of records without dwells: in time, projected on its low-frequency lines."""
 
 import numpy as np
 from jaxtyping import Float
 from scipy.signal.windows import tukey
 
-from ...models import Isolator
-from ._force_balance import BalanceFit, BalanceProjection, fit_balance
+from ...records import TIME_DERIVATIVES, Band, Campaign, Record
+from ._force_balance import BalanceProjection
 from ._motion import Motion
-
-_DERIVATIVES = {"displacement": 2, "velocity": 1, "acceleration": 0}
+from ._scales import excited_centre
 
 
 def line_projection(
-    size: int,
-    rate: float,
-    lowest: float,
-    highest: float,
-    derivatives: int,
-    centre: float,
-    margin: int = 0,
+    motion: Motion, rate: float, band: Band, derivatives: int, centre: float
 ) -> BalanceProjection:
     """Give the projection on the Fourier lines of a band, which low-passes without a phase.
 
-    A smooth window takes the ends of the record out, where derivatives and integrals are not to be trusted.
-    Lines above `centre` are weighed down as the noise of a differentiated response rises.
+    A smooth window removes the ends of the record, where derivatives and integrals are unreliable. Lines
+    above `centre` get a smaller weight, as the noise of a differentiated response rises.
 
     Args:
-        size: samples of the record.
+        motion: the motion, whose margins are left out.
         rate: samples a second [Hz].
-        lowest: lower end of the band [Hz]; zero keeps the mean.
-        highest: upper end of the band [Hz].
+        band: the lines that count [Hz]; a lower end of zero keeps the mean.
         derivatives: how often the response was differentiated to give the acceleration.
         centre: centre of the band [Hz].
-        margin: samples at each end to take out altogether.
 
     Returns:
         The projection.
     """
-    window = np.pad(tukey(size - 2 * margin, 0.1), margin)
+    size = motion.drive.size
+    window = np.pad(tukey(size - 2 * motion.margin, 0.1), motion.margin)
     frequency = np.fft.rfftfreq(size, 1.0 / rate)
-    kept = (frequency >= lowest) & (frequency <= highest)
+    kept = (frequency >= band.lowest) & (frequency <= band.highest)
     weight = 1.0 / (1.0 + (frequency[kept] / centre) ** derivatives) / np.sqrt(size)
 
     def project(force: Float[np.ndarray, " time"]) -> Float[np.ndarray, " row"]:
@@ -49,47 +41,36 @@ def line_projection(
     return project
 
 
-def fit_restoring_force(
-    model: Isolator,
-    names: tuple[str, ...],
-    motions: tuple[Motion, ...],
-    centres: tuple[float, ...],
-    rate: float,
-    quantity: str,
-    offset_free: bool = False,
-    mass_free: bool = False,
-) -> BalanceFit:
-    """Fit the coefficients to the force balance in time, low-passed.
+def band_projections(
+    campaign: Campaign, records: tuple[Record, ...], motions: tuple[Motion, ...]
+) -> tuple[BalanceProjection, ...]:
+    """Give the projections with which the force balance in time is fitted, low-passed.
 
     Args:
-        model: the structure; its present strengths do not matter.
-        names: catalogue names of the elements to fit.
-        motions: measured motion and drive of the records.
-        centres: centre of the excited band of each [Hz].
-        rate: samples a second [Hz].
-        quantity: what the output measures.
-        offset_free: whether an offset may take up the mean force, which then counts where a displacement was
-            measured; else only what lies above the lowest excited frequency counts.
-        mass_free: whether the mass is unknown too.
+        campaign: says what the output measures, and which offsets are free: one of them may take up the mean
+            force, which then counts where a displacement was measured. Else only what lies above the lowest
+            excited frequency counts.
+        records: the records.
+        motions: their measured motion and drive.
 
     Returns:
-        The model found.
+        One a record.
 
-    Source: Masri & Caughey 1979; the same filter on force and on every column keeps the balance exact (A.
+    Source: Masri & Caughey 1979; the same filter on force and on every regressor keeps the balance exact (A.
     Janot, P.-O. Vandanjon and M. Gautier, A generic instrumental variable approach for industrial robot
     identification, IEEE Trans. Control Syst. Technol. 22 (2014) 132).
     """
+    quantity = campaign.output.quantity
+    offset_free = campaign.input.offset_free or campaign.output.offset_free
     keeps_mean = offset_free and quantity == "displacement"
-    projections = tuple(
+    derivatives = TIME_DERIVATIVES["acceleration"] - TIME_DERIVATIVES[quantity]
+    return tuple(
         line_projection(
-            motion.drive.size,
-            rate,
-            0.0 if keeps_mean else motion.band.lowest,
-            motion.band.highest,
-            _DERIVATIVES[quantity],
-            centre,
-            motion.margin,
+            motion,
+            campaign.rate,
+            Band(0.0, motion.band.highest) if keeps_mean else motion.band,
+            derivatives,
+            excited_centre(record, motion) / (2 * np.pi),
         )
-        for motion, centre in zip(motions, centres, strict=True)
+        for record, motion in zip(records, motions, strict=True)
     )
-    return fit_balance(model, names, motions, projections, mass_free)

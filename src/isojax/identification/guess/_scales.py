@@ -11,6 +11,10 @@ from ..jacobian import workers
 from ._motion import Motion, measured_motion
 
 _PERIODS_A_WINDOW = 4.0
+"""Periods of the band's centre in a window whose velocity amplitude is estimated."""
+
+_MOVED = 1e-3
+"""Velocity amplitude of a window, over the largest, below which it did not move."""
 
 
 def _amplitude(signals: list[Float[np.ndarray, " _"]]) -> float:
@@ -19,9 +23,9 @@ def _amplitude(signals: list[Float[np.ndarray, " _"]]) -> float:
 
 
 def _largest(record: Record, motion: Motion, signal: Float[np.ndarray, " time"]) -> float:
-    """Give the amplitude of an estimated signal: of the sine as strong as it where its integrals are good.
+    """Give the amplitude of an estimated signal: of an equally strong sine, where its integrals are reliable.
 
-    A motion that rings down is largest where they are poorest: its peak there is better than no word of it.
+    A motion that rings down is largest where they are not; there its peak is used all the same.
     """
     if record.rings_down:
         return float(np.max(np.abs(signal)))
@@ -61,7 +65,7 @@ def _slowest(record: Record, motion: Motion, centre: float) -> float:
         trusted = range(record.time.size)[motion.trusted]
         spans = [(start, start + length) for start in range(trusted.start, trusted.stop - length + 1, length)]
     speeds = np.array([np.sqrt(2.0) * np.std(motion.velocity[start:stop]) for start, stop in spans])
-    return float(np.min(speeds[speeds > 1e-3 * np.max(speeds)], initial=np.max(speeds)))
+    return float(np.min(speeds[speeds > _MOVED * np.max(speeds)], initial=np.max(speeds)))
 
 
 def scales(campaign: Campaign) -> Scales:
@@ -93,7 +97,7 @@ def scales(campaign: Campaign) -> Scales:
         force *= campaign.mass
     return Scales(
         mass=campaign.mass,
-        # A free decay has no drive: inertia is then the force that counts.
+        # A free decay has no drive, so its inertia is the typical force.
         force=force if force > 0 else campaign.mass * acceleration,
         displacement=max(_largest(record, motion, motion.displacement) for record, motion in pairs),
         velocity=max(_largest(record, motion, motion.velocity) for record, motion in pairs),

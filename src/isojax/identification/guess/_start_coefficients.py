@@ -1,4 +1,4 @@
-"""Coefficients to start from, by what kind of records there are."""
+"""Coefficients to start from, for records with dwells and for those without."""
 
 import dataclasses
 
@@ -8,20 +8,19 @@ from ...models import Isolator
 from ...records import Campaign, Record
 from ._decay_cycles import start_from_decays
 from ._dwell_balance import dwell_motion, fit_all_dwells
-from ._force_balance import BalanceFit
+from ._force_balance import BalanceFit, fit_balance
 from ._linear_response import LinearResponse, linear_response
 from ._logarithmic_decrement import Decrement, about_rest, logarithmic_decrement
 from ._measured_receptance import MeasuredResponse
 from ._motion import measured_motion
 from ._physical_fit import fit_physically
-from ._restoring_force import fit_restoring_force
-from ._scales import excited_centre
+from ._restoring_force import band_projections
 from ._sensor_offset_start import output_mean
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TimeStart:
-    """What records without dwells say.
+    """The start that records without dwells give.
 
     Attributes:
         fit: coefficients from the force balance.
@@ -51,16 +50,15 @@ def start_from_dwells(
         The fit and its notes.
     """
     motion = dwell_motion(base, responses)
-    highest, fastest = (float(np.max(np.abs(s))) for s in (motion.displacement, motion.velocity))
     return fit_physically(
-        lambda chosen: fit_all_dwells(base, chosen, responses, mass_free=mass_free), names, highest, fastest
+        lambda chosen: fit_all_dwells(base, chosen, responses, mass_free=mass_free), names, *motion.largest
     )
 
 
 def start_from_time(
     campaign: Campaign, base: Isolator, names: tuple[str, ...], records: tuple[Record, ...], mass_free: bool
 ) -> TimeStart:
-    """Start from records without dwells: from the force balance in time, or the swings of free decays alone.
+    """Start from records without dwells: by the force balance in time, or by the cycles of free decays alone.
 
     Args:
         campaign: says what the channels measure.
@@ -74,25 +72,17 @@ def start_from_time(
     """
     origin = output_mean(campaign) if campaign.output.offset_free else 0.0
     motions = tuple(measured_motion(campaign, record, origin) for record in records)
-    pairs = list(zip(records, motions, strict=True))
-    centres = tuple(excited_centre(record, motion) / (2 * np.pi) for record, motion in pairs)
-    offset_free = campaign.input.offset_free or campaign.output.offset_free
-    highest = max(float(np.max(np.abs(motion.displacement[motion.trusted]))) for motion in motions)
-    fastest = max(float(np.max(np.abs(motion.velocity[motion.trusted]))) for motion in motions)
     released = all(record.rings_down for record in records)
-    by_swings = start_from_decays(campaign, base, names, records) if released else None
-    fit, notes = by_swings or fit_physically(
-        lambda chosen: fit_restoring_force(
-            base, chosen, motions, centres, campaign.rate, campaign.output.quantity, offset_free, mass_free
-        ),
-        names,
-        highest,
-        fastest,
+    by_cycles = start_from_decays(campaign, base, names, records) if released else None
+    projections = band_projections(campaign, records, motions)
+    highest, fastest = (max(sizes) for sizes in zip(*(motion.largest for motion in motions), strict=True))
+    fit, notes = by_cycles or fit_physically(
+        lambda chosen: fit_balance(base, chosen, motions, projections, mass_free), names, highest, fastest
     )
     factor = -float(base.mass) if base.excitation == "base_acceleration" else 1.0
     linear = tuple(
-        linear_response(record.name, motion, factor * motion.drive, record.rate, record.period)
-        for record, motion in pairs
+        linear_response(record, motion, factor * motion.drive)
+        for record, motion in zip(records, motions, strict=True)
         if record.kind != "free_decay" and np.any(motion.drive)
     )
     decrements = {

@@ -1,4 +1,10 @@
-"""isojax.records.formats."""
+"""Readers of data files, one per format.
+
+In: a file and the names of columns. Out: a `Column` per name, float64 samples in the file's own unit, with
+the rate and start time that the file states.
+Read `_samples.py` first, then `_csv.py`; `_npz.py`, `_hdf5.py`, `_mat.py`, `_tdms.py` and
+`_universal_file.py` do the same for their formats.
+"""
 
 from ._csv import numbers as numbers
 from ._csv import read_csv_columns as read_csv_columns

@@ -1,6 +1,6 @@
-"""What every reader hands back: named columns of float64 samples, and the checks they share."""
+"""What every reader returns: named columns of float64 samples, and the checks they share."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,30 @@ def missing_column(file: Path, name: str, present: Iterable[str]) -> ValueError:
     """Gives the error for a column that the file does not have; lists those it has."""
     present = list(present)
     return ValueError(f"{file} has no column `{name}`; it has {listing(present)}{nearest(name, present)}")
+
+
+def find_channel(file: Path, name: str, names: Sequence[Sequence[str]]) -> int:
+    """Gives the index of the one channel of a name.
+
+    Args:
+        file: For the error.
+        name: The name sought.
+        names: All names of each channel.
+
+    Returns:
+        Its index in `names`.
+
+    Raises:
+        ValueError: If no channel has the name, or several have; lists names that only one channel has.
+    """
+    matches = [i for i, own in enumerate(names) if name in own]
+    if not matches:
+        raise missing_column(file, name, dict.fromkeys(one for own in names for one in own))
+    if len(matches) > 1:
+        unique = [one for i in matches for one in names[i] if sum(one in own for own in names) == 1]
+        hint = f"use one of {listing(unique)}" if unique else "rename them before the export"
+        raise ValueError(f"{file}: {len(matches)} channels are called `{name}`; {hint}")
+    return matches[0]
 
 
 def as_samples(values: Any, file: Path, name: str) -> Float[np.ndarray, " time"]:

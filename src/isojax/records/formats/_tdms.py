@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._wording import listing
-from ._samples import Column, as_samples, missing_column
+from ._samples import Column, as_samples, find_channel
 
 
 def read_tdms_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
@@ -33,20 +32,11 @@ def read_tdms_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
         channels = [channel for group in held.groups() for channel in group.channels()]
     except Exception as error:  # npTDMS raises ValueError, KeyError, struct.error, ... on a broken file
         raise ValueError(f"{file} cannot be read as TDMS: {error}") from error
-    chosen = {name: _choose(file, name, channels) for name in names}
+    known = [(f"{one.group_name}/{one.name}", one.name) for one in channels]
+    chosen = {name: channels[find_channel(file, name, known)] for name in names}
     clocks = [channel.properties.get("wf_start_time") for channel in chosen.values()]
     origin = next((clock for clock in clocks if clock is not None), None)
     return {name: _column(file, name, channel, origin) for name, channel in chosen.items()}
-
-
-def _choose(file: Path, name: str, channels: list[Any]) -> Any:
-    matches = [one for one in channels if name in (one.name, f"{one.group_name}/{one.name}")]
-    if not matches:
-        raise missing_column(file, name, [f"{one.group_name}/{one.name}" for one in channels])
-    if len(matches) > 1:
-        full = listing(f"{one.group_name}/{one.name}" for one in matches)
-        raise ValueError(f"{file}: {len(matches)} channels are called `{name}`; use one of {full}")
-    return matches[0]
 
 
 def _column(file: Path, name: str, channel: Any, origin: Any) -> Column:

@@ -1,6 +1,4 @@
-"""Universal files (.uff, .unv): time histories in datasets 58 and 58b; meshes, modes and spectra are passed
-over.
-"""
+"""Universal files (.uff, .unv): time histories in datasets 58 and 58b, without meshes, modes and spectra."""
 
 import re
 import tempfile
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._wording import listing
-from ._samples import Column, as_samples, missing_column
+from ._samples import Column, as_samples, find_channel
 
 _TIME_RESPONSE = (0, 1)  # function type "general" and "time response"
 _TIME_AXES = (0, 1, 17)  # abscissa "unknown", "general" and "time"; 18 is frequency
@@ -20,8 +18,8 @@ _TIME_AXES = (0, 1, 17)  # abscissa "unknown", "general" and "time"; 18 is frequ
 def read_universal_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
     """Gives the named time histories of a universal file.
 
-    A channel goes by its first header line, its response entity, its ordinate label or "node:direction",
-    whichever names one channel only.
+    A channel is named by its first header line, its response entity, its ordinate label or "node:direction",
+    as far as that names one channel only.
 
     Args:
         file: The file, ASCII or binary.
@@ -36,7 +34,7 @@ def read_universal_columns(file: Path, names: Sequence[str]) -> dict[str, Column
     """
     histories = _time_histories(file)
     labels = [_labels(one) for one in histories]
-    return {name: _column(file, name, histories[_choose(file, name, labels)]) for name in names}
+    return {name: _column(file, name, histories[find_channel(file, name, labels)]) for name in names}
 
 
 def _time_histories(file: Path) -> list[dict[str, Any]]:
@@ -80,17 +78,6 @@ def _labels(one: dict[str, Any]) -> list[str]:
     written = [one.get("id1"), one.get("rsp_ent_name"), one.get("ordinate_axis_lab")]
     named = [str(text).strip() for text in written if text and str(text).strip() not in ("", "NONE")]
     return list(dict.fromkeys([*named, f"{one.get('rsp_node')}:{one.get('rsp_dir')}"]))
-
-
-def _choose(file: Path, name: str, labels: list[list[str]]) -> int:
-    matches = [i for i, known in enumerate(labels) if name in known]
-    if not matches:
-        raise missing_column(file, name, dict.fromkeys(label for known in labels for label in known))
-    if len(matches) > 1:
-        own = [label for i in matches for label in labels[i] if sum(label in known for known in labels) == 1]
-        hint = f"use {listing(own)}" if own else "rename them before the export"
-        raise ValueError(f"{file}: {len(matches)} channels are called `{name}`; {hint}")
-    return matches[0]
 
 
 def _column(file: Path, name: str, one: dict[str, Any]) -> Column:

@@ -1,4 +1,9 @@
-"""isojax.records.noise."""
+"""The noise of the output channel, and the health of the data.
+
+In: a `Campaign`. Out: the rms of its output noise, and what the reader must know of the data: dwells that
+never settled, brief blows, differences between repeats, a resonance peak in the scatter.
+Read `_noise.py` first, then `_repeats.py`; `_noise_peak.py` and `_health.py` after them.
+"""
 
 from ._health import DataHealth as DataHealth
 from ._health import brief_blows as brief_blows

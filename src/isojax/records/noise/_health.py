@@ -1,4 +1,4 @@
-"""Data health: dwells that never settled, blows too brief for the rate, and how well repeats repeat."""
+"""Data health: dwells that never settled, blows too brief for the rate, and differences between repeats."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,20 @@ from ..spectrum import dwell_harmonics, harmonic_basis
 from ._noise_peak import NoisePeak, noise_peak
 from ._repeats import repeat_groups
 
-_CYCLES = 6
-_ORDERS = 3
+_LAST_CYCLES = 6
+"""Cycles at the end of a dwell that are compared with each other."""
+
+_FREE_ORDERS = 3
+"""Harmonics that may differ from cycle to cycle."""
+
+_COMMON_ORDERS = 12
+"""Highest harmonic that all these cycles have in common, where a cycle has 60 samples and more."""
+
+_UNSETTLED = 1e-3
+"""Chance, over all dwells tested, that a settled one is reported as unsettled."""
 
 _FEW_SAMPLES = 4
-"""Samples in a row below which the shape of a blow between them is a guess."""
+"""Samples in a row below which the shape of a blow between them is unknown."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +77,14 @@ class BriefBlow:
 
 @dataclass(frozen=True)
 class DataHealth:
-    """What is to be known of the data before a model is blamed.
+    """What the reader must know of the data before judging a model.
 
     Attributes:
-        dwells: Number of dwells looked at.
+        dwells: Number of dwells tested.
         unsettled: Those that never settled.
         repeats: Pairs of repeats.
         brief_blows: Records whose blow lasts fewer than four samples.
-        noise_peak: Resonance peak in the scatter, or None; not looked for where a floor is measured.
+        noise_peak: Resonance peak in the scatter, or None; not sought where a floor is measured.
     """
 
     dwells: int
@@ -109,7 +118,7 @@ def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth
         for dwell in record.dwells
         if (result := cycle_change(record, dwell)) is not None
     ]
-    limit = 1e-3 / max(len(tested), 1)
+    limit = _UNSETTLED / max(len(tested), 1)
     unsettled = tuple(one for one in tested if one.p_value < limit and one.change > smallest_change)
     peak = noise_peak(campaign) if campaign.floor is None else None
     return DataHealth(len(tested), unsettled, _repeat_differences(campaign), brief_blows(campaign), peak)
@@ -133,26 +142,26 @@ def brief_blows(campaign: Campaign) -> tuple[BriefBlow, ...]:
 
 
 def cycle_change(record: Record, dwell: Dwell) -> tuple[float, float] | None:
-    """Gives the p-value of "the last six cycles are alike" and the relative change between them; None if too
-    short.
+    """Gives the p-value of the hypothesis that the last six cycles are equal, and the relative change between
+    them; None for a dwell that is too short.
     """
     cycle = record.rate / dwell.frequency
-    if dwell.cycles < _CYCLES + 1 or cycle < 2 * _ORDERS + 3:
+    if dwell.cycles < _LAST_CYCLES + 1 or cycle < 2 * _FREE_ORDERS + 3:
         return None
-    edges = dwell.stop - np.round(np.arange(_CYCLES, -1, -1) * cycle).astype(int)
+    edges = dwell.stop - np.round(np.arange(_LAST_CYCLES, -1, -1) * cycle).astype(int)
     start = int(edges[0])
     signal = record.output[start : dwell.stop]
     time = (np.arange(start, dwell.stop) - start) / record.rate
-    orders = max(_ORDERS, min(12, int(0.2 * cycle)))
+    orders = max(_FREE_ORDERS, min(_COMMON_ORDERS, int(0.2 * cycle)))
     common = harmonic_basis(time, dwell.frequency, orders)
     shared = signal - common @ np.linalg.lstsq(common, signal, rcond=None)[0]
     own = shared.copy()
-    few = harmonic_basis(time, dwell.frequency, _ORDERS)
+    few = harmonic_basis(time, dwell.frequency, _FREE_ORDERS)
     for first, last in zip(edges[:-1] - start, edges[1:] - start, strict=True):
         part = few[first:last]
         own[first:last] -= part @ np.linalg.lstsq(part, shared[first:last], rcond=None)[0]
     before, after = float(shared @ shared), float(own @ own)
-    gained = (_CYCLES - 1) * few.shape[1]
+    gained = (_LAST_CYCLES - 1) * few.shape[1]
     left = signal.size - common.shape[1] - gained
     size = float(np.sqrt(np.mean((signal - np.mean(signal)) ** 2)))
     if after <= 0.0 or left < 1 or size == 0.0:

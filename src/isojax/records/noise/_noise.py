@@ -15,15 +15,23 @@ from ..spectrum import NoiseBand, dwell_rest, dwell_window, hum_lines, spectral_
 from ._repeats import repeat_difference, repeat_groups
 
 NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency"]
-_QUANTILE = 0.25
+_SETTLED_QUANTILE = 0.25
+"""Quantile of the dwells' scatters that is taken for noise: up to three quarters of them may be unsettled."""
+
 _UNSETTLED = 1e-3
-"""Chance of a settled dwell to scatter as much as one that does not count."""
+"""Chance that a settled dwell scatters so much that it is left out."""
 
-_FLOORS = ((0.35, 0.5), (0.5, 0.65), (0.65, 0.8), (0.8, 0.95))
-"""Parts of the band whose floors are compared."""
+_TRANSIENT = 1.2
+"""The first period is left out where it raises the scatter of the others by this factor."""
 
-_AGREE = 3.0
-"""Standard errors within which two floors are one."""
+_FLOOR_SPANS = ((0.35, 0.5), (0.5, 0.65), (0.65, 0.8), (0.8, 0.95))
+"""Sections of the noise band, as shares of it, whose spectral floors are compared."""
+
+_EQUAL_FLOORS = 3.0
+"""Standard errors within which two floors count as equal."""
+
+_TRIMMED = 6
+"""From so many records on, the pooled noise comes from the inner half: one bad record does not count."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +40,11 @@ class NoiseEstimate:
 
     Attributes:
         sigma: Pooled over the records; of the samples as the campaign holds them, filtered where it filters.
-        method: How it was found; where records differ, the method of most of them.
+        method: How it was estimated; where records differ, the method of most of them.
         per_record: One value per record, in the campaign's order.
         methods: The method of each record.
         bandwidth_hz: Frequency up to which the noise reaches [Hz]: half the rate, or the [filter]'s cut-off.
-        note: What to keep in mind, or "".
+        note: What the reader must know, or "".
         share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
             independent.
     """
@@ -51,10 +59,10 @@ class NoiseEstimate:
 
     @property
     def white(self) -> float:
-        """White noise of the density that this noise has inside its band, its rms: sigma / sqrt(share).
+        """The rms of white noise with the density that this noise has inside its band: sigma / sqrt(share).
 
-        It is this, not the smaller rms of what a filter left, that a coefficient is uncertain by: the motion
-        lies inside the band, where a filter has taken nothing off the noise.
+        It sets the uncertainty of a coefficient, and not the smaller rms of the filtered noise: the motion
+        lies inside the band, where a filter leaves the noise as it is.
         """
         return self.sigma / float(np.sqrt(self.share))
 
@@ -62,12 +70,12 @@ class NoiseEstimate:
 def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     """Gives the output noise of a campaign.
 
-    Per record, the first that applies: the declared one (of the column as the file holds it); the scatter
+    Per record, the first that applies: the declared one (of the column as it stands in the file); the scatter
     about the harmonics of settled dwells; the scatter between periods; the difference of repeats at equal
-    level and direction, where it is not explained by the records themselves; the floor of the spectrum above
-    the excited band. The last alone counts where the building's floor was measured: the scatter that it makes
-    is for a model to explain. Forces and stiffness that change from repeat to repeat move harmonics, not the
-    scatter about them, so stepped sines never need the repeats.
+    level and direction, as far as the records do not explain it; the floor of the spectrum above the excited
+    band. Where the building's floor was measured only the last applies, since a model can explain the scatter
+    that the floor causes. Stepped sines never need the repeats: forces and stiffness that change between
+    repeats move the harmonics, and not the scatter about them.
 
     Args:
         campaign: The campaign.
@@ -94,7 +102,8 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     ]
     common: NoiseMethod = max(dict.fromkeys(seen), key=seen.count) if seen else "high_frequency"
     sigma = _pool([value for value, method in found if method == common and np.isfinite(value)])
-    # it is one channel: a floor is a makeshift where other records show the noise itself
+    # All records share one channel: a spectral floor does not count where other records show the noise
+    # itself.
     kept = [np.isfinite(value) and method in (*seen, common) for value, method in found]
     return NoiseEstimate(
         sigma=sigma,
@@ -118,7 +127,8 @@ def _estimate_each(records: tuple[Record, ...], band: NoiseBand) -> list[tuple[f
             ("repeats", lambda record=record, group=group: _repeat_scatter(record, group, band)),
         ]
         if record.floor is not None:
-            # what a measured floor does from cycle to cycle scatters, but a model can explain it: no noise
+            # A measured floor also causes scatter from cycle to cycle, but a model can explain that: no
+            # noise.
             tries = []
         for method, estimate in tries:
             value = estimate()
@@ -134,11 +144,10 @@ def cycle_scatter(record: Record, band: NoiseBand) -> float:
     """Gives the rms about the harmonics of the last quarter of each dwell, at least four cycles; NaN if none
     is long.
 
-    As many harmonics are taken as half the rate holds, up to 120, and the fundamental may drift linearly:
-    they stand above the noise beyond a filter's cut-off, too. Lines of the mains that stand out of the record
-    are no noise either: a model can explain them. Dwells that never settle, near a fold or in modulation, do
-    not count: beyond the chance of one in a thousand, by chi-square, from the level that the lower quartile
-    of the dwells shows.
+    Up to 120 harmonics below 0.45 of the rate are removed, also beyond a filter's cut-off, where they can
+    exceed the noise; the fundamental may drift linearly. Significant lines of the mains are removed as well:
+    a model can explain them. Dwells that never settle, near a fold or in modulation, are left out: those
+    whose scatter exceeds the level of the lower quartile by more than chance (1e-3, chi-square) allows.
 
     Args:
         record: The record.
@@ -152,7 +161,7 @@ def cycle_scatter(record: Record, band: NoiseBand) -> float:
     if not scatters.size:
         return float("nan")
     squares, freedom = scatters.T
-    quantile = _QUANTILE if squares.size >= 4 else 0.5
+    quantile = _SETTLED_QUANTILE if squares.size >= 4 else 0.5
     level = np.quantile(squares * freedom / scipy.stats.chi2.ppf(quantile, freedom), quantile)
     for _ in range(3):
         settled = squares * freedom <= level * scipy.stats.chi2.isf(_UNSETTLED, freedom)
@@ -170,7 +179,7 @@ def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float,
     lines = tuple(line.frequency for line in hum_lines(record))
     rest, frequencies = dwell_rest(record, dwell, window, lines)
     taken = float(np.sum(band.power_gain(frequencies)))
-    # noise of a narrow band has fewer degrees of freedom than samples; the harmonics take theirs from them
+    # Noise of a narrow band has fewer degrees of freedom than samples, and the harmonics use some of them.
     freedom = window * band.share - taken
     if freedom < taken:
         return None
@@ -178,32 +187,28 @@ def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float,
 
 
 def period_scatter(record: Record) -> float:
-    """Gives the rms of what does not repeat from period to period after the settle samples; NaN without two
-    periods.
+    """Gives the rms of what does not repeat from period to period; NaN without two periods.
 
-    Only whole periods count, taken from the end. With three and more the first ones are left out as long as
-    they scatter clearly more than the rest (a transient).
+    Only whole periods after the settle samples count. With three and more the first ones are left out as long
+    as they scatter clearly more than the others (a transient).
     """
-    if record.period is None:
+    periods = record.periods
+    if len(periods) < 2:
         return float("nan")
-    count = (record.output.size - record.settle) // record.period
-    if count < 2:
-        return float("nan")
-    periods = record.output[record.output.size - count * record.period :].reshape(count, record.period)
-    squares = [_between(periods[first:]) for first in range(max(1, count - 1))]
+    squares = [_variance_of_periods(periods[first:]) for first in range(max(1, len(periods) - 1))]
     chosen = squares[-1]
     for square in reversed(squares):
-        chosen = square if square < 1.2 * chosen else chosen
+        chosen = square if square < _TRANSIENT * chosen else chosen
     return float(np.sqrt(chosen))
 
 
 def high_frequency_floor(record: Record, band: NoiseBand) -> float:
-    """Gives the rms of noise that has the density of the spectrum's quietest upper part.
+    """Gives the rms of noise that has the density of the spectrum's quietest upper section.
 
-    The quietest of four parts alone would be low by the luck of the draw. Those that agree with it are
-    therefore taken together; where the response fills the lower ones, the quietest stands alone, and no
-    choice between equals has been made. Of a record that rings down only what follows the release or the
-    blow counts: its own spectrum has no upper end.
+    The smallest of four estimates is biased low, so the sections that agree with the quietest are averaged
+    with it. Where the response fills the lower sections, the quietest one remains alone and has no such bias.
+    Of a record that rings down only what follows the release or the blow counts, since the spectrum of a
+    release or a blow itself has no upper end.
 
     Args:
         record: The record.
@@ -213,27 +218,27 @@ def high_frequency_floor(record: Record, band: NoiseBand) -> float:
         rms per sample in the output's unit.
     """
     output = ring_down(record)
-    spans = [(low * band.highest, high * band.highest) for low, high in _FLOORS]
+    spans = [(low * band.highest, high * band.highest) for low, high in _FLOOR_SPANS]
     found = [(*spectral_floor(output, band, span), span) for span in spans]
     known = sorted(one for one in found if np.isfinite(one[0]))
-    if not known:  # a short record has too few lines for narrow parts
+    if not known:  # a short record has too few lines for narrow sections
         density, _ = spectral_floor(output, band, (0.4 * band.highest, 0.95 * band.highest))
     else:
         density, error, quietest = known[0]
         alike = [quietest]
         for level, own, span in known[1:]:
-            if level <= density * (1.0 + _AGREE * np.hypot(own, error)):
+            if level <= density * (1.0 + _EQUAL_FLOORS * np.hypot(own, error)):
                 alike.append(span)
                 density, error = spectral_floor(output, band, *alike)
-    return _rms(density, band)
+    return _rms_of_density(density, band)
 
 
-def _rms(density: float, band: NoiseBand) -> float:
+def _rms_of_density(density: float, band: NoiseBand) -> float:
     """Gives the rms per sample of noise whose white density [per Hz] is known."""
     return float(np.sqrt(density * band.share * 0.5 * band.rate))
 
 
-def _between(periods: Float[np.ndarray, "period time"]) -> float:
+def _variance_of_periods(periods: Float[np.ndarray, "period time"]) -> float:
     rest = periods - np.mean(periods, axis=0)
     return float(np.mean(rest**2)) * periods.shape[0] / (periods.shape[0] - 1)
 
@@ -241,25 +246,23 @@ def _between(periods: Float[np.ndarray, "period time"]) -> float:
 def _repeat_scatter(record: Record, group: list[Record], band: NoiseBand) -> float:
     """Gives the rms noise of a record from the unexplained difference to its repeats; NaN without any.
 
-    The median over the band counts: lines that a drift still moves are the minority.
+    The median over the band counts, because a drift changes only a minority of the lines.
     """
     squares = []
     for other in group:
         difference = repeat_difference(record, other)
         if difference is not None:
             density, _ = spectral_floor(difference, band, (0.0, 0.95 * band.highest))
-            squares.append(0.5 * _rms(density, band) ** 2)
+            squares.append(0.5 * _rms_of_density(density, band) ** 2)
     known = [one for one in squares if np.isfinite(one)]
     return float(np.sqrt(np.mean(known))) if known else float("nan")
 
 
 def _pool(values: list[float]) -> float:
-    """Gives the rms of the records' values; above five records, of the inner half: one bad record does not
-    count.
-    """
+    """Gives the rms of the records' values, or of their inner half."""
     if not values:
         return float("nan")
     ordered = np.sort(values)
-    if ordered.size >= 6:
+    if ordered.size >= _TRIMMED:
         ordered = ordered[ordered.size // 4 : ordered.size - ordered.size // 4]
     return float(np.sqrt(np.mean(ordered**2)))

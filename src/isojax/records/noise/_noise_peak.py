@@ -1,4 +1,4 @@
-"""A resonance peak in the scatter from cycle to cycle: the isolator answers what nobody measured."""
+"""A resonance peak in the scatter between cycles: the isolator responds to an unmeasured excitation."""
 
 import functools
 from collections.abc import Iterator
@@ -10,27 +10,40 @@ from jaxtyping import Float
 
 from .._campaign import Campaign
 from .._record import Record
-from ..spectrum import NoiseBand, harmonic_basis
+from ..spectrum import MOST_HARMONICS, NoiseBand, harmonic_basis
 
-_LINES = 48
-_ORDERS = 120
+_LINE_COUNT = 48
+"""Frequencies, evenly spaced on a logarithmic scale, at which a peak is sought."""
+
 _QUIET = 0.35
-"""Share of the noise band above which the level of white noise is read."""
+"""Share of the noise band above which the level of white noise is estimated."""
 
-_KEPT = 0.3
-"""Share of a line that must stand beside the harmonics of the drive, else a dwell does not show it."""
+_OBSERVABLE = 0.3
+"""Share of a line's power that the harmonics of the drive must leave, else the dwell does not count."""
 
-_FEWEST = 4
-_CLEAR = 3.0
-_ERRORS = 5.0
+_FEWEST_STRETCHES = 4
+"""Dwells or periods without which no median is taken."""
+
+_FEWEST_SHARE = 0.25
+"""Share of all dwells or periods that must show a line."""
+
+_CLEAR_HEIGHT = 3.0
+"""Power density of a clear peak over the level of white noise."""
+
+_CLEAR_ERRORS = 5.0
+"""Standard errors of the median by which a clear peak exceeds that level."""
+
+_FLANK = 0.5
+"""A clear peak has at most this share of its density at half and at twice its frequency."""
+
 _DECAYED = 0.5
-"""A peak that falls to less between the third and the last quarter of the dwells is a transient."""
+"""A peak that falls below this share from the third to the last quarter of the dwells is a transient."""
 
 _MEDIAN = float(np.log(2.0))
 """Median of a periodogram's line over its mean."""
 
 _Lines = Float[np.ndarray, " line"]
-_Piece = tuple[Float[np.ndarray, " _"], float]
+_Stretch = tuple[Float[np.ndarray, " _"], float]
 """What was measured in a stretch, and the frequency whose harmonics do not count in it, or 0 [Hz]."""
 
 
@@ -53,41 +66,41 @@ def noise_peak(campaign: Campaign) -> NoisePeak | None:
     """Gives the resonance peak, if clear, of the scatter about harmonics of dwells or between periods.
 
     White noise has none. The power density at each frequency is the median over dwells; near a harmonic of
-    the drive a dwell does not count. A clear peak stands three times above the level at high frequency and
-    five standard errors above chance, twice above the densities at half and less and at twice and more of its
-    frequency, and does not die out within the dwells.
+    the drive a dwell does not count. A clear peak is three times the level at high frequency and five
+    standard errors above it. It is twice the density at half its frequency and below, and at twice its
+    frequency and above. It does not die out within the dwells.
 
     Args:
         campaign: The campaign.
 
     Returns:
-        The peak, or None: there is no clear one, or too few dwells or periods to tell.
+        The peak, or None where there is no clear one or where dwells and periods are too few.
 
     Source: the scatter is coloured by the transmissibility of what shakes the isolator unseen; medians of
         periodograms, Percival & Walden 1993, sec. 6.
     """
     band = NoiseBand(campaign.rate, campaign.filter)
-    late, early = ([*_pieces(campaign, last)] for last in (True, False))
-    if len(late) < _FEWEST:
+    late, early = ([*_stretches(campaign, last)] for last in (True, False))
+    if len(late) < _FEWEST_STRETCHES:
         return None
-    longest = max(piece.size for piece, _ in late)
-    lines = np.geomspace(campaign.rate / longest, 0.9 * band.highest, _LINES)
+    longest = max(signal.size for signal, _ in late)
+    lines = np.geomspace(campaign.rate / longest, 0.9 * band.highest, _LINE_COUNT)
     density, count = _spectrum(late, lines, band)
     quiet = lines > _QUIET * band.highest
     if not np.any(np.isfinite(density[quiet])):
         return None
     level = float(np.nanmedian(density[quiet]))
-    known = np.where(quiet | (count < max(_FEWEST, 0.25 * len(late))), np.nan, density)
+    known = np.where(quiet | (count < max(_FEWEST_STRETCHES, _FEWEST_SHARE * len(late))), np.nan, density)
     if level <= 0.0 or not np.any(np.isfinite(known)):
         return None
     top = int(np.nanargmax(known))
     height, frequency = float(known[top]) / level, float(lines[top])
     below, above = known[lines < 0.5 * frequency], density[lines > 2.0 * frequency]
     if not np.any(np.isfinite(below)) or height < 1.0 + max(
-        _CLEAR - 1.0, _ERRORS / (_MEDIAN * np.sqrt(count[top]))
+        _CLEAR_HEIGHT - 1.0, _CLEAR_ERRORS / (_MEDIAN * np.sqrt(count[top]))
     ):
         return None
-    if max(float(np.nanmedian(side)) for side in (below, above)) > 0.5 * known[top]:
+    if max(float(np.nanmedian(side)) for side in (below, above)) > _FLANK * known[top]:
         return None
     if float(_spectrum(early, lines, band)[0][top]) * _DECAYED > known[top]:
         return None
@@ -97,7 +110,7 @@ def noise_peak(campaign: Campaign) -> NoisePeak | None:
     return NoisePeak(frequency, height, float(np.sqrt(power)))
 
 
-def _pieces(campaign: Campaign, last: bool) -> Iterator[_Piece]:
+def _stretches(campaign: Campaign, last: bool) -> Iterator[_Stretch]:
     """Gives the last or third quarter of each dwell with its frequency, and how each period differs."""
     for record in campaign.records:
         for dwell in record.dwells:
@@ -111,10 +124,7 @@ def _pieces(campaign: Campaign, last: bool) -> Iterator[_Piece]:
 
 def _between_periods(record: Record, last: bool) -> list[Float[np.ndarray, " _"]]:
     """Gives the later or earlier half of the periods, less the mean of all but the first."""
-    if record.period is None:
-        return []
-    count = (record.output.size - record.settle) // record.period
-    periods = record.output[record.output.size - count * record.period :].reshape(count, record.period)[1:]
+    count, periods = len(record.periods), record.periods[1:]
     if count < 3:
         return []
     rest = (periods - np.mean(periods, axis=0)) * np.sqrt((count - 1) / max(count - 2, 1))
@@ -122,14 +132,14 @@ def _between_periods(record: Record, last: bool) -> list[Float[np.ndarray, " _"]
     return list(rest[half:] if last else rest[:half])
 
 
-def _spectrum(pieces: list[_Piece], lines: _Lines, band: NoiseBand) -> tuple[_Lines, _Lines]:
-    """Gives the median power density at each line, as the mean square of white noise as strong, and of how
-    many pieces.
+def _spectrum(stretches: list[_Stretch], lines: _Lines, band: NoiseBand) -> tuple[_Lines, _Lines]:
+    """Gives the median power density at each line, as the mean square of equally strong white noise, and the
+    number of stretches that it comes from.
     """
-    powers = np.full((len(pieces), lines.size), np.nan)
-    for row, (signal, frequency) in zip(powers, pieces, strict=True):
-        columns = _columns(signal.size, band.rate, frequency, band.highest, tuple(lines.tolist()))
-        projected = np.einsum("lts,t->ls", columns, signal)
+    powers = np.full((len(stretches), lines.size), np.nan)
+    for row, (signal, frequency) in zip(powers, stretches, strict=True):
+        bases = _line_bases(signal.size, band.rate, frequency, band.highest, tuple(lines.tolist()))
+        projected = np.einsum("lts,t->ls", bases, signal)
         row[:] = 0.5 * np.sum(projected**2, axis=1)
     count = np.sum(np.isfinite(powers), axis=0)
     middle = np.array(
@@ -142,16 +152,16 @@ def _spectrum(pieces: list[_Piece], lines: _Lines, band: NoiseBand) -> tuple[_Li
 
 
 @functools.lru_cache(maxsize=64)
-def _columns(
+def _line_bases(
     size: int, rate: float, frequency: float, highest: float, lines: tuple[float, ...]
 ) -> Float[np.ndarray, "line time pair"]:
-    """Gives two orthonormal signals a line, at right angles to the harmonics of the drive; NaN where little
-    is left of the line beside them.
+    """Gives two orthonormal signals a line, orthogonal to the harmonics of the drive; NaN where these leave
+    too little of the line.
     """
     time = (np.arange(size) - 0.5 * (size - 1)) / rate
     design = np.ones((size, 1))
     if frequency:
-        orders = min(_ORDERS, int(0.9 * highest / frequency), max(1, size // 8))
+        orders = min(MOST_HARMONICS, int(0.9 * highest / frequency), max(1, size // 8))
         basis = harmonic_basis(time, frequency, orders)
         design = np.concatenate([basis, (time / time[-1])[:, None] * basis[:, :3]], axis=1)
     known, _ = np.linalg.qr(design)
@@ -160,6 +170,6 @@ def _columns(
         pair = np.stack([np.cos(2 * np.pi * line * time), np.sin(2 * np.pi * line * time)], axis=1)
         pair -= known @ (known.T @ pair)
         basis, sizes, _ = np.linalg.svd(pair, full_matrices=False)
-        if cast(float, sizes[-1]) ** 2 > _KEPT * 0.5 * size:
+        if cast(float, sizes[-1]) ** 2 > _OBSERVABLE * 0.5 * size:
             found[place] = basis
     return found

@@ -1,4 +1,4 @@
-"""Records that repeat each other, at equal level and direction; what of their difference is unexplained."""
+"""Records that repeat each other at equal level and direction, and their unexplained difference."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,11 @@ from jaxtyping import Float
 
 from .._record import Record
 
-_SHIFTS = 6
+_REACH = 6
+"""Samples before and after an instant that the filters of the inputs use."""
+
+_SAME_INPUT = 0.9
+"""Correlation of two inputs below which their records do not repeat each other."""
 
 
 def repeat_groups(records: Sequence[Record]) -> dict[str, tuple[Record, ...]]:
@@ -28,15 +32,15 @@ def repeat_groups(records: Sequence[Record]) -> dict[str, tuple[Record, ...]]:
 def repeat_difference(one: Record, other: Record) -> Float[np.ndarray, " time"] | None:
     """Gives output(one) - output(other), aligned by the inputs, less what the inputs and a drift explain.
 
-    Taken out by least squares are the forcing difference and the input itself, each through a short filter,
-    and a change of gain. The output goes in without one: a filter of it could pick out its own noise.
+    Least squares removes the difference of the inputs and the input itself, each through a short filter, and
+    a change of gain. The output is used without a filter, since a filter could reproduce its own noise.
 
     Args:
         one: A record.
         other: A repeat of it.
 
     Returns:
-        The rest (time,), or None where the inputs are not alike (correlation below 0.9).
+        The residual (time,), or None where the correlation of the inputs is below 0.9.
     """
     size = min(one.input.size, other.input.size)
     a, b = one.input[:size] - np.mean(one.input[:size]), other.input[:size] - np.mean(other.input[:size])
@@ -45,7 +49,7 @@ def repeat_difference(one: Record, other: Record) -> Float[np.ndarray, " time"] 
         return None
     lags = scipy.signal.correlate(a, b, mode="full", method="fft")
     lag = int(np.argmax(lags)) - (size - 1)
-    if lags[lag + size - 1] < 0.9 * scale:
+    if lags[lag + size - 1] < _SAME_INPUT * scale:
         return None
     first, second = slice(max(lag, 0), size + min(lag, 0)), slice(max(-lag, 0), size + min(-lag, 0))
     drive, response = one.input[first] - other.input[second], one.output[first] - other.output[second]
@@ -53,7 +57,7 @@ def repeat_difference(one: Record, other: Record) -> Float[np.ndarray, " time"] 
     for signal in (drive, other.input[second]):
         spread = float(np.std(signal))
         if spread > 0.0:
-            columns += [np.roll(signal / spread, shift) for shift in range(-_SHIFTS, _SHIFTS + 1)]
-    design = np.stack(columns, axis=1)[_SHIFTS:-_SHIFTS]
-    inner = response[_SHIFTS:-_SHIFTS]
+            columns += [np.roll(signal / spread, shift) for shift in range(-_REACH, _REACH + 1)]
+    design = np.stack(columns, axis=1)[_REACH:-_REACH]
+    inner = response[_REACH:-_REACH]
     return inner - design @ np.linalg.lstsq(design, inner, rcond=1e-10)[0]

@@ -1,4 +1,4 @@
-"""The reader of each file ending, and channels brought on to one time base."""
+"""The reader of each file ending, and channels aligned to one time base."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -24,6 +24,12 @@ _READERS: Mapping[str, Callable[[Path, Sequence[str]], dict[str, Column]]] = {
     ".unv": read_universal_columns,
     ".tdms": read_tdms_columns,
 }
+
+_SAME_RATE = 1e-6
+"""Relative difference of the rates of two channels that are sampled together."""
+
+_WHOLE_SHIFT = 0.05
+"""Fraction of a sample by which the starts of two channels may miss a whole number of samples."""
 
 
 def read_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
@@ -62,7 +68,7 @@ def _aligned(file: Path, columns: dict[str, Column]) -> dict[str, Column]:
     if stated:
         first, reference = next(iter(stated.items()))
         for name, column in stated.items():
-            if abs(column.rate / reference.rate - 1.0) > 1e-6:  # type: ignore[operator]
+            if abs(column.rate / reference.rate - 1.0) > _SAME_RATE:  # type: ignore[operator]
                 raise ValueError(
                     f"{file}: channel `{name}` is sampled at {column.rate:.9g} Hz, but `{first}` at "
                     f"{reference.rate:.9g} Hz; resample them to one rate"
@@ -85,7 +91,7 @@ def _cut(file: Path, columns: dict[str, Column], rate: float) -> dict[str, Colum
     shifts: dict[str, int] = {}
     for name, start in starts.items():
         shift = (last - start) * rate
-        if abs(shift - round(shift)) > 0.05:
+        if abs(shift - round(shift)) > _WHOLE_SHIFT:
             raise ValueError(
                 f"{file}: channel `{late}` starts {shift:.3f} samples after `{name}`; "
                 "channels must start together or a whole number of samples apart"

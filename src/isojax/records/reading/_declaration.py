@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from .._record import Kind
+from .._campaign import Hold, InputQuantity, OutputQuantity
+from .._record import Direction, ExcitationKind, Role
 from .._wording import listing, nearest
 
-# Why no validation library: the same declaration was written for pydantic 2 and for msgspec. pydantic reports
-# field and value, but not in words what a missing or wrong field must be, and its errors come in another order.
-# With these words declared beside every type and the errors sorted, the code is as long as the table below.
-# The error of msgspec is one text without the value, so a message that quotes what was found needs a parser.
+# Why no validation library: this declaration was also written for pydantic 2 and tried with msgspec. pydantic
+# reports field and value, but not in words what a missing or wrong field must be, and orders its errors
+# differently. With such words beside every type and the errors sorted, its code is as long as this table.
+# msgspec reports one text without the value that it refused, so a message that quotes it needs a parser.
 
 
 @dataclass(frozen=True)
@@ -89,29 +90,27 @@ def _names(default: tuple[str, ...]) -> Field:
     return Field('a list of different names such as ["linear", "cubic"]', _is_names, default=default)
 
 
-_SECTIONS: Mapping[str, Mapping[str, Field]] = {
+SECTIONS: Mapping[str, Mapping[str, Field]] = {
     "campaign": {"title": _text(), "mass": _positive(required=True), "mass_free": _flag()},
     "input": {
-        "quantity": _choice(
-            "force", "base_acceleration", "reaction_mass_acceleration", "command", required=True
-        ),
+        "quantity": _choice(*get_args(InputQuantity), required=True),
         "column": _text(required=True),
         "unit": _text(required=True),
         "gain": _factor(),
         "gain_free": _flag(),
         "offset_free": _flag(),
-        "hold": _choice("band_limited", "linear", "zero_order", default="band_limited"),
+        "hold": _choice(*get_args(Hold), default="band_limited"),
         "moving_mass": _positive(),
     },
     "output": {
-        "quantity": _choice("acceleration", "velocity", "displacement", required=True),
+        "quantity": _choice(*get_args(OutputQuantity), required=True),
         "column": _text(required=True),
         "unit": _text(required=True),
         "offset_free": _flag(),
         "noise": _positive(),
     },
     "floor": {
-        "quantity": _choice("acceleration", "velocity", "displacement", required=True),
+        "quantity": _choice(*get_args(OutputQuantity), required=True),
         "column": _text(required=True),
         "unit": _text(required=True),
         "gain": _factor(),
@@ -130,20 +129,20 @@ _SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "elements": _names(()),
     },
 }
-_RECORD: Mapping[str, Field] = {
+RECORD: Mapping[str, Field] = {
     "file": _file(required=True),
-    "role": _choice("fit", "holdout", required=True),
+    "role": _choice(*get_args(Role), required=True),
     "level": _number(),
-    "direction": _choice("forward", "backward", "none", default="none"),
+    "direction": _choice(*get_args(Direction), default="none"),
     "repeat": _count(),
     "start": _count(default=0),
     "stop": _count(at_least=1),
     "period": _count(at_least=2),
     "settle": _count(default=0),
     "schedule": _file(),
-    "kind": _choice(*get_args(Kind)),
+    "kind": _choice(*get_args(ExcitationKind)),
 }
-_REQUIRED_SECTIONS = ("campaign", "input", "output")
+__REQUIRED_SECTIONS = ("campaign", "input", "output")
 _ABSENT_SECTIONS = ("floor", "filter")
 """Sections that are None where the file has none; of the others every field is then at its default."""
 
@@ -185,10 +184,10 @@ def read_declaration(path: str | Path) -> Declaration:
             f"{file} does not exist; expected a campaign .toml, or a folder with a campaign.toml"
         )
     table = _parse(file)
-    _check_names(file, "the file", table, (*_SECTIONS, "record"), "section")
+    _check_names(file, "the file", table, (*SECTIONS, "record"), "section")
     sections: dict[str, Any] = {}
-    for name, fields in _SECTIONS.items():
-        if name not in table and name in _REQUIRED_SECTIONS:
+    for name, fields in SECTIONS.items():
+        if name not in table and name in __REQUIRED_SECTIONS:
             raise ValueError(
                 f"{file}: section [{name}] is missing; it must hold {listing(_required(fields))}"
             )
@@ -204,7 +203,7 @@ def read_declaration(path: str | Path) -> Declaration:
     if not entries:
         raise ValueError(f'{file}: no [[record]] is listed; at least one with role = "fit" is needed')
     records = tuple(
-        _checked(file, f"[[record]] number {i + 1}", one, _RECORD) for i, one in enumerate(entries)
+        _checked(file, f"[[record]] number {i + 1}", one, RECORD) for i, one in enumerate(entries)
     )
     _check_together(file, sections, records)
     return Declaration(file, sections, records)

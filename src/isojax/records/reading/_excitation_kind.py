@@ -3,22 +3,40 @@
 import numpy as np
 from jaxtyping import Float
 
-from .._blow import ABOVE_NOISE, BRIEF, drive_noise, driven_samples
-from .._record import Dwell, Kind
+from .._blow import ABOVE_NOISE, BRIEF, drive_noise, driven_samples, rest_position
+from .._record import Dwell, ExcitationKind
 from ..spectrum import power_spectrum, ringing_frequency
 from ._find_dwells import rising_crossings, segment_dwells
 
-_PARTS = 10
-"""Parts of a record whose sizes are compared."""
+_TENTHS = 10
+"""Sections of a record whose rms values are compared."""
+
+_EARLY = 3
+"""A free motion is largest in one of so many first sections."""
 
 _DIED_OUT = 0.7
-"""A motion whose end is above this share of its largest part has not died out."""
+"""A motion whose last section is above this share of its largest one has not died out."""
 
-_IDLE = 0.1
-"""A drive below this share of the inertia, within the band of the motion, did not make the motion ..."""
+_NO_DRIVE = 0.1
+"""A drive below this share of the inertia, within the band of the motion, did not cause the motion ..."""
 
 _FEATURELESS = 4.0
 """... if its power there is not above so many times that of its other frequencies either."""
+
+_FEWEST_CROSSINGS = 6
+"""Rising zero crossings without which a drive is no sine."""
+
+_PERIODIC = 0.1
+"""A drive whose period usually changes by more of itself, from cycle to cycle, is no sine."""
+
+_STEPPED = 0.5
+"""Share of a record that dwells must cover, else it is no stepped sine."""
+
+_GLIDING = 0.5
+"""A sine whose period changes within dwells by more than this share of the steps between them is swept."""
+
+_ONE_WAY = 0.7
+"""Share of the cycles, those of one way less those of the other, over which the period of a sweep changes."""
 
 
 def detect_kind(
@@ -26,7 +44,7 @@ def detect_kind(
     response: Float[np.ndarray, " time"],
     rate: float,
     inertia: float | None = None,
-) -> tuple[tuple[Dwell, ...], Kind]:
+) -> tuple[tuple[Dwell, ...], ExcitationKind]:
     """Gives the dwells (of a stepped sine) and the kind of a record without period or schedule.
 
     Args:
@@ -34,7 +52,7 @@ def detect_kind(
         response: Output, (time,).
         rate: Samples per second [Hz].
         inertia: Input per unit of output that inertia alone would take (the mass, where the output is an
-            acceleration), or None where it is not known; it tells a small input from none.
+            acceleration), or None where it is unknown; it distinguishes a small input from none.
 
     Returns:
         Dwells and kind.
@@ -45,22 +63,22 @@ def detect_kind(
         if _is_idle(drive, response, rate, inertia):
             return (), "free_decay"
     crossings = rising_crossings(drive, rate)
-    if crossings.size < 6:
+    if crossings.size < _FEWEST_CROSSINGS:
         return (), "broadband"
     periods = np.diff(crossings)
-    if float(np.median(np.abs(np.diff(periods)))) > 0.1 * float(np.median(periods)):
+    if float(np.median(np.abs(np.diff(periods)))) > _PERIODIC * float(np.median(periods)):
         return (), "broadband"
     dwells = segment_dwells(drive, rate)
     covered = sum(dwell.stop - dwell.start for dwell in dwells)
     if len(dwells) > 1 and _glides(crossings, dwells, rate):
         return (), "swept"
-    if covered < 0.5 * drive.size:
+    if covered < _STEPPED * drive.size:
         return (), "swept" if _is_monotone(periods) else "broadband"
     return dwells, "stepped_sine"
 
 
 def _glides(crossings: Float[np.ndarray, " crossing"], dwells: tuple[Dwell, ...], rate: float) -> bool:
-    """Whether the period changes as much within the found dwells as between them."""
+    """Whether the period changes as much within the detected dwells as between them."""
     periods, middle = np.diff(crossings), 0.5 * (crossings[1:] + crossings[:-1])
     within, centres = [], []
     for dwell in dwells:
@@ -71,24 +89,24 @@ def _glides(crossings: Float[np.ndarray, " crossing"], dwells: tuple[Dwell, ...]
             centres.append(float(np.mean(periods[inside])))
     if len(within) < 2:
         return False
-    return float(np.median(within)) > 0.5 * float(np.median(np.abs(np.diff(centres))))
+    return float(np.median(within)) > _GLIDING * float(np.median(np.abs(np.diff(centres))))
 
 
 def _is_monotone(periods: Float[np.ndarray, " cycle"]) -> bool:
     smooth = np.convolve(periods, np.full(5, 0.2), mode="valid") if periods.size >= 10 else periods
     steps = np.diff(smooth)
-    return abs(int(np.sum(np.sign(steps)))) > 0.7 * steps.size
+    return abs(int(np.sum(np.sign(steps)))) > _ONE_WAY * steps.size
 
 
 def _dies_out(response: Float[np.ndarray, " time"]) -> bool:
-    """Whether the motion is largest near its beginning and has fallen off by its end."""
-    rest = float(np.mean(response[-max(response.size // _PARTS, 1) :]))
-    size = np.array([np.sqrt(np.mean(part**2)) for part in np.array_split(response - rest, _PARTS)])
-    return bool(np.argmax(size) < 3 and size[-1] < _DIED_OUT * np.max(size))
+    """Whether the motion is largest near its start and has decayed by its end."""
+    sections = np.array_split(response - rest_position(response), _TENTHS)
+    size = np.array([np.sqrt(np.mean(section**2)) for section in sections])
+    return bool(np.argmax(size) < _EARLY and size[-1] < _DIED_OUT * np.max(size))
 
 
 def _is_brief(drive: Float[np.ndarray, " time"]) -> bool:
-    """Whether the drive stands above its noise for a small share of the record only."""
+    """Whether the drive exceeds its noise in a small share of the record only."""
     peak = float(np.max(np.abs(drive - np.median(drive))))
     share = np.count_nonzero(driven_samples(drive)) / drive.size
     return bool(peak > 2.0 * ABOVE_NOISE * drive_noise(drive) and share < BRIEF)
@@ -100,7 +118,7 @@ def _is_idle(
     rate: float,
     inertia: float | None,
 ) -> bool:
-    """Whether the drive knows nothing of the motion: it is zero, or noise far below the inertia."""
+    """Whether the drive did not cause the motion: it is zero, or noise far below the inertia."""
     if np.ptp(drive) == 0.0:
         return True
     frequency, motion = power_spectrum(response, rate)
@@ -111,4 +129,4 @@ def _is_idle(
         return False
     if inertia is None:
         return True
-    return bool(np.sum(noise[band]) < _IDLE**2 * inertia**2 * np.sum(motion[band]))
+    return bool(np.sum(noise[band]) < _NO_DRIVE**2 * inertia**2 * np.sum(motion[band]))

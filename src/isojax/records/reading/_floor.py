@@ -4,9 +4,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import make_interp_spline
 
-from .._campaign import OutputQuantity
+from .._campaign import TIME_DERIVATIVES, OutputQuantity
 
-_ORDER = {"acceleration": 0, "velocity": 1, "displacement": 2}
 _DEGREE = 7
 
 
@@ -16,7 +15,7 @@ def floor_acceleration(
     """Gives the acceleration of a measured motion of the floor, about its mean.
 
     A velocity or a displacement is differentiated on a spline of degree 7: to 1e-3 up to an eighth of the
-    sampling rate. A mean acceleration is the zero of the sensor: the floor stays where it is.
+    sampling rate. A mean acceleration is an offset of the sensor, since the floor stays where it is.
 
     Args:
         motion: What was measured [m/s^2, m/s or m], (time,).
@@ -26,7 +25,7 @@ def floor_acceleration(
     Returns:
         Acceleration [m/s^2], (time,).
     """
-    order = _ORDER[quantity]
+    order = TIME_DERIVATIVES["acceleration"] - TIME_DERIVATIVES[quantity]
     if order:
         time = np.arange(motion.size) / rate
         motion = make_interp_spline(time, motion - np.mean(motion), k=_DEGREE).derivative(order)(time)

@@ -11,6 +11,9 @@ from ..formats import numbers, read_table
 
 _HEADINGS = ("start_s", "frequency_hz", "cycles")
 
+_FEWEST_CYCLES = 2.0
+"""A dwell that the record cuts shorter is left out."""
+
 
 def read_schedule(file: Path) -> Float[np.ndarray, "segment 3"]:
     """Gives the rows start [s], frequency [Hz], cycles of a schedule.
@@ -55,8 +58,8 @@ def scheduled_dwells(
 ) -> tuple[Dwell, ...]:
     """Gives the dwells that lie in samples [start, stop) of a file of `total` samples.
 
-    A dwell that the file or the record cuts off is shortened to what is there. One that a record's start or
-    stop leaves less than two cycles of is left out.
+    A dwell that the file or the record cuts off is shortened. One of which less than two cycles remain is
+    left out.
 
     Args:
         file: The schedule, for the error.
@@ -74,24 +77,23 @@ def scheduled_dwells(
             half the rate, or no dwell is left.
     """
     ends = rows[:, 0] + rows[:, 2] / rows[:, 1]
-    for i, (begin, frequency, _) in enumerate(rows):
+    for i, (first, frequency, _) in enumerate(rows):
         if frequency >= 0.5 * rate:
             raise ValueError(
                 f"{file}: frequency_hz = {frequency:.6g} at {row(i)} must be below half the sampling rate, "
                 f"{0.5 * rate:.6g} Hz"
             )
-        if begin * rate >= total or ends[i] * rate > total + rate / frequency:
+        if first * rate >= total or ends[i] * rate > total + rate / frequency:
             raise ValueError(
-                f"{file}: the dwell at {row(i)} runs from {begin:.6g} s to {ends[i]:.6g} s, past the end "
-                "of the "
-                f"record at {total / rate:.6g} s"
+                f"{file}: the dwell at {row(i)} runs from {first:.6g} s to {ends[i]:.6g} s, past the end "
+                f"of the record at {total / rate:.6g} s"
             )
     following = np.append(rows[1:, 0], np.inf)
     dwells = []
-    for begin, end, (_, frequency, _) in zip(rows[:, 0], np.minimum(ends, following), rows, strict=True):
-        first, last = max(round(begin * rate), start), min(round(end * rate), stop)
+    for opening, end, (_, frequency, _) in zip(rows[:, 0], np.minimum(ends, following), rows, strict=True):
+        first, last = max(round(opening * rate), start), min(round(end * rate), stop)
         cycles = (last - first) * frequency / rate
-        if cycles >= 2.0:
+        if cycles >= _FEWEST_CYCLES:
             dwells.append(Dwell(first - start, last - start, float(frequency), float(cycles)))
     if not dwells:
         raise ValueError(

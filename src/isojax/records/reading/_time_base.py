@@ -1,4 +1,4 @@
-"""The sampling rate: declared, from a time column or stated by the file; where several say, they agree."""
+"""The sampling rate: declared, from a time column or stated by the file; all that are given must agree."""
 
 from pathlib import Path
 
@@ -7,7 +7,17 @@ from jaxtyping import Float
 
 from .._wording import row
 
-_AGREE = 1e-3  # relative; a written time column or UFF step is rounded, a wrong rate is off by more
+RATE_TOLERANCE = 1e-3
+"""Relative difference of equal rates: a written time column is rounded, and a wrong rate differs by more."""
+
+_GAP = 1.5
+"""A time step above this multiple of the usual one, and four times its jitter more, is a gap."""
+
+_JITTER = 4.0
+"""Jitters of the time steps by which a rounded time column may deviate from a uniform one."""
+
+_WHOLE = 1e-6
+"""Relative distance from a whole number of samples per second below which a rate is rounded to it."""
 
 
 def find_rate(
@@ -36,19 +46,19 @@ def find_rate(
             backwards or repeats a time.
     """
     measured = None if time is None else uniform_rate(file, time, str(column), first)
-    said = [
+    candidates = [
         ("[sampling] rate", declared),
         (f"time column `{column}`", measured),
         ("the file's own time base", stated),
     ]
-    known = [(name, rate) for name, rate in said if rate is not None]
+    known = [(name, rate) for name, rate in candidates if rate is not None]
     if not known:
         raise ValueError(
             f'{file}: the sampling rate is not known; give [sampling] rate = ... or time = "column"'
         )
     first_name, chosen = known[0]
     for name, rate in known[1:]:
-        if abs(rate / chosen - 1.0) > _AGREE:
+        if abs(rate / chosen - 1.0) > RATE_TOLERANCE:
             raise ValueError(
                 f"{file}: {first_name} says {chosen:.9g} Hz, but {name} says {rate:.9g} Hz; they must agree"
             )
@@ -78,7 +88,7 @@ def uniform_rate(file: Path, time: Float[np.ndarray, " time"], column: str, firs
         )
     usual = float(np.median(steps))
     jitter = float(np.median(np.abs(steps - usual)))
-    limit = usual * 1.5 + 4.0 * jitter
+    limit = usual * _GAP + _JITTER * jitter
     at = int(np.argmax(steps)) + 1
     if steps[at - 1] > limit:
         raise ValueError(
@@ -88,11 +98,10 @@ def uniform_rate(file: Path, time: Float[np.ndarray, " time"], column: str, firs
     step = float((time[-1] - time[0]) / (time.size - 1))
     drift = time - time[0] - step * np.arange(time.size)
     at = int(np.argmax(np.abs(drift)))
-    if abs(drift[at]) > 1.0 * step + 4.0 * jitter:
+    if abs(drift[at]) > step + _JITTER * jitter:
         raise ValueError(
             f"{file}: time column `{column}` is not uniform: at {row(first + at)} it is {drift[at]:.3g} s "
-            "off the "
-            f"even grid of {step:.6g} s; resample the record"
+            f"off the even grid of {step:.6g} s; resample the record"
         )
     rate = 1.0 / step
-    return float(round(rate)) if abs(rate / max(round(rate), 1) - 1.0) < 1e-6 else rate
+    return float(round(rate)) if abs(rate / max(round(rate), 1) - 1.0) < _WHOLE else rate

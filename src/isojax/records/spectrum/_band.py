@@ -16,14 +16,32 @@ from ._noise_band import NoiseBand
 _AVERAGES = 15
 """Segments over which the spectrum of a floor is averaged; they overlap by half."""
 
+_FEWEST_LINES = 8
+"""Lines of a spectrum without which no floor is estimated."""
+
+_QUIET = 0.1
+"""Quantile of the lines of an output's spectrum that is taken for its noise."""
+
+_ABOVE_NOISE = 30.0
+"""Power density over that noise above which a line belongs to the signal."""
+
+_MARGIN = 1.25
+"""The band ends at this multiple of the highest such line ..."""
+
+_HIGHEST = 0.8
+"""... but at this share of half the rate at most."""
+
+_FIRST_POWER = 1e-3
+"""Share of the drive's power that lies below its lowest excited frequency."""
+
 
 @dataclass(frozen=True)
 class Band:
-    """Where a record's signal is.
+    """The frequencies at which a record has a signal.
 
     Attributes:
         lowest: Half of the lowest excited frequency [Hz], at least two per record; of a motion that rings
-            down a third of the frequency at which it rings, since a release or a blow excites every one.
+            down a third of the frequency at which it rings, since a release or a blow excites all of them.
         highest: Frequency above which the output is noise [Hz].
     """
 
@@ -31,8 +49,8 @@ class Band:
     highest: float
 
 
-_KNOWN: WeakKeyDictionary[Record, Band] = WeakKeyDictionary()
-"""Bands already worked out: a fit asks for each several times."""
+_EXCITED_BANDS: WeakKeyDictionary[Record, Band] = WeakKeyDictionary()
+"""Kept, because a fit asks for each several times."""
 
 
 def power_spectrum(
@@ -65,14 +83,14 @@ def spectral_floor(
         spans: Lower and upper ends [Hz]; the lines between any of them count.
 
     Returns:
-        Power per Hz and its relative standard error; NaN where fewer than 8 lines lie between.
+        Power per Hz and its relative standard error; NaN with fewer than 8 lines.
 
     Source: Welch 1967 (degrees of freedom of overlapping segments).
     """
     frequency, density = power_spectrum(signal, band.rate, _AVERAGES)
     inside = np.any([(frequency > low) & (frequency < high) for low, high in spans], axis=0)
     lines = np.count_nonzero(inside)
-    if lines < 8:
+    if lines < _FEWEST_LINES:
         return float("nan"), float("nan")
     freedom, alike = _freedom(signal.size, 2 * (frequency.size - 1))
     level = np.median(density[inside] / band.power_gain(frequency[inside]))
@@ -81,7 +99,7 @@ def spectral_floor(
 
 
 def _freedom(size: int, segment: int) -> tuple[float, float]:
-    """Gives the degrees of freedom of a line of the averaged spectrum, and how many lines go as one.
+    """Gives the degrees of freedom of a line of the averaged spectrum, and how many lines are as good as one.
 
     Both follow from the window: segments that overlap by half share some noise, and so do neighbouring lines.
     """
@@ -109,18 +127,18 @@ def excited_band(record: Record) -> Band:
     Returns:
         The band.
     """
-    if record not in _KNOWN:
-        _KNOWN[record] = _find_band(record)
-    return _KNOWN[record]
+    if record not in _EXCITED_BANDS:
+        _EXCITED_BANDS[record] = _find_band(record)
+    return _EXCITED_BANDS[record]
 
 
 def _find_band(record: Record) -> Band:
     nyquist = 0.5 * record.rate
     slowest = 2.0 * record.rate / record.time.size
     frequency, output = power_spectrum(record.output, record.rate)
-    floor = float(np.quantile(output[frequency > 0.0], 0.1))
-    above = frequency[output > 30.0 * max(floor, 1e-300)]
-    highest = min(1.25 * float(above[-1]) if above.size else nyquist, 0.8 * nyquist)
+    floor = float(np.quantile(output[frequency > 0.0], _QUIET))
+    above = frequency[output > _ABOVE_NOISE * max(floor, 1e-300)]
+    highest = min(_MARGIN * float(above[-1]) if above.size else nyquist, _HIGHEST * nyquist)
     if record.dwells:
         lowest = 0.5 * min(dwell.frequency for dwell in record.dwells)
     elif record.rings_down:
@@ -129,6 +147,6 @@ def _find_band(record: Record) -> Band:
         driven = record.output if not np.any(record.input) else record.input
         frequency, power = power_spectrum(driven, record.rate)
         share = np.cumsum(power) / np.sum(power)
-        lowest = 0.5 * float(frequency[np.searchsorted(share, 1e-3)])
+        lowest = 0.5 * float(frequency[np.searchsorted(share, _FIRST_POWER)])
     lowest = min(max(lowest, slowest), 0.5 * nyquist)
     return Band(lowest, max(highest, 1.5 * lowest))

@@ -1,12 +1,20 @@
-"""Columns of least squares for a dwell: harmonics of its frequency, and lines of the mains beside them."""
+"""Least-squares bases for a dwell: harmonics of its frequency, and lines of the mains beside them."""
 
 import functools
 
 import numpy as np
 from jaxtyping import Float
 
-_APART = 0.25
-"""Turns that a line and a harmonic must part by over a window, so that it can tell them apart."""
+USABLE_SHARE = 0.45
+"""Frequencies up to this share of the sampling rate, 0.9 of half of it, are estimated."""
+
+_RESOLVED = 0.25
+"""Phase, in turns over a window, by which a line and a harmonic must differ to be resolved."""
+
+
+def usable_orders(rate: float, frequency: float, most: int) -> int:
+    """Gives how many harmonics of a frequency lie below 0.45 of the sampling rate, at most `most`."""
+    return min(most, int(USABLE_SHARE * rate / frequency))
 
 
 def harmonic_basis(
@@ -30,7 +38,7 @@ def harmonic_basis(
 
 
 def meeting_order(frequency: float, line: float, seconds: float) -> int | None:
-    """Gives the harmonic that a window cannot tell from a line, such as the tenth of 5 Hz from 50 Hz.
+    """Gives the harmonic that a window cannot separate from a line, such as the tenth of 5 Hz from 50 Hz.
 
     Args:
         frequency: Of the dwell [Hz].
@@ -38,10 +46,10 @@ def meeting_order(frequency: float, line: float, seconds: float) -> int | None:
         seconds: Length of the window.
 
     Returns:
-        Its order, 2 or more, or None: the fundamental is far above any line.
+        Its order, 2 or more; None where the window separates all of them.
     """
     order = round(line / frequency)
-    return order if order >= 2 and abs(order * frequency - line) * seconds < _APART else None
+    return order if order >= 2 and abs(order * frequency - line) * seconds < _RESOLVED else None
 
 
 @functools.lru_cache(maxsize=64)
@@ -52,8 +60,8 @@ def drifting_harmonics(
 ]:
     """Gives harmonics whose fundamental drifts linearly, lines beside them, the inverse of their products.
 
-    A line that the window cannot tell from a harmonic lets that one drift too. The records of a campaign
-    dwell at the same frequencies: all but the first find both ready.
+    Where the window cannot separate a line from a harmonic, that harmonic may drift too. The records of a
+    campaign dwell at the same frequencies and share the result.
 
     Args:
         window: Samples.

@@ -1,4 +1,4 @@
-"""The settled end of a dwell, and what its harmonics leave of it."""
+"""The settled end of a dwell, and its residual without the harmonics."""
 
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -7,18 +7,24 @@ import numpy as np
 from jaxtyping import Float
 
 from .._record import Dwell, Record
-from ._basis import drifting_harmonics
+from ._basis import drifting_harmonics, usable_orders
 
 MOST_HARMONICS = 120
-"""Those of dry friction fall as 1/n: the fortieth may still stand above the noise."""
+"""The harmonics of dry friction fall as 1/n, so the fortieth may still exceed the noise."""
+
+_FEWEST_CYCLES = 4.0
+"""Cycles at the end of a dwell, a quarter of them and at least so many, that its noise is estimated from."""
+
+_LONGEST_END = 0.7
+"""Largest share of a dwell that this end may take: what is before it must have settled."""
 
 
 class Rest(NamedTuple):
-    """What the harmonics leave of a dwell's end.
+    """The residual of a dwell's end without its harmonics.
 
     Attributes:
         signal: Samples, in the output's unit.
-        taken: Frequencies of the columns that were taken out [Hz].
+        taken: Frequencies of the basis signals that were removed [Hz].
     """
 
     signal: Float[np.ndarray, " time"]
@@ -26,32 +32,31 @@ class Rest(NamedTuple):
 
 
 def dwell_window(record: Record, dwell: Dwell) -> int | None:
-    """Gives the samples of a dwell's settled end that its noise is taken from; None if it is too short."""
-    window = round(max(dwell.cycles / 4.0, 4.0) * record.rate / dwell.frequency)
-    return None if window > 0.7 * (dwell.stop - dwell.start) else window
+    """Gives the samples of a dwell's settled end that its noise comes from; None if it is too short."""
+    window = round(max(dwell.cycles / 4.0, _FEWEST_CYCLES) * record.rate / dwell.frequency)
+    return None if window > _LONGEST_END * (dwell.stop - dwell.start) else window
 
 
-_KNOWN: WeakKeyDictionary[Record, dict[tuple, Rest]] = WeakKeyDictionary()
-"""The columns of all dwells outgrow a cache of the processor: what is asked again is not worked out again."""
+_RESIDUALS: WeakKeyDictionary[Record, dict[tuple, Rest]] = WeakKeyDictionary()
+"""Kept, because the bases of all dwells are too large for the processor's cache to compute them twice."""
 
 
 def dwell_rest(record: Record, dwell: Dwell, window: int, lines: tuple[float, ...] = ()) -> Rest:
-    """Gives what the harmonics up to 0.45 of the rate, at most 120, leave of the end of a dwell.
+    """Gives the end of a dwell without its harmonics up to 0.45 of the rate, at most 120.
 
-    A declared filter ends nothing: its cut-off is where the harmonics begin to fall, and some stand above the
-    noise well beyond it.
+    The cut-off of a declared filter is no limit: some harmonics exceed the noise well beyond it.
 
     Args:
         record: The record.
         dwell: One of its dwells.
         window: Samples of its end.
-        lines: Of the mains, taken out with them [Hz].
+        lines: Of the mains, removed with them [Hz].
 
     Returns:
-        The rest. Not to be written to.
+        The residual. Not to be written to.
     """
-    orders = min(MOST_HARMONICS, int(0.45 * record.rate / dwell.frequency), max(1, window // 8))
-    known = _KNOWN.setdefault(record, {})
+    orders = min(usable_orders(record.rate, dwell.frequency, MOST_HARMONICS), max(1, window // 8))
+    known = _RESIDUALS.setdefault(record, {})
     key = dwell.start, dwell.stop, dwell.frequency, window, orders, lines
     if key not in known:
         design, inverse, taken = drifting_harmonics(window, record.rate, dwell.frequency, orders, lines)

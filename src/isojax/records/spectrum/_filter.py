@@ -1,4 +1,4 @@
-"""Butterworth low-pass: run without phase, and taken out again where a bench has run it."""
+"""Butterworth low-pass: applied without phase, and compensated where the test rig applied it."""
 
 import numpy as np
 import scipy.signal
@@ -41,17 +41,17 @@ def zero_phase_butterworth(
 
 
 LEAST_GAIN = 0.5
-"""Gain of a filter below which no more of it is taken out: twice the noise is the price, and no more."""
+"""Gain of a filter below which it is compensated no further: compensation at most doubles the noise."""
 
 FEWEST_UNSURE = 100
-"""A filter that ends near half the rate is short, but its inverse falls there from twice to nothing."""
+"""A filter with a cut-off near half the rate is short, but its inverse falls steeply there from 2 to 0."""
 
 
 def unsure_samples(rate: float, order: int, cutoff_hz: float) -> int:
     """Gives the samples at either end of a record that depend on what lies beyond it.
 
-    What is assumed there leaves an error of 1e-3 of the signal at most further inside, with a cut-off up to
-    0.2 of the rate; with one close to half of it up to 8e-3, near the cut-off.
+    Further inside, the assumed continuation causes an error of at most 1e-3 of the signal with a cut-off up
+    to 0.2 of the rate. With a cut-off close to half the rate it is at most 8e-3, near the cut-off.
 
     Args:
         rate: Samples per second [Hz].
@@ -67,10 +67,10 @@ def unsure_samples(rate: float, order: int, cutoff_hz: float) -> int:
 def compensate_butterworth(
     signal: Float[np.ndarray, " time"], rate: float, order: int, cutoff_hz: float
 ) -> Float[np.ndarray, " time"]:
-    """Takes out of a signal the gain and the phase of a digital Butterworth low-pass that ran once.
+    """Gives a signal without the gain and the phase of a digital Butterworth low-pass that ran once.
 
-    A linear plant does not care which filter force and response went through alike; a nonlinear one is driven
-    by the force that acted, and its harmonics are as large as they were.
+    The receptance of a linear isolator does not change if force and response pass the same filter. A
+    nonlinear one needs the force that acted, and harmonics of their true size.
 
     Args:
         signal: Samples, (time,).
@@ -79,13 +79,13 @@ def compensate_butterworth(
         cutoff_hz: Cut-off frequency [Hz], where its power gain is 1/2.
 
     Returns:
-        The samples before the filter, (time,), as far as its gain was above `LEAST_GAIN`; beyond, without
-        its phase. The first and last `unsure_samples` of them are not to be relied on.
+        The samples before the filter, (time,), where its gain was above `LEAST_GAIN`; elsewhere only its
+        phase is compensated. The first and last `unsure_samples` of them are not reliable.
     """
     sections = scipy.signal.butter(order, cutoff_hz, fs=rate, output="sos")
     pad = _settling(order, cutoff_hz, rate, signal.size)
     longer = np.pad(signal, pad, mode="reflect", reflect_type="odd")
-    # The transform takes the signal for periodic: what is put behind must lead back to its start.
+    # The transform assumes a periodic signal, so a bridge leads from its end back to its start.
     bridge = np.linspace(longer[-1], longer[0], 2 * pad + 2)[1:-1]
     whole = np.concatenate([longer, bridge])
     frequency = np.fft.rfftfreq(whole.size, 1.0 / rate)
@@ -95,5 +95,5 @@ def compensate_butterworth(
 
 
 def _settling(order: int, cutoff_hz: float, rate: float, samples: int) -> int:
-    """Gives how many samples the filter takes to forget, at most all but one."""
+    """Gives the length of the filter's transient [samples], at most all but one of the signal."""
     return min(round(2.0 * order * rate / cutoff_hz), samples - 1)

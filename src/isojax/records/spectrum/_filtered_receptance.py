@@ -1,16 +1,15 @@
-"""Receptance X/F of each dwell, from whatever was measured, and what the filter did to it."""
+"""Receptance X/F of each dwell, from whatever was measured, and the effect of a filter on it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Complex, Float
 
-from .._campaign import Campaign, OutputQuantity
+from .._campaign import TIME_DERIVATIVES, Campaign, OutputQuantity
 from .._record import Record
+from ._basis import usable_orders
 from ._filter import zero_phase_butterworth
 from ._harmonics import fit_harmonics, settled_window
-
-_ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +91,7 @@ def compare_filtered_receptance(
     if order is None or cutoff_hz is None:
         raise ValueError(
             f"Arguments `order` and `cutoff_hz` must be given, since {campaign.file} has no [filter], but "
-            "are "
-            f"{order} and {cutoff_hz}."
+            f"are {order} and {cutoff_hz}."
         )
     drive, response = (
         zero_phase_butterworth(one, record.rate, order, cutoff_hz)
@@ -111,7 +109,7 @@ def to_displacement(
     quantity: OutputQuantity,
 ) -> Complex[np.ndarray, " frequency"]:
     """Gives displacement amplitudes [m] of amplitudes of acceleration, velocity or displacement."""
-    return amplitude / (2j * np.pi * frequency) ** _ORDER[quantity]
+    return amplitude / (2j * np.pi * frequency) ** TIME_DERIVATIVES[quantity]
 
 
 def _receptance(
@@ -130,7 +128,7 @@ def _receptance(
     for i, dwell in enumerate(record.dwells):
         start, stop = settled_window(dwell, record.rate)
         time = (np.arange(start, stop) - dwell.start) / record.rate
-        orders = max(1, min(7, int(0.45 * record.rate / dwell.frequency)))
+        orders = max(1, usable_orders(record.rate, dwell.frequency, 7))
         for channel, signal in enumerate((drive, response)):
             amplitudes[channel, i] = fit_harmonics(signal[start:stop], time, dwell.frequency, orders)[0][1]
     force, moved = amplitudes[0], to_displacement(amplitudes[1], frequency, campaign.output.quantity)

@@ -9,8 +9,11 @@ from jaxtyping import Complex, Float
 
 from .._record import Dwell, Record
 from ._basis import harmonic_basis as harmonic_basis
-from ._basis import meeting_order
+from ._basis import meeting_order, usable_orders
 from ._mains import hum_lines
+
+_FEWEST_SETTLED = 4.0
+"""Cycles at the end of a dwell, a third of them and at least so many, that are taken for settled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +26,9 @@ class DwellHarmonics:
         cycles: Number of cycles they were taken from.
         input: c_0 (mean) to c_H of the input, in its unit.
         output: The same of the output.
-        input_residual: rms of what the harmonics leave of the input, per degree of freedom.
+        input_residual: rms of the input without its harmonics, per degree of freedom.
         output_residual: The same of the output.
-        masked: Orders that a line of the mains, seen in the record, falls on; they are 0.
+        masked: Orders that coincide with a significant line of the mains; they are 0.
     """
 
     frequency: float
@@ -49,7 +52,7 @@ def settled_window(dwell: Dwell, rate: float, settled_cycles: float | None = Non
         Samples, counted from the start of the record.
     """
     whole = max(1.0, np.floor(dwell.cycles + 1e-6))
-    kept = max(4.0, np.floor(whole / 3.0)) if settled_cycles is None else settled_cycles
+    kept = max(_FEWEST_SETTLED, np.floor(whole / 3.0)) if settled_cycles is None else settled_cycles
     length = round(min(kept, whole) * rate / dwell.frequency)
     return max(dwell.start, dwell.stop - length), dwell.stop
 
@@ -57,9 +60,9 @@ def settled_window(dwell: Dwell, rate: float, settled_cycles: float | None = Non
 def fit_harmonics(
     signal: Float[np.ndarray, " time"], time: Float[np.ndarray, " time"], frequency: float, harmonics: int
 ) -> tuple[Complex[np.ndarray, " harmonic"], float]:
-    """Gives the complex amplitudes 0..harmonics of a signal and the rms of the rest per degree of freedom."""
+    """Gives the complex amplitudes 0..harmonics of a signal and the rms residual per degree of freedom."""
     basis = harmonic_basis(time, frequency, harmonics)
-    # Harmonics over whole cycles are all but orthogonal: their normal equations lose nothing.
+    # Harmonics over whole cycles are nearly orthogonal, so the normal equations lose no digits.
     solution = np.linalg.solve(basis.T @ basis, basis.T @ signal)
     rest = signal - basis @ solution
     freedom = max(signal.size - basis.shape[1], 1)
@@ -85,12 +88,11 @@ def dwell_harmonics(
         ValueError: If the window has fewer samples than coefficients.
     """
     start, stop = settled_window(dwell, record.rate, settled_cycles)
-    fitted = min(harmonics, int(0.45 * record.rate / dwell.frequency))
+    fitted = usable_orders(record.rate, dwell.frequency, harmonics)
     if stop - start <= 2 * fitted + 1:
         raise ValueError(
             f"Argument `dwell` of record {record.name} must leave more than {2 * fitted + 1} settled "
-            "samples for "
-            f"{fitted} harmonics, but leaves {stop - start}."
+            f"samples for {fitted} harmonics, but leaves {stop - start}."
         )
     time = (np.arange(start, stop) - dwell.start) / record.rate
     drive, drive_rest = fit_harmonics(record.input[start:stop], time, dwell.frequency, fitted)

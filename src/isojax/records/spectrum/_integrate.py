@@ -9,15 +9,13 @@ import scipy.fft
 from jaxtyping import Float
 from scipy.signal import windows
 
-from .._campaign import OutputQuantity
+from .._campaign import TIME_DERIVATIVES, OutputQuantity
 from .._record import Record
 from ._band import excited_band
 
-_ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
-
 _State = tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"], Float[np.ndarray, " time"]]
-_KNOWN: WeakKeyDictionary[Record, dict[OutputQuantity, _State]] = WeakKeyDictionary()
-"""States in the default band that were already worked out: a fit asks for each several times."""
+_MEASURED_STATES: WeakKeyDictionary[Record, dict[OutputQuantity, _State]] = WeakKeyDictionary()
+"""States in the default band, kept because a fit asks for each several times."""
 
 
 def integrate_acceleration(
@@ -26,11 +24,9 @@ def integrate_acceleration(
     """Gives velocity and displacement of a measured acceleration, with no drift and zero mean.
 
     Each spectral line is divided by 2 pi i f; lines above `lowest_frequency` are kept whole, lines below a
-    quarter of it dropped, with a smooth ramp between. The ends are continued by mirror images, so that they
-    do
-    not wrap around: the displacement is good to some per cent two periods of `lowest_frequency` from an end,
-        to
-    5e-4 from six on.
+    quarter of it dropped, with a smooth ramp between. Mirror images continue the ends, so that they do not
+    wrap around. The displacement has an error of some per cent two periods of `lowest_frequency` from an
+    end, and of 5e-4 from six on.
 
     Args:
         acceleration: [m/s^2], (time,).
@@ -76,7 +72,7 @@ def measured_state(
         ValueError: If a frequency is not between 0 and half the rate.
     """
     if lowest_frequency is None and highest_frequency is None:
-        known = _KNOWN.setdefault(record, {})
+        known = _MEASURED_STATES.setdefault(record, {})
         if output_quantity not in known:
             band = excited_band(record)
             known[output_quantity] = measured_state(record, output_quantity, band.lowest, band.highest)
@@ -89,7 +85,7 @@ def measured_state(
             f"Argument `highest_frequency` must lie between {lowest:g} Hz and half the rate, "
             f"{0.5 * record.rate:g} Hz, but is {highest:g} Hz."
         )
-    measured = _ORDER[output_quantity]
+    measured = TIME_DERIVATIVES[output_quantity]
     x, v, a = (
         record.output
         if order == measured
@@ -167,6 +163,5 @@ def _check_lowest(signal: Float[np.ndarray, " time"], rate: float, lowest_freque
     if not rate / signal.size <= lowest_frequency < 0.5 * rate:
         raise ValueError(
             f"Argument `lowest_frequency` must lie between one period per signal, {rate / signal.size:.4g} "
-            "Hz, and "
-            f"half the rate, {0.5 * rate:g} Hz, but is {lowest_frequency:g} Hz."
+            f"Hz, and half the rate, {0.5 * rate:g} Hz, but is {lowest_frequency:g} Hz."
         )

@@ -1,4 +1,4 @@
-"""Hum of the mains on the output: whether it is there, and which dwells hide it under a harmonic."""
+"""Hum of the mains on the output: its lines, and the dwells that hide it under a harmonic."""
 
 import functools
 from dataclasses import dataclass
@@ -9,25 +9,25 @@ import scipy.stats
 from jaxtyping import Complex
 
 from .._record import Dwell, Record
-from ._basis import meeting_order
+from ._basis import USABLE_SHARE, meeting_order
 from ._dwell_end import dwell_rest, dwell_window
 
 MAINS = (50.0, 60.0)
 """Frequencies of public mains [Hz]."""
 
-_BESIDE = np.array([-3.5, -2.5, -1.5, 1.5, 2.5, 3.5])
-"""Where the noise next to a line is looked at, in lines of the window."""
+_NEIGHBOURS = np.array([-3.5, -2.5, -1.5, 1.5, 2.5, 3.5])
+"""Distances from a line at which the noise is estimated, in lines of the window."""
 
-_CLEAR = 0.75
-"""Lines of the window by which what is looked at must keep off harmonics, which have been taken out."""
+_KEPT_OFF = 0.75
+"""Lines of the window by which these frequencies must differ from the harmonics, which have been removed."""
 
-_CHANCE = 1e-4
-"""Of a record without hum to show one."""
+_FALSE_ALARM = 1e-4
+"""Chance that a record without hum shows one."""
 
 
 @dataclass(frozen=True)
 class HumLine:
-    """A line of the mains that stands out of a record.
+    """A significant line of the mains in a record.
 
     Attributes:
         record: Name of the record.
@@ -42,7 +42,7 @@ class HumLine:
 
 @dataclass(frozen=True)
 class MainsCollision:
-    """A dwell with a harmonic that cannot be told from the mains.
+    """A dwell with a harmonic that cannot be separated from the mains.
 
     Attributes:
         record: Name of the record.
@@ -57,15 +57,15 @@ class MainsCollision:
     mains: float
 
 
-_KNOWN: WeakKeyDictionary[Record, tuple[HumLine, ...]] = WeakKeyDictionary()
-"""Lines that were already sought: noise, harmonics and health all ask."""
+_HUM_LINES: WeakKeyDictionary[Record, tuple[HumLine, ...]] = WeakKeyDictionary()
+"""Kept, because noise, harmonics and health all ask for them."""
 
 
 def hum_lines(record: Record) -> tuple[HumLine, ...]:
-    """Gives the lines of the mains that stand out of what the harmonics leave of a record's settled dwells.
+    """Gives the significant lines of the mains in a record's settled dwells, without their harmonics.
 
-    A line counts if its power, summed over the dwells in which no harmonic is near it, exceeds that of the
-    noise next to it beyond a chance of 1e-4: their ratio is F-distributed without hum.
+    In each dwell without a harmonic nearby, the power of the line is compared with the noise next to it.
+    Without hum their ratio is F-distributed; a line counts if all ratios together have a chance below 1e-4.
 
     Args:
         record: The record.
@@ -73,28 +73,28 @@ def hum_lines(record: Record) -> tuple[HumLine, ...]:
     Returns:
         The lines; none without dwells, and none where every dwell has a harmonic there.
     """
-    if record not in _KNOWN:
-        found = [_stands_out(record, line) for line in MAINS if line < 0.45 * record.rate]
-        _KNOWN[record] = tuple(one for one in found if one is not None)
-    return _KNOWN[record]
+    if record not in _HUM_LINES:
+        found = [_significant_line(record, line) for line in MAINS if line < USABLE_SHARE * record.rate]
+        _HUM_LINES[record] = tuple(one for one in found if one is not None)
+    return _HUM_LINES[record]
 
 
-def _stands_out(record: Record, line: float) -> HumLine | None:
-    """Gives a line if it stands out of the noise."""
+def _significant_line(record: Record, line: float) -> HumLine | None:
+    """Gives a line if it is significantly above the noise."""
     powers, beside, squares = [], [], []
     for dwell in record.dwells:
         window = dwell_window(record, dwell)
         if window is None:
             continue
         resolution = record.rate / window
-        sought = np.concatenate([[line], line + _BESIDE * resolution])
+        sought = np.concatenate([[line], line + _NEIGHBOURS * resolution])
         off = np.abs(sought - dwell.frequency * np.round(sought / dwell.frequency))
-        clear = (off >= _CLEAR * resolution) & (sought < 0.45 * record.rate)
+        clear = (off >= _KEPT_OFF * resolution) & (sought < USABLE_SHARE * record.rate)
         if not clear[0] or not np.any(clear[1:]):
             continue
         rest = dwell_rest(record, dwell, window).signal
         power = np.abs(_tones(window, record.rate, tuple(sought[clear])) @ rest) ** 2
-        # Per dwell, so that one that never settled does not drown the others.
+        # Per dwell, so that one that never settled does not hide the others.
         noise = float(np.mean(power[1:]))
         if noise > 0.0:
             powers.append(power[0] / noise)
@@ -104,20 +104,20 @@ def _stands_out(record: Record, line: float) -> HumLine | None:
         return None
     # Each ratio is F(2, 2 k); on Fisher's scale their chances add up to a chi-square.
     chances = np.maximum(scipy.stats.f.sf(powers, 2, 2 * np.array(beside)), 1e-300)
-    if not scipy.stats.chi2.sf(-2.0 * np.sum(np.log(chances)), 2 * chances.size) < _CHANCE:
+    if not scipy.stats.chi2.sf(-2.0 * np.sum(np.log(chances)), 2 * chances.size) < _FALSE_ALARM:
         return None
     return HumLine(record.name, line, float(np.sqrt(max(np.mean(squares), 0.0))))
 
 
 @functools.lru_cache(maxsize=128)
 def _tones(window: int, rate: float, frequencies: tuple[float, ...]) -> Complex[np.ndarray, "line time"]:
-    """Gives a turning phasor for each frequency; the records of a campaign ask for the same ones."""
+    """Gives a rotating phasor for each frequency; the records of a campaign share them."""
     time = np.arange(window) / rate
     return np.exp(-2j * np.pi * np.array(frequencies)[:, None] * time)
 
 
 def mains_collisions(records: tuple[Record, ...]) -> tuple[MainsCollision, ...]:
-    """Gives the dwells in which a harmonic falls on the mains: a hum there would pass for that harmonic.
+    """Gives the dwells in which a harmonic falls on the mains, where hum looks like that harmonic.
 
     Args:
         records: The records.
@@ -131,7 +131,7 @@ def mains_collisions(records: tuple[Record, ...]) -> tuple[MainsCollision, ...]:
         for record in records
         for dwell in record.dwells
         for line in sorted(seen or MAINS)
-        if line < 0.45 * record.rate
+        if line < USABLE_SHARE * record.rate
         and (order := meeting_order(dwell.frequency, line, (dwell.stop - dwell.start) / record.rate))
         is not None
     )

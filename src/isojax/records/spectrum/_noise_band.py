@@ -1,4 +1,4 @@
-"""The band that the noise of a channel fills: all of it, or what a declared low-pass filter leaves."""
+"""The band that the noise of a channel fills: up to half the rate, or up to a declared filter's cut-off."""
 
 from dataclasses import dataclass, replace
 
@@ -8,7 +8,8 @@ from jaxtyping import Float
 from .._campaign import Filter
 from ._filter import LEAST_GAIN
 
-_POINTS = 4096
+_FREQUENCIES = 4096
+"""Frequencies over which the power gain is averaged."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,9 @@ class NoiseBand:
     def power_gain(self, frequency: Float[np.ndarray, " frequency"]) -> Float[np.ndarray, " frequency"]:
         """Gives the power gain of the filter: `1 / (1 + (w / wc)^(2 n))`, `w = tan(pi f / rate)`.
 
-        Squared for the reader's filter, which runs forwards and backwards and so acts twice. The bench's is
-        taken for a digital one too, run once: a filter before the converter would not shape its noise. Where
-        the reader has taken it out the gain is 1 as far as that goes.
+        Squared for the reader's filter, which runs forwards and backwards and so acts twice. The filter of
+        the test rig is assumed to be digital and to have run once, since a filter before the converter
+        would not shape the noise. Where the reader has compensated it, the gain is 1 as far as that reaches.
 
         Args:
             frequency: From 0 to half the rate [Hz].
@@ -54,7 +55,7 @@ class NoiseBand:
             return np.ones_like(frequency)
         warped = np.tan(np.pi * np.minimum(frequency / self.rate, 0.5 - 1e-9))
         ratio = warped / np.tan(np.pi * self.filter.cutoff_hz / self.rate)
-        # capped so that no power overflows near half the rate, where the gain is nothing anyway
+        # Capped, so that no power overflows near half the rate, where the gain is zero anyway.
         once = 1.0 / (1.0 + np.minimum(ratio, 1e6) ** np.minimum(2 * self.filter.order, 50))
         if self.filter.compensate:
             return (once / np.maximum(once, LEAST_GAIN**2)) ** 2
@@ -67,5 +68,5 @@ class NoiseBand:
         It is also the share of independent samples: N samples of such noise, weighed by the white noise of
         the same density, have the expected chi-square `share N`.
         """
-        middles = (np.arange(_POINTS) + 0.5) * (0.5 * self.rate / _POINTS)
+        middles = (np.arange(_FREQUENCIES) + 0.5) * (0.5 * self.rate / _FREQUENCIES)
         return float(np.mean(self.power_gain(middles)))

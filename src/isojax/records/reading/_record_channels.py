@@ -1,0 +1,147 @@
+"""The channels of one record in SI, cut to its samples and checked."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from .._wording import row
+from ._data_file import read_columns
+from ._declaration import Declaration
+from ._floor import floor_acceleration
+from ._time_base import find_rate
+
+FEWEST_SAMPLES = 16
+"""Samples without which a record is refused."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordChannels:
+    """Samples [start, stop) of a data file.
+
+    Attributes:
+        start: First sample, counted from the start of the file.
+        stop: One past the last sample.
+        total: Samples of the file.
+        settle: Samples at the start that count in no error.
+        rate: Samples per second [Hz].
+        raw_input: Input before the reader's [filter], in SI.
+        raw_output: Output before the reader's [filter], in SI.
+        input: Input after it.
+        output: Output after it.
+        floor: Measured motion of the floor after it, in SI, or None.
+    """
+
+    start: int
+    stop: int
+    total: int
+    settle: int
+    rate: float
+    raw_input: Float[np.ndarray, " time"]
+    raw_output: Float[np.ndarray, " time"]
+    input: Float[np.ndarray, " time"]
+    output: Float[np.ndarray, " time"]
+    floor: Float[np.ndarray, " time"] | None
+
+    def floor_acceleration(self, declared: Declaration) -> Float[np.ndarray, " time"] | None:
+        """Gives the acceleration of the floor [m/s^2], or None."""
+        if self.floor is None:
+            return None
+        return floor_acceleration(self.floor, self.rate, declared.sections["floor"]["quantity"])
+
+
+def read_channels(
+    where: str,
+    file: Path,
+    declared: Declaration,
+    entry: Mapping[str, Any],
+    factors: tuple[float, float, float],
+) -> RecordChannels:
+    """Gives the channels of a record as they were measured.
+
+    Args:
+        where: The [[record]], for errors.
+        file: Its data file.
+        declared: What the channels are called.
+        entry: The [[record]] as declared.
+        factors: From the units of input, output and floor to SI.
+
+    Returns:
+        The channels; nothing is filtered yet.
+
+    Raises:
+        ValueError: If the file, a channel or the span of the record is wrong.
+    """
+    sections = declared.sections
+    drive, response, clock = (
+        sections["input"]["column"],
+        sections["output"]["column"],
+        sections["sampling"]["time"],
+    )
+    ground = None if sections["floor"] is None else sections["floor"]["column"]
+    columns = read_columns(file, list(dict.fromkeys(one for one in (drive, response, ground, clock) if one)))
+    total = columns[drive].samples.size
+    start, stop = _span(where, file, entry, total)
+    raw_input = _finite(file, drive, columns[drive].samples[start:stop], start) * factors[0]
+    raw_output = _finite(file, response, columns[response].samples[start:stop], start) * factors[1]
+    floor = None
+    if ground is not None:
+        floor = _finite(file, ground, columns[ground].samples[start:stop], start) * factors[2]
+        _check_not_constant(file, ground, floor)
+    time = columns[clock].samples[start:stop] if clock else None
+    stated = next((column.rate for column in columns.values() if column.rate is not None), None)
+    rate = find_rate(file, sections["sampling"]["rate"], stated, time, clock, start)
+    _check_not_constant(file, response, raw_output)
+    if np.ptp(raw_input) == 0.0 and raw_input[0] != 0.0:
+        _check_not_constant(file, drive, raw_input)
+    return RecordChannels(
+        start, stop, total, entry["settle"], rate, raw_input, raw_output, raw_input, raw_output, floor
+    )
+
+
+def _span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:
+    start, stop = entry["start"], total if entry["stop"] is None else entry["stop"]
+    if start >= total or stop > total:
+        wrong = f"start = {start}" if start >= total else f"stop = {stop}"
+        raise ValueError(f"{where} {wrong} lies outside {file}, which has {total} samples")
+    if stop <= start:
+        raise ValueError(f"{where} stop = {stop} must be above start = {start}")
+    size = stop - start
+    if size < FEWEST_SAMPLES:
+        raise ValueError(f"{where} covers {size} samples of {file}; at least {FEWEST_SAMPLES} are needed")
+    if entry["settle"] >= size:
+        raise ValueError(
+            f"{where} settle = {entry['settle']} must be below the record's {size} samples ({file})"
+        )
+    if entry["period"] is not None and entry["period"] > size:
+        raise ValueError(f"{where} period = {entry['period']} exceeds the record's {size} samples ({file})")
+    if entry["period"] is not None and entry["schedule"] is not None:
+        raise ValueError(
+            f"{where} has both a period and a schedule; a record is periodic or stepped, not both"
+        )
+    return start, stop
+
+
+def _finite(
+    file: Path, column: str, samples: Float[np.ndarray, " time"], start: int
+) -> Float[np.ndarray, " time"]:
+    wrong = np.flatnonzero(~np.isfinite(samples))
+    if wrong.size:
+        at = int(wrong[0])
+        more = f" (and at {wrong.size - 1} more)" if wrong.size > 1 else ""
+        raise ValueError(
+            f"{file}: column `{column}` is {samples[at]} at {row(start + at)}{more}; every sample must be "
+            "a finite number"
+        )
+    return samples
+
+
+def _check_not_constant(file: Path, column: str, samples: Float[np.ndarray, " time"]) -> None:
+    if np.ptp(samples) == 0.0:
+        raise ValueError(
+            f"{file}: column `{column}` is constant ({samples[0]:.6g} in SI throughout); expected a "
+            "channel that varies"
+        )
