@@ -21,16 +21,16 @@ from ..fitting import Fit, Run
 from ..guess import Motion, is_absolute, measured_motion
 from ..jacobian import channel_table, follow_motion, scaled_model
 
-_STEPS = 2
+_STEPS_A_SAMPLE = 2
 """Integration steps a sample where memories follow the measured motion."""
 
 _STEEP = 6
 """Order of the filter below the band."""
 
-_ORDERS = 8.0
+_HIGHEST_ORDER = 8.0
 """Multiples of the drive's frequency that the latent force of a dwell keeps."""
 
-_DRAWS = 4
+_NOISE_DRAWS = 4
 """Times that the noise is drawn."""
 
 _TURNS = 3
@@ -100,8 +100,10 @@ def follow_memories(
 
     def body(internal: State, ends: tuple[tuple[Array, ...], tuple[Array, ...]]) -> tuple[State, State]:
         moved = internal
-        for step in range(_STEPS):
-            moved, *_ = solver.step(term, step / _STEPS, (step + 1) / _STEPS, moved, ends, None, False)
+        for step in range(_STEPS_A_SAMPLE):
+            moved, *_ = solver.step(
+                term, step / _STEPS_A_SAMPLE, (step + 1) / _STEPS_A_SAMPLE, moved, ends, None, False
+            )
         return moved, internal
 
     signals = (x, v, y, u)
@@ -228,7 +230,7 @@ def _force_residual(
 
     # What the noise of the output alone makes of it: the same road with noise of the same density on top.
     noise = []
-    for draw in range(_DRAWS):
+    for draw in range(_NOISE_DRAWS):
         stray = _stray_motion(campaign, record, motion, fit.noise.white, (seed, draw))
         shaken = missing(x + stray[0], v + stray[1], a + stray[2])[0] - force
         noise.append(_inside(np.asarray(shaken), record.rate, *band))
@@ -261,7 +263,7 @@ def _moved(campaign: Campaign, record: Record, motion: Motion) -> tuple[Float[np
 
 def _highest(record: Record, motion: Motion) -> float:
     """Give the frequency up to which the latent force is kept."""
-    orders = _ORDERS * max((dwell.frequency for dwell in record.dwells), default=0.0)
+    orders = _HIGHEST_ORDER * max((dwell.frequency for dwell in record.dwells), default=0.0)
     return float(min(max(motion.band.highest, orders), 0.39 * record.rate))
 
 
