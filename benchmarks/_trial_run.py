@@ -51,7 +51,7 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
             return row | {"truth": []} | timed | {"total_seconds": time.perf_counter() - begin}
         drawn = sketch(seed, kind, names)
         with tempfile.TemporaryDirectory() as folder:
-            hidden, path, size = _simulated(drawn, Path(folder), held_out=task != "coverage")
+            hidden, path, size = simulated(drawn, Path(folder), held_out=task != "coverage")
             campaign = read_campaign(path)
         row |= _facts(drawn, hidden, size)
         if task == "loop":
@@ -67,7 +67,7 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
     return row
 
 
-def _simulated(drawn: Sketch, folder: Path, held_out: bool = True) -> tuple[tuple[Secret, ...], Path, float]:
+def simulated(drawn: Sketch, folder: Path, held_out: bool = True) -> tuple[tuple[Secret, ...], Path, float]:
     """File the campaign, with smaller effects where the plant would run away."""
     hidden = secrets(drawn) if drawn.names else ()
     for attempt in range(TRIES):

@@ -209,15 +209,7 @@ def _made(model: Isolator, experiment: Experiment, question: _Question, rest: fl
     lost = missing_channels(model, blank)
     if lost:
         return f"its records would have no {' or '.join(lost)} to follow"
-    made = trial_run(
-        model,
-        experiment,
-        blank,
-        quantity=problem.quantity,
-        hold=problem.hold,
-        substeps=problem.integrator.record_steps(model),
-        rest=rest if experiment.load else 0.0,
-    )
+    made = trial_run(model, experiment, blank, problem, rest if experiment.load else 0.0)
     return made if made.is_finite else "the motion runs away"
 
 

@@ -10,9 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...excitations import Hold, tabulate
+from ...excitations import tabulate
 from ...models import RK4, Instant, Isolator, Quantity, State, add_ringing, read_record, scan_records
 from ...records import Dwell, Record
+from ..fitting import Problem
 from ..jacobian import carries, channel_table
 from ._candidate_experiments import DWELLS, Experiment
 
@@ -110,10 +111,7 @@ def trial_run(
     model: Isolator,
     experiment: Experiment,
     blank: tuple[Record, ...],
-    *,
-    quantity: Quantity,
-    hold: Hold,
-    substeps: int,
+    problem: Problem,
     rest: float,
 ) -> TrialRun:
     """Carry out an experiment on a model.
@@ -125,16 +123,16 @@ def trial_run(
         model: the isolator, as the experiment has it.
         experiment: the test.
         blank: its records, still without output.
-        quantity: what the campaign's sensor measures; the one of the experiment may measure another.
-        hold: what the drive does between samples.
-        substeps: integration steps a sample.
+        problem: the campaign's records: what the drive does between samples, the integration steps, and what
+            the sensor measures; that of the experiment may measure another quantity.
         rest: rest position [m].
 
     Returns:
         The records; not finite where the motion runs away.
     """
     rows, total = experiment.drive.shape
-    length, shift = total // DWELLS, float(model.shift())
+    length, shift, hold = total // DWELLS, float(model.shift()), problem.hold
+    substeps = problem.integrator.record_steps(model)
     window = (np.arange(2 * length)[:, None] + (np.arange(DWELLS) - 1) * length) % total
 
     def side_by_side(tables: Iterable[Float[np.ndarray, "time stage"]]) -> Array:
@@ -152,7 +150,7 @@ def trial_run(
         model,
         Instant(*(side_by_side(values) for values in zip(*tables, strict=True)), channels=channels),
         start,
-        quantity,
+        problem.quantity,
         1.0 / experiment.rate,
     )
 
@@ -160,7 +158,7 @@ def trial_run(
         return np.asarray(values)[length:].T.reshape(rows, total)
 
     displacement = in_turn(path[0])
-    outputs = displacement if experiment.quantity != quantity else in_turn(reading)
+    outputs = displacement if experiment.quantity != problem.quantity else in_turn(reading)
     records = tuple(
         dataclasses.replace(record, output=output, raw_output=output)
         for record, output in zip(blank, outputs, strict=True)

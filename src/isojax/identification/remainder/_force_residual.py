@@ -21,16 +21,16 @@ from ..fitting import Fit, Run
 from ..guess import Motion, is_absolute, measured_motion
 from ..jacobian import channel_table, follow_motion, scaled_model
 
-_STEPS = 2
+_STEPS_A_SAMPLE = 2
 """Integration steps per sample for internal states that follow the measured motion."""
 
 _STEEP = 6
 """Order of the filter below the band."""
 
-_ORDERS = 8.0
+_HIGHEST_ORDER = 8.0
 """Multiples of the drive's frequency that the force residual of a dwell keeps."""
 
-_DRAWS = 4
+_NOISE_DRAWS = 4
 """Draws of the noise."""
 
 _TURNS = 3
@@ -91,8 +91,10 @@ def follow_internal_states(
 
     def body(internal: State, ends: tuple[tuple[Array, ...], tuple[Array, ...]]) -> tuple[State, State]:
         moved = internal
-        for step in range(_STEPS):
-            moved, *_ = solver.step(term, step / _STEPS, (step + 1) / _STEPS, moved, ends, None, False)
+        for step in range(_STEPS_A_SAMPLE):
+            moved, *_ = solver.step(
+                term, step / _STEPS_A_SAMPLE, (step + 1) / _STEPS_A_SAMPLE, moved, ends, None, False
+            )
         return moved, internal
 
     signals = (x, v, y, u)
@@ -194,7 +196,7 @@ def _force_residual(
 
     # The share of the noise: the same computation with noise of the same density added to the motion.
     noise = []
-    for draw in range(_DRAWS):
+    for draw in range(_NOISE_DRAWS):
         stray = _noise_motion(campaign, record, motion, fit.noise.white, (seed, draw))
         shaken = missing(x + stray[0], v + stray[1], a + stray[2]) - force
         noise.append(_band_limited(np.asarray(shaken), record.rate, lowest, highest))
@@ -218,7 +220,7 @@ def _motion_in_band(campaign: Campaign, record: Record, band: Band) -> tuple[Flo
 
 def _highest(record: Record, motion: Motion) -> float:
     """Give the frequency up to which the force residual is kept."""
-    orders = _ORDERS * max((dwell.frequency for dwell in record.dwells), default=0.0)
+    orders = _HIGHEST_ORDER * max((dwell.frequency for dwell in record.dwells), default=0.0)
     return float(min(max(motion.band.highest, orders), 0.39 * record.rate))
 
 

@@ -300,7 +300,7 @@ class FadingForce(AbstractFreeForce):
 
 _ORDER = 4.0
 _MIXED = ((0.5, 0.0), (1.5, 0.0), (2.5, 0.0), (0.5, 1.0), (1.5, 1.0))
-_REACHES = (0.1, 0.2, 0.4, 0.8)
+_SLIP_REACHES = (0.1, 0.2, 0.4, 0.8)
 _WAVES = (0.1, 0.15, 0.2, 0.3, 0.5)
 _TIMES = (0.1, 0.3, 1.0, 3.0, 10.0)
 
@@ -329,7 +329,7 @@ def free_laws(scales: Scales) -> tuple[AbstractFreeForce, ...]:
         for share in _WAVES
         for phase in (0.0, 0.5 * jnp.pi)
     )
-    slips = tuple(SlipForce(0.0, share * scales.displacement) for share in _REACHES)
+    slips = tuple(SlipForce(0.0, share * scales.displacement) for share in _SLIP_REACHES)
     fading = tuple(
         FadingForce(0.0, share / scales.angular_frequency, power, scales.displacement)
         for power in (1.0, 2.0, 3.0)

@@ -1,0 +1,236 @@
+"""Print what each rule of the diagnosis decides: what changes at half and at twice its value.
+
+Run `python benchmarks/rules.py --seeds 3000:3004`, then `... --report`. Each seed is a campaign of the blind
+trial, as `blind_trial.py` draws it. The loop runs once with the default rules, then once more for each rule
+at half and at twice its value. A rule that the first run never read is not changed: "not consulted". A
+computation that reads none of the changed rules is not repeated, so that a seed takes a few times one loop.
+
+Rules whose meaning is a distance from one (chi2/dof, shares and quantiles near one) have that distance
+halved and doubled; counts are rounded down. A line of `results/rules.jsonl` is one rule on one seed; what is
+there is skipped, so that a run can be stopped and split by seeds.
+"""
+
+import argparse
+import dataclasses
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from _trial_campaign import kind_of, sketch
+from _trial_run import crowded, simulated
+from blind_trial import commit, read
+from isojax import compile_quickly
+from isojax.elements import Scales
+from isojax.identification import Rules, classical_guess, fit, read_campaign, scales
+from isojax.identification._close_loop import overall_verdict, search_effects
+from isojax.identification.diagnosis import _candidate_refits, _diagnose, _imitations, findings_in
+from isojax.identification.fitting import Search
+from isojax.models import Isolator
+from isojax.records import Campaign
+
+KEPT = Path(__file__).parent / "results" / "rules.jsonl"
+FROM_ONE = ("good", "clean", "most_of_it", "close_likeness", "visited_quantile")
+DEFAULTS = {field.name: field.default for field in dataclasses.fields(Rules)}
+REPEATED = (
+    (_diagnose, "score_test"),
+    (_diagnose, "transferred_share"),
+    (_diagnose, "polish"),
+    (_candidate_refits, "find_balance_start"),
+    (_candidate_refits, "refit_candidate"),
+    (_candidate_refits, "refit_from"),
+    (_candidate_refits, "find_violation"),
+    (_imitations, "score_test"),
+    (_imitations, "refit_candidate"),
+    (_imitations, "refit_from"),
+)
+"""What a diagnosis spends its time in."""
+
+Outcome = tuple[str, list[str]]
+_readers: list[dict[str, Any]] = []
+"""Of each computation in progress: the rules that it has read so far, with their values."""
+
+
+class WatchedRules(Rules):
+    """Rules that note who reads them."""
+
+    def __getattribute__(self, name: str) -> Any:
+        value = object.__getattribute__(self, name)
+        if name in DEFAULTS:
+            for reader in _readers:
+                reader[name] = value
+        return value
+
+
+def watched(work: Callable[[], Any]) -> tuple[Any, dict[str, Any]]:
+    """Do some work; give its result and the rules that it read."""
+    reader: dict[str, Any] = {}
+    _readers.append(reader)
+    try:
+        return work(), reader
+    finally:
+        _readers.pop()
+
+
+def _key(argument: Any) -> Any:
+    """Give what makes two arguments the same."""
+    if isinstance(argument, Search):
+        return argument.max_steps, argument.tolerance, argument.rival
+    if isinstance(argument, Rules | Scales):
+        return None
+    if isinstance(argument, Isolator):
+        return tuple((entry.name, float(entry.value)) for entry in argument.parameters)
+    if isinstance(argument, tuple) and argument and hasattr(argument[0], "strength"):
+        return tuple(element.name for element in argument)
+    return argument if isinstance(argument, str | int) else id(argument)
+
+
+def remembered(function: Callable[..., Any], known: list) -> Callable[..., Any]:
+    """Give a function that repeats no work: same arguments, and same values of all rules that it read."""
+
+    def call(*arguments: Any, **named: Any) -> Any:
+        everything = (*arguments, *named.values())
+        rules = next(
+            one.rules if isinstance(one, Search) else one
+            for one in everything
+            if isinstance(one, Search | Rules)
+        )
+        values = vars(rules)
+        key = function.__name__, *map(_key, everything)
+        entry = next(
+            (
+                one
+                for one in known
+                if one[0] == key and all(values[name] == value for name, value in one[1].items())
+            ),
+            None,
+        )
+        if entry is None:
+            result, read_rules = watched(lambda: function(*arguments, **named))
+            # The arguments stay alive, or another could take their identity.
+            entry = key, read_rules, result, everything
+            known.append(entry)
+        for reader in _readers:
+            reader.update(entry[1])
+        return entry[2]
+
+    return call
+
+
+def changed(name: str, factor: float) -> Any:
+    """Give a rule's value, or its distance from one, times a factor."""
+    value = DEFAULTS[name]
+    if name in FROM_ONE:
+        return 1.0 + factor * (value - 1.0) if value > 1.0 else 1.0 - (1.0 - value) / factor
+    if isinstance(value, tuple):
+        return tuple(max(1, int(factor * one)) for one in value)
+    return max(1, int(factor * value)) if isinstance(value, int) else factor * value
+
+
+class Trial:
+    """One campaign, diagnosed again and again."""
+
+    def __init__(self, seed: int):
+        """Draw the campaign; nothing is diagnosed yet."""
+        drawn = sketch(seed, kind_of(seed))
+        with tempfile.TemporaryDirectory() as folder:
+            self.campaign: Campaign = read_campaign(simulated(drawn, Path(folder))[1])
+        self.scales = scales(self.campaign)
+        self.known: list = []
+
+    def outcome(self, rules: Rules) -> Outcome:
+        """Give the verdict and the names of what is found."""
+        originals = [(module, name, getattr(module, name)) for module, name in REPEATED]
+        try:
+            for module, name, function in originals:
+                setattr(module, name, remembered(function, self.known))
+            guess = remembered(classical_guess, self.known)(self.campaign, rules=rules)
+            before = remembered(fit, self.known)(guess.model, self.campaign, rules=rules)
+            search = Search(self.scales, rules, max_steps=rules.evaluations, tolerance=rules.converged)
+            extensions, last = search_effects(before, search, 3)
+            after = extensions[-1].after if extensions else before
+            names = [finding.effect for finding in findings_in(after.model, extensions)]
+            return overall_verdict(before, after, len(names), last, rules), names
+        finally:
+            for module, name, function in originals:
+                setattr(module, name, function)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run what is not there yet."""
+    first, _, stop = options.seeds.partition(":")
+    version = commit()
+    for seed in range(int(first), int(stop) if stop else int(first) + 1):
+        done = {row["rule"] for row in read(options.out) if row["seed"] == seed}
+        if done >= set(DEFAULTS):
+            continue
+        trial = Trial(seed)
+        default, consulted = watched(lambda trial=trial: trial.outcome(WatchedRules()))
+        for name in DEFAULTS:
+            if name in done:
+                continue
+            row = {"seed": seed, "kind": kind_of(seed), "rule": name, "default": default}
+            if name in consulted:
+                row |= {
+                    word: trial.outcome(WatchedRules(**{name: changed(name, factor)}))
+                    for word, factor in (("half", 0.5), ("twice", 2.0))
+                }
+            with options.out.open("a") as file:
+                file.write(json.dumps(row | {"commit": version}) + "\n")
+            print(json.dumps(row), flush=True)
+        if crowded():
+            jax.clear_caches()
+
+
+def report(rows: list[dict]) -> None:
+    """Print the table."""
+    print(f"{'rule':<24}{'half':>10}{'value':>10}{'twice':>10}{'consulted':>11}{'verdicts':>10}{'names':>8}")
+    for name, value in DEFAULTS.items():
+        mine = [row for row in rows if row["rule"] == name]
+        consulted = [row for row in mine if "half" in row]
+        verdicts, names = (
+            [sum(row[word][part] != row["default"][part] for row in consulted) for word in ("half", "twice")]
+            for part in (0, 1)
+        )
+        values = "".join(f"{_brief(one):>10}" for one in (changed(name, 0.5), value, changed(name, 2.0)))
+        counts = f"{len(consulted)} of {len(mine)}"
+        if consulted and not any(verdicts + names):
+            outcome = f"  no change seen on {len(consulted)} campaigns"
+        elif consulted:
+            outcome = f"{verdicts[0]:>6} / {verdicts[1]}{names[0]:>4} / {names[1]}"
+        else:
+            outcome = "  not consulted"
+        print(f"{name:<24}{values}{counts:>11}{outcome}")
+
+
+def _brief(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, tuple) else f"{value:.5g}"
+
+
+def main() -> None:
+    """Run, or report."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", default="3000:3004", help="first:stop")
+    parser.add_argument("--out", type=Path, default=KEPT, help="one line a rule and seed")
+    parser.add_argument("--cache", type=Path, help="folder in which compiled code is kept between runs")
+    parser.add_argument("--report", action="store_true", help="print the table of the lines that are there")
+    options = parser.parse_args()
+    if options.report:
+        report(read(options.out))
+        return
+    jax.config.update("jax_enable_x64", True)
+    compile_quickly()
+    if options.cache:
+        jax.config.update("jax_compilation_cache_dir", os.fspath(options.cache))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    run(options)
+
+
+if __name__ == "__main__":
+    main()
