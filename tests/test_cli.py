@@ -104,6 +104,17 @@ def small_campaign(folder, dwells=None):
     return folder
 
 
+def test_fit_shows_a_line_a_stage_and_verbose_its_steps_as_well(tmp_path, capsys):
+    campaign = small_campaign(tmp_path / "campaign", dwells=2)
+    for option, stages_only in ((), True), (("--verbose",), False):
+        assert main(["fit", str(campaign), *option]) in (0, 1)
+        shown = capsys.readouterr().err.splitlines()
+        names = [line.split(" s  ")[1].split(":")[0] for line in shown]
+        assert {"reading of the campaign", "classical guess", "fit of the declared model"} <= set(names)
+        assert ("step 1" not in names) == stages_only
+        assert (len(shown) == 3) == stages_only
+
+
 def test_fit_prints_its_report_and_writes_it(tmp_path, capsys):
     campaign = small_campaign(tmp_path / "campaign")
     assert main(["fit", str(campaign), "--out", str(tmp_path / "out"), "--quiet"]) == 0
@@ -191,4 +202,6 @@ def test_demo_finds_the_friction_that_was_put_in(tmp_path, capsys):
     assert level["value"] == pytest.approx(truth["spec"]["q"][0], abs=3.0 * level["standard_error"])
     assert result["after"]["error"]["holdout"]["chi2_per_dof"] < 1.05
     assert "report.html" in shown.out
-    assert "records read" in shown.err
+    assert "8 records read" in shown.err
+    assert "chi2/dof" in shown.err
+    assert len(shown.err.splitlines()) < 12
