@@ -51,5 +51,3 @@ def test_a_stage_that_raises_leaves_no_line_and_hides_no_error():
         progress(Stage("reading"))
         raise ValueError("bad file")
     assert file.getvalue() == ""
-
-
