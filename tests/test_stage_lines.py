@@ -46,8 +46,11 @@ def test_a_terminal_shows_the_current_step_and_keeps_only_the_stages():
 
 
 def test_a_stage_that_raises_leaves_no_line_and_hides_no_error():
-    file = io.StringIO()
-    with pytest.raises(ValueError, match="bad file"), stage_lines(Console(file=file)) as progress:
+    def fail(progress):
         progress(Stage("reading"))
         raise ValueError("bad file")
+
+    file = io.StringIO()
+    with pytest.raises(ValueError, match="bad file"), stage_lines(Console(file=file)) as progress:
+        fail(progress)
     assert file.getvalue() == ""

@@ -67,8 +67,8 @@ def test_headline_names_effect_strength_and_held_out_error(page, found):
     before, after = (fit.errors["holdout"].chi2_per_dof for fit in (found.before, found.after))
     assert re.search(r"Dry \(Coulomb\) friction, Fc = \d\.\d+ ± 0\.\d+ N", text)
     assert f"held-out χ²/dof {before:.2f} → {after:.2f}" in text
-    assert "presliding (Dahl) friction, which these data cannot tell from it" in text
-    assert "What would part them: a test at 5 N" in text
+    assert "presliding (Dahl) friction, which these data cannot distinguish from it" in text
+    assert "A test that separates them: a test at 5 N" in text
 
 
 def test_report_without_dwells_or_holdout_says_so(plain_page):
