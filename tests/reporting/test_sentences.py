@@ -65,10 +65,10 @@ def test_of_what_is_below_the_noise_no_share_is_told(found):
 
 
 def test_a_doubt_stands_in_the_headline(found, monkeypatch):
+    doubt = "isojax.reporting.words._sentences.doubt_words"
+    monkeypatch.setattr(doubt, lambda loop: "")
     plain = headline(found)
-    monkeypatch.setattr(
-        "isojax.reporting.words._sentences.doubt_words", lambda loop: "But they do not agree."
-    )
+    monkeypatch.setattr(doubt, lambda loop: "But they do not agree.")
     assert headline(found) == f"{plain} But they do not agree."
 
 
