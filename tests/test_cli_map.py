@@ -143,7 +143,15 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
         main(["map", "--help"])
     assert ended.value.code == 0
     shown = " ".join(capsys.readouterr().out.split())
-    for option in ("--amplitudes", "--frequencies", "--coexisting", "--out", "--checkpoint", "--quiet"):
+    for option in (
+        "--amplitudes",
+        "--frequencies",
+        "--coexisting",
+        "--out",
+        "--checkpoint",
+        "--verbose",
+        "--quiet",
+    ):
         assert option in shown
     for word in (
         "map.npz",
@@ -151,7 +159,7 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
         "response.png",
         "folds.png",
         "no cell of a map did",
-        "200 if not told",
+        "200 if omitted",
     ):
         assert word in shown
 

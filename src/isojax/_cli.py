@@ -16,10 +16,13 @@ from rich.console import Console
 from rich.text import Text
 
 from ._compiling import compile_quickly
+from ._progress import KeyFigure, Stage
 from ._results import is_successful
+from ._stage_lines import stage_lines, step_lines
 from .demo import campaign_folder
-from .identification import Fit, classical_guess, fit, read_campaign
+from .identification import Fit, classical_guess, fit, read_campaign, silent
 from .models import load_model
+from .records import Campaign
 from .reporting import (
     catalogue_table,
     check_folder,
@@ -39,7 +42,7 @@ _WIDTH = 120
 _NOT_CONVERGED = 1
 
 _CELLS = 200
-"""Values along each side of a map, if not told."""
+"""Values along each side of a map, if omitted."""
 
 _EXIT_CODES = (
     "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
@@ -88,16 +91,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="where report.html, result.json and model.json go (no model after a failed fit)",
     )
-    _quiet(loop)
-    loop.set_defaults(run=lambda asked: _close_loop(asked.campaign, asked.out, asked.quiet))
+    _shown(loop)
+    loop.set_defaults(run=_close_loop)
 
     single = commands.add_parser("fit", help="fit the declared model and print its report")
     _campaign(single)
     single.add_argument(
         "--out", metavar="DIR", help="where model.json (not after a failed fit) and fit.txt go"
     )
-    _quiet(single)
-    single.set_defaults(run=lambda asked: _fit(asked.campaign, asked.out, asked.quiet))
+    _shown(single)
+    single.set_defaults(run=_fit)
 
     plane = commands.add_parser(
         "map",
@@ -119,7 +122,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="keep finished chunks here; a run that was killed goes on from them",
     )
-    _quiet(plane)
+    _shown(plane)
     plane.set_defaults(run=_map)
 
     effects = commands.add_parser("effects", help="list the effects that can be named")
@@ -127,8 +130,8 @@ def _parser() -> argparse.ArgumentParser:
 
     demo = commands.add_parser("demo", help="close-loop on the campaign in the package")
     demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
-    _quiet(demo)
-    demo.set_defaults(run=lambda asked: _close_loop(campaign_folder(), asked.out, asked.quiet))
+    _shown(demo)
+    demo.set_defaults(run=_close_loop, campaign=campaign_folder())
     return parser
 
 
@@ -136,8 +139,12 @@ def _campaign(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder")
 
 
-def _quiet(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--quiet", action="store_true", help="no lines of progress")
+def _shown(parser: argparse.ArgumentParser) -> None:
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument(
+        "--verbose", action="store_true", help="a line for every step, not only for every stage"
+    )
+    shown.add_argument("--quiet", action="store_true", help="no lines of progress")
 
 
 def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
@@ -146,19 +153,16 @@ def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
         required=True,
         nargs="+",
         metavar=("START STOP", "COUNT"),
-        help=f"{words}; COUNT equal steps apart, {_CELLS} if not told",
+        help=f"{words}; COUNT equal steps apart, {_CELLS} if omitted",
     )
 
 
-def _progress(quiet: bool) -> Callable[[str], None]:
-    """Give what shows a line of progress, with the seconds since the start, on stderr."""
-    console, begin = Console(stderr=True, highlight=False), time.perf_counter()
-
-    def show(line: str) -> None:
-        if not quiet:
-            console.print(Text(f"{time.perf_counter() - begin:7.1f} s  {line}", style="dim"))
-
-    return show
+def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Callable[[str], None]]:
+    """Give what shows progress on stderr: a line a stage, every step of it, or nothing."""
+    console = Console(stderr=True, highlight=False)
+    if asked.quiet:
+        return contextlib.nullcontext(silent)
+    return step_lines(console) if asked.verbose else stage_lines(console)
 
 
 def _results() -> Console:
@@ -166,28 +170,37 @@ def _results() -> Console:
     return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 
-def _close_loop(campaign: str | Path, out: str, quiet: bool) -> int:
-    begin, folder = time.perf_counter(), check_folder(out)
-    measured, progress = read_campaign(campaign), _progress(quiet)
-    progress(f"{len(measured.records)} records read")
-    loop = close_loop(measured, progress=progress)
-    progress("writing the report")
-    loop.report(folder)
+def _close_loop(asked: argparse.Namespace) -> int:
+    begin, folder = time.perf_counter(), check_folder(asked.out)
+    with _progress(asked) as progress:
+        measured = _read(asked.campaign, progress)
+        loop = close_loop(measured, progress=progress)
+        progress(Stage("report"))
+        loop.report(folder)
     console = _results()
     console.print(loop_summary(loop.loop))
     console.print(Text(f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}"))
     return _exit_code(loop.after)
 
 
-def _fit(campaign: str | Path, out: str | None, quiet: bool) -> int:
+def _read(campaign: str | Path, progress: Callable[[str], None]) -> Campaign:
+    progress(Stage("reading of the campaign"))
+    measured = read_campaign(campaign)
+    progress(KeyFigure(f"{len(measured.records)} records read"))
+    return measured
+
+
+def _fit(asked: argparse.Namespace) -> int:
     begin = time.perf_counter()
-    folder = None if out is None else check_folder(out)
-    measured, progress = read_campaign(campaign), _progress(quiet)
-    guess = classical_guess(measured)
-    progress(f"{len(measured.records)} records read")
-    for note in guess.notes:
-        progress(note)
-    fitted = fit(guess.model, measured, progress=progress)
+    folder = None if asked.out is None else check_folder(asked.out)
+    with _progress(asked) as progress:
+        measured = _read(asked.campaign, progress)
+        progress(Stage("classical guess"))
+        guess = classical_guess(measured)
+        progress(KeyFigure(" ".join(guess.notes)))
+        progress(Stage("fit of the declared model"))
+        fitted = fit(guess.model, measured, progress=progress)
+        progress(KeyFigure(f"chi2/dof {fitted.stats.chi2 / fitted.stats.dof:.4g}"))
     report = str(fitted)
     if folder is not None:
         write_texts(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
@@ -200,25 +213,28 @@ def _map(asked: argparse.Namespace) -> int:
     folder, model = check_folder(asked.out), load_model(asked.model)
     amplitudes = _values("--amplitudes", asked.amplitudes)
     frequencies = _values("--frequencies", asked.frequencies)
-    progress = _progress(asked.quiet)
     seconds, watch = {}, _stopwatch()
-    smap = stability_map(
-        model,
-        amplitudes,
-        frequencies,
-        coexisting=asked.coexisting,
-        checkpoint=asked.checkpoint,
-        progress=progress,
-    )
-    seconds["map"] = watch()
-    folds = None
-    if np.any(np.asarray(smap.count) > 1):
-        progress("following the folds around cells with several orbits")
-        folds = folds_around(smap)
-        seconds["folds"] = watch()
-    progress("drawing")
-    written = write_map(smap, folder, folds=folds)
-    seconds["pictures"] = watch()
+    with _progress(asked) as progress:
+        progress(Stage("periodic orbits over drive amplitude and frequency"))
+        smap = stability_map(
+            model,
+            amplitudes,
+            frequencies,
+            coexisting=asked.coexisting,
+            checkpoint=asked.checkpoint,
+            progress=progress,
+        )
+        several = int(np.count_nonzero(np.asarray(smap.count) > 1))
+        progress(KeyFigure(f"{smap.count.size} cells, {several} with several orbits"))
+        seconds["map"] = watch()
+        folds = None
+        if several:
+            progress(Stage("folds around the cells with several orbits"))
+            folds = folds_around(smap)
+            seconds["folds"] = watch()
+        progress(Stage("pictures"))
+        written = write_map(smap, folder, folds=folds)
+        seconds["pictures"] = watch()
     print(map_summary(smap, folds=folds, seconds=seconds))
     print(f"see {', '.join(str(folder / name) for name in written)}")
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
@@ -239,7 +255,7 @@ def _values(option: str, words: Sequence[str]) -> np.ndarray:
 
 
 def _stopwatch() -> Callable[[], tuple[float, float]]:
-    """Give what tells the seconds since it was last asked: compiling, and everything else."""
+    """Give what measures the seconds since its last call: compiling, and everything else."""
     last = [compile_seconds(), time.perf_counter()]
 
     def watch() -> tuple[float, float]:

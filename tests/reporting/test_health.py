@@ -29,7 +29,7 @@ def test_the_nearest_dwell_is_named_with_force_frequency_and_settling_time():
         "1.5 N (1.00 % of the drive) or 0.021 Hz from up at 4.40 Hz; 1 of 3 dwells are within 5 %" in lines[0]
     )
     # ln(100) / -ln(0.9) = 43.7
-    assert "at most 0.900 (up at 4.40 Hz): there a disturbance falls to a hundredth in 44 cycles" in lines[1]
+    assert "at most 0.900 (up at 4.40 Hz): there a disturbance decays to 1 % in 44 cycles" in lines[1]
 
 
 def test_a_fold_that_only_the_frequency_reaches_is_named_too():
@@ -43,8 +43,8 @@ def test_no_fold_within_reach_is_said():
 
 def test_unstable_and_lost_dwells_are_counted():
     lines = dwell_words([dwell(4.0, 1.02, 0.1, 0.1), LOST], "force")
-    assert "of 1 measured dwells the model says that they are unstable" in lines[1]
-    assert lines[2] == "Not told of 1 of 2 dwells, such as up at 4.60 Hz: the dwell is not driven."
+    assert "by the model 1 of the measured dwells are unstable" in lines[1]
+    assert lines[2] == "1 of 2 dwells left out (for example up at 4.60 Hz): the dwell is not driven."
     assert dwell_words([], "force") == ()
 
 

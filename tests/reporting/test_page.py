@@ -65,10 +65,10 @@ def test_pictures_are_png_of_some_size(page):
 def test_headline_names_effect_strength_and_held_out_error(page, found):
     text = " ".join(read(page).text)
     before, after = (fit.errors["holdout"].chi2_per_dof for fit in (found.before, found.after))
-    assert re.search(r"Dry \(Coulomb\) friction, Fc = \d\.\d+ ± 0\.\d+ N", text)
+    assert re.search(r"Dry \(Coulomb\) friction, Fc = \d+\.\d+ ± 0\.\d+ N", text)
     assert f"held-out χ²/dof {before:.2f} → {after:.2f}" in text
-    assert "presliding (Dahl) friction, which these data cannot tell from it" in text
-    assert "What would part them: a test at 5 N" in text
+    assert "presliding (Dahl) friction, which these data cannot distinguish from it" in text
+    assert "A test that separates them: a test at 5 N" in text
 
 
 def test_report_without_dwells_or_holdout_says_so(plain_page):

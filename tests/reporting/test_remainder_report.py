@@ -50,7 +50,7 @@ def test_the_page_has_the_section_with_its_pictures(unexplained):
     section = page.partition("<h2>Unexplained residual</h2>")[2].partition("<h2>")[0]
     assert section.count("data:image/png;base64,") == 4
     assert "no finding" in section
-    assert re.search(r"selected from \d+ free laws, would explain [0-9.]+ % of it", section)
+    assert re.search(r"selected from \d+ free laws, would explain [\d.]+ % of it", section)
 
 
 def test_the_terminal_says_it_in_a_few_lines(unexplained):

@@ -60,19 +60,12 @@ def test_result_follows_schema_one(found, plain):
 
 def test_result_names_every_parameter_and_gives_no_error_to_fixed_ones(found):
     result = result_dict(found)
-    assert result["before"]["elements"] == [
-        "linear_stiffness",
-        "abs_quadratic_stiffness",
-        "cubic_stiffness",
-        "linear_damping",
-        "abs_quadratic_damping",
-        "cubic_damping",
-    ]
+    assert result["before"]["elements"] == ["linear_stiffness", "cubic_stiffness", "linear_damping"]
     parameters = result["after"]["parameters"]
     assert parameters["mass"] == {"value": 800.0, "standard_error": None, "unit": "kg"}
     assert parameters["coulomb_friction.width"]["standard_error"] is None
     assert parameters["coulomb_friction.force_level"]["standard_error"] > 0
-    assert parameters["abs_quadratic_stiffness.coefficient"]["unit"] == "N/m^2"
+    assert parameters["cubic_stiffness.coefficient"]["unit"] == "N/m^3"
     assert "coulomb_friction.force_level" not in result["before"]["parameters"]
 
 

@@ -32,17 +32,17 @@ def test_headline_says_what_the_verdict_says(found, verdict, start):
 @pytest.mark.parametrize(
     ("before", "after", "samples", "verdict", "said"),
     [
-        (1.16, 1.32, 9e3, "found", "speak against it: they are predicted worse than without it."),
-        (1.16, 1.32, 9e3, "partly_explained", "speak against it: they are predicted worse than without it."),
-        (1.16, 1.12, 9e3, "found", "not explained down to their noise: there the law may be another."),
+        (1.16, 1.32, 9e3, "found", "contradict it: they are predicted worse than without it."),
+        (1.16, 1.32, 9e3, "partly_explained", "contradict it: they are predicted worse than without it."),
+        (1.16, 1.12, 9e3, "found", "down to their noise: another law may act there."),
         (1.16, 1.12, 9e3, "partly_explained", ""),
         (1.16, 1.04, 9e3, "found", ""),
         (0.98, 1.03, 9e3, "found", ""),
         # Of few samples chi2/dof scatters by itself: sqrt(2 / 300) is 0.08.
         (1.16, 1.12, 300.0, "found", ""),
         (1.16, 1.30, 100.0, "partly_explained", ""),
-        (1.22, 1.30, 300.0, "found", "not explained down to their noise: there the law may be another."),
-        (3.00, math.nan, 9e3, "found", "speak against it: the model runs away on them."),
+        (1.22, 1.30, 300.0, "found", "down to their noise: another law may act there."),
+        (3.00, math.nan, 9e3, "found", "contradict it: the model diverges on them."),
     ],
 )
 def test_what_held_out_records_say_against_a_finding_is_told(
@@ -65,10 +65,10 @@ def test_of_what_is_below_the_noise_no_share_is_told(found):
 
 
 def test_a_doubt_stands_in_the_headline(found, monkeypatch):
+    doubt = "isojax.reporting.words._sentences.doubt_words"
+    monkeypatch.setattr(doubt, lambda loop: "")
     plain = headline(found)
-    monkeypatch.setattr(
-        "isojax.reporting.words._sentences.doubt_words", lambda loop: "But they do not agree."
-    )
+    monkeypatch.setattr(doubt, lambda loop: "But they do not agree.")
     assert headline(found) == f"{plain} But they do not agree."
 
 
@@ -103,7 +103,7 @@ def test_more_than_two_findings_of_a_good_fit_are_said_to_explain_it(found):
 def test_finding_without_rivals_asks_for_no_experiment(found):
     alone = found.findings[0]._replace(indistinguishable=("coulomb_friction",), transfer=0.9)
     lines = finding_words(alone)
-    assert not any("cannot tell" in line or "part them" in line for line in lines)
+    assert not any("cannot distinguish" in line or "separates them" in line for line in lines)
     assert any("90.0 %" in line for line in lines)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
+from .._progress import KeyFigure, Stage
 from .._results import RESULTS, is_successful
 from ..elements import CATALOGUE
 from ..records import Campaign
@@ -111,7 +112,7 @@ def close_loop(
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.
-        progress: receives a line a step.
+        progress: receives a `Stage` and a `KeyFigure` for each stage, and a line for each of its steps.
         rules: the numbers that decide verdicts.
 
     Returns:
@@ -127,14 +128,17 @@ def close_loop(
     if unknown:
         raise ValueError(f"Argument `excluded` must hold catalogue names, but {unknown[0]!r} is none.")
     start = time.perf_counter()
-    progress("classical guess")
+    progress(Stage("classical guess"))
     guess = classical_guess(campaign, rules=rules)
-    progress("fit of the declared model")
+    progress(Stage("fit of the declared model"))
     before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules)
+    progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     extensions, verdict = search_effects(
         before, search_of(campaign, rules, solver, progress), max_iterations, excluded
     )
-    extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
+    if extensions:
+        progress(Stage("search for separating experiments"))
+        extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
     after = extensions[-1].after if extensions else before
     if not is_successful(after.result):
         verdict = _without_evidence(after)
@@ -142,8 +146,8 @@ def close_loop(
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
     # Asked for here, so that the time of the loop counts it.
-    for when, compared in (("before", before), ("after", after)):
-        progress(f"free-run error {when}: {compared.nrmse:.4g} of the measured rms")
+    progress(Stage("free runs of every record"))
+    progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
     return Loop(
         campaign,
         guess,
@@ -182,13 +186,14 @@ def search_effects(
     if len(extensions) < 2:
         return extensions, verdict
     final = extensions[-1].after.estimate
+    search.progress(Stage("test whether the later findings replace an earlier one"))
     earlier = tuple(
         step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
     )
     doubtful = find_superfluous(final, earlier, search)
     if doubtful is None:
         return extensions, verdict
-    search.progress(f"{doubtful} is not needed beside the later findings: search again without it")
+    search.progress(KeyFigure(f"{doubtful} is not needed beside the later findings: search again without it"))
     again, last = _grow(before, search, max_iterations, (*excluded, doubtful))
     if not again:
         return extensions, verdict
@@ -207,8 +212,9 @@ def _grow(
     extensions: tuple[Extension, ...] = ()
     current, significance = before, search.rules.significance
     while True:
+        search.progress(Stage(f"diagnosis {len(extensions) + 1}: which effect is missing"))
         verdict = diagnose_with(search, current, before.estimate.excess, significance, excluded)
-        search.progress(verdict.reason)
+        search.progress(KeyFigure(verdict.reason))
         if verdict.refit is None or len(extensions) == max_iterations:
             return extensions, verdict
         extensions = (*extensions, extend(current, verdict))

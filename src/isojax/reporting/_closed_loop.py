@@ -60,7 +60,7 @@ class ClosedLoop:
 
     @cached_property
     def health(self) -> CampaignHealth:
-        """State of the data: dwells beside folds, drift budget; worked out when it is first asked for."""
+        """State of the data: dwells beside folds, drift budget; computed at its first use."""
         return campaign_health(self.loop)
 
     def report(self, folder: str | Path) -> None:

@@ -1,4 +1,4 @@
-"""How long JAX has been compiling, so that a run can be told from its first call."""
+"""How long JAX has been compiling, to report compiling and running apart."""
 
 import functools
 import time

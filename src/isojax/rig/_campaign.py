@@ -14,7 +14,7 @@ from ._bench import DEFAULT_BENCH, Bench, SimulatedRecord, run
 from ._instruments import Instrument
 from ._law import Law
 from ._plan import Plan
-from ._plant import Plant
+from ._plant import BASE_NAMES, Plant
 
 _UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}
 
@@ -29,6 +29,7 @@ def write_campaign(
     title: str,
     bench: Bench = DEFAULT_BENCH,
     file_format: Literal["npz", "csv"] = "npz",
+    declared: tuple[str, ...] = BASE_NAMES,
 ) -> Path:
     """Run a plan and write campaign.toml, one file and (for dwells) one schedule per record, and truth.json.
 
@@ -40,6 +41,7 @@ def write_campaign(
         title: of the campaign.
         bench: how it is measured.
         file_format: of the records: compressed NPZ of float32, or CSV.
+        declared: base laws that [model] names.
 
     Returns:
         Path of campaign.toml.
@@ -60,7 +62,7 @@ def write_campaign(
             _write(folder / f"{record.name}_schedule.csv", _schedule(record))
     _write(folder / "truth.json", (json.dumps(truth(plant, bench), indent=1) + "\n").encode())
     campaign = folder / "campaign.toml"
-    _write(campaign, _toml(records, plant, title, bench, file_format).encode())
+    _write(campaign, _toml(records, plant, title, bench, file_format, declared).encode())
     return campaign
 
 
@@ -83,6 +85,11 @@ def _spec(effect: Law | Instrument) -> dict[str, Any]:
             np.asarray(value, dtype=float).tolist() for name, value in vars(effect).items() if name[0] != "_"
         ],
     }
+
+
+def _terms(declared: tuple[str, ...], kind: str) -> list[str]:
+    """Terms of one kind as [model] writes them: "cubic" for "cubic_damping"."""
+    return [name.removesuffix(f"_{kind}") for name in declared if name.endswith(kind)]
 
 
 def _write(path: Path, content: bytes) -> None:
@@ -120,7 +127,12 @@ def _schedule(record: SimulatedRecord) -> bytes:
 
 
 def _toml(
-    records: Sequence[SimulatedRecord], plant: Plant, title: str, bench: Bench, file_format: str
+    records: Sequence[SimulatedRecord],
+    plant: Plant,
+    title: str,
+    bench: Bench,
+    file_format: str,
+    declared: tuple[str, ...],
 ) -> str:
     """Text of campaign.toml."""
     lines = [
@@ -143,8 +155,7 @@ def _toml(
         f"rate = {float(bench.rate)!r}",
         "",
         "[model]",
-        'stiffness = ["linear", "abs_quadratic", "cubic"]',
-        'damping = ["linear", "abs_quadratic", "cubic"]',
+        *(f"{kind} = {json.dumps(_terms(declared, kind))}" for kind in ("stiffness", "damping")),
     ]
     for record in records:
         lines += ["", "[[record]]", f'file = "{record.name}.{file_format}"']

@@ -1,4 +1,4 @@
-"""The small campaign inside the package: a horizontal isolator whose base model lacks its dry friction.
+"""The small campaign inside the package: a horizontal isolator whose declared model lacks its dry friction.
 
 Run `python -m isojax.rig.demo_campaign FOLDER` to write it again.
 """
@@ -10,16 +10,21 @@ import numpy as np
 
 from ._bench import Bench
 from ._campaign import write_campaign
+from ._dampers import LinearDamping
 from ._friction import CoulombFriction
-from ._plant import Plant, base_laws
+from ._plant import Plant
 from ._sine_plans import SteppedSine
+from ._springs import CubicStiffness, LinearStiffness
 
 SEED = 20240611
 """Seed of the campaign in the package."""
 
 
 def write_demo_campaign(folder: str | Path, seed: int = SEED) -> Path:
-    """Write the demo campaign: three levels up and down in frequency to fit, one level held out.
+    """Write the demo campaign: two levels up and down in frequency to fit, one level between them held out.
+
+    The friction of 30 N is large beside the drive of 60 to 150 N. A viscous damper cannot follow it, so the
+    declared model misses the held-out motion by a fifth of its rms; with the friction noise alone remains.
 
     Args:
         folder: made if it is not there.
@@ -28,11 +33,17 @@ def write_demo_campaign(folder: str | Path, seed: int = SEED) -> Path:
     Returns:
         Path of campaign.toml.
     """
-    plant = Plant((*base_laws(1.12e6, -7.1e8, 2.48e11, 1.01e4, -3.6e5, 5.2e6), CoulombFriction(4.0)))
+    spring, damper = (LinearStiffness(1.12e6), CubicStiffness(1.5e11)), LinearDamping(6e3)
     frequencies = tuple((np.arange(40, 65, 3) / 10).tolist())
-    plan = SteppedSine((50.0, 90.0, 140.0), frequencies, cycles=15, holdout_levels=(120.0,))
-    bench = Bench(rate=500.0, noise=0.01, drift=0.0005)
-    return write_campaign(folder, plant, plan, seed, "isojax demo: stepped sine, horizontal", bench)
+    return write_campaign(
+        folder,
+        Plant((*spring, damper, CoulombFriction(30.0))),
+        SteppedSine((60.0, 150.0), frequencies, cycles=15, holdout_levels=(100.0,)),
+        seed,
+        "isojax demo: stepped sine, horizontal",
+        Bench(rate=500.0, noise=0.008, drift=0.0005),
+        declared=("linear_stiffness", "cubic_stiffness", "linear_damping"),
+    )
 
 
 if __name__ == "__main__":

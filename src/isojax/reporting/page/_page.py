@@ -46,7 +46,7 @@ def render_page(loop: Loop, health: CampaignHealth | None = None) -> str:
 
     Args:
         loop: the closed loop.
-        health: of its campaign; worked out here if omitted.
+        health: of its campaign; computed here if omitted.
 
     Returns:
         The page.

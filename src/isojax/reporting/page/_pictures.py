@@ -114,7 +114,7 @@ def _draw(
 
 def _error_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
     """Draw the errors before and after."""
-    goodness = "Segments restarted, over the noise. One is all that noise allows."
+    goodness = "Segments restarted, squared error over squared noise. 1 means noise alone."
     free = "Each record simulated from start to end, nothing fed back."
     return (
         *_draw("goodness of fit", goodness, plot_errors, before, after),
@@ -124,7 +124,7 @@ def _error_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
 
 def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tuple[Picture, ...]:
     """Draw the ranking behind each finding, or behind the verdict, and the effects by themselves."""
-    caption = "Score of each absent effect, what a refit would absorb projected out; χ²/dof where refitted."
+    caption = "Score of each absent effect, net of what a refit would absorb; χ²/dof where refitted."
     rankings = [(one.ranking, one.effect, one.indistinguishable) for one in loop.findings]
     if not rankings:
         rankings = [(loop.last.ranking, None, ())]
@@ -142,7 +142,7 @@ def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tup
             )
             pictures.append(Picture(name, caption, encode(figure), True))
     if before is not None and any(run.record.dwells for run in before.restarts.runs):
-        caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force stays."
+        caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force remains."
         pictures += _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
     return tuple(pictures) + _effect_pictures(loop)
 
@@ -154,7 +154,9 @@ def _remainder_pictures(loop: Loop) -> tuple[Picture, ...]:
         return ()
     pictures: tuple[Picture, ...] = ()
     if remainder.dwells:
-        caption = "One is the noise. Level and frequency at which the model errs."
+        caption = (
+            "Rms over the noise: 1 means noise alone. Shows at which level and frequency the model fails."
+        )
         pictures += _draw("map of the residual", caption, plot_remainder_map, remainder.dwells)
     caption = "Drive less inertia less model, averaged; a law of x and v has one value at each point."
     pictures += _draw("force residual over the plane", caption, plot_force_residual_map, remainder.force_map)
@@ -197,8 +199,8 @@ def _motion(loop: Loop) -> tuple[float, float, float]:
 def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
     """Draw the worst record against the models, and what they leave."""
     place, low, high = worst_window(before)
-    caption = "Free run, nothing fed back; the record on which the model before is worst."
-    zoomed = "The same, at the cycles where the model before is worst."
+    caption = "Free run, nothing fed back: the record with the largest error before."
+    zoomed = "The same record at the cycles with the largest error before."
     left, right = residual(before), None if after is None else residual(after)
     return (
         *_draw("time history", caption, plot_time_history, before, after, record=place, wide=True),
@@ -213,17 +215,23 @@ def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
             window=(low, high),
         ),
         *_draw(
-            "where the model errs",
-            "One is the noise. A trend over frequency is a hint.",
+            "residual of each dwell",
+            "1 means noise alone. A trend over frequency hints at the missing effect.",
             plot_where,
             before,
             after,
         ),
         *_draw("residual", "Whole record, one scale.", plot_residual, before, after, record=place),
-        *_draw("autocorrelation", "Fitted records; white noise stays inside.", plot_correlation, left, right),
+        *_draw(
+            "autocorrelation",
+            "Fitted records; white noise stays inside the band.",
+            plot_correlation,
+            left,
+            right,
+        ),
         *_draw(
             "cross-correlation",
-            "Inside the band: nothing of the drive is left in it.",
+            "Inside the band the residual holds nothing of the drive.",
             plot_correlation,
             left,
             right,
@@ -246,7 +254,9 @@ def _force_pictures(guess: ClassicalGuess, before: Fit | None, after: Fit | None
         for what in ("stiffness", "damping"):
             pictures += _draw(f"equivalent {what}", caption, plot_equivalent, guess, fits, what=what)
     if before is not None:
-        caption = "Drive less inertia; models with memories at rest. Beyond the visited range: extrapolation."
+        caption = (
+            "Drive less inertia; internal states at rest. Outside the visited range the curves extrapolate."
+        )
         for what in ("stiffness", "damping"):
             pictures += _draw(
                 f"restoring force, {what}", caption, plot_restoring_force, before, after, what=what
@@ -258,7 +268,7 @@ def _health_pictures(before: Fit, after: Fit | None, health: CampaignHealth) -> 
     """Draw how the stiffness scatters between records, and how the dwells lie on the model's branches."""
     pictures: tuple[Picture, ...] = ()
     if len(before.campaign.records) > 1 and np.any(before.restarts.stiffness):
-        caption = "Scatter is data health; a trend in the order of the test is drift."
+        caption = "Random scatter is a property of the test; a trend in the order of the records is drift."
         pictures += _draw(
             "stiffness of each record", caption, plot_stiffness_scatter, before, after, wide=True
         )
@@ -267,6 +277,6 @@ def _health_pictures(before: Fit, after: Fit | None, health: CampaignHealth) -> 
         caption = "Each measured dwell on the fitted model's branch, by level; unstable above one."
         pictures += _draw("multipliers of the dwells", caption, plot_dwell_stability, known)
     if any(np.isfinite(one.nearness) for one in known):
-        caption = "The fold at which the dwell's own branch ends; near it, drift moves the motion far."
+        caption = "The fold at which the dwell's branch ends; near it a small drift changes the motion a lot."
         pictures += _draw("distance to folds", caption, plot_dwell_stability, known, what="fold")
     return pictures

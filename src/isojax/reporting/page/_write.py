@@ -39,7 +39,7 @@ def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None =
     Args:
         loop: the closed loop.
         folder: where they go; made if it is not there. Other files in it stay as they are.
-        health: of its campaign; worked out here if omitted.
+        health: of its campaign; computed here if omitted.
 
     Raises:
         ValueError: if something else than a folder is in the way, or a model that was found is not finite.

@@ -188,7 +188,7 @@ def _threads(
             ends = np.array([frequency[few], frequency[many]])
             sizes = np.array([values[orbit, few], values[near, many]])
             curves.append((ends, sizes, np.array([stable[orbit, few], stable[near, many]])))
-        # What is left over meets in a fold between the two frequencies.
+        # Orbits without a partner meet in a fold between the two frequencies.
         for one, other in zip(left[::2], left[1::2], strict=False):
             pair = [one, other]
             curves.append((frequency[[many, many]], values[pair, many], stable[pair, many]))

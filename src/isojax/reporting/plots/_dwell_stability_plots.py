@@ -51,7 +51,7 @@ def plot_dwell_stability(
         ax.axhline(1.0, color="black", linewidth=0.9, linestyle="--")
         ax.set_ylim(0.0, max(1.08, *(1.05 * one.spectral_radius for one in known)) if known else 1.08)
         ax.set_ylabel("|μ| [1]")
-        entitle(ax, "how much of a disturbance is left after a cycle")
+        entitle(ax, "share of a disturbance that remains after a cycle")
     else:
         ax.axhspan(1.04 * reach, 1.2 * reach, color=NEUTRAL, alpha=0.2, linewidth=0)
         marks = np.arange(0.0, reach + 1.0, 10.0)

@@ -23,12 +23,12 @@ def plot_ranking(
     indistinguishable: Sequence[str] = (),
     ax: Axes | None = None,
 ) -> Figure:
-    """Draw how loudly the residual speaks for each effect: |z|, best ten.
+    """Draw the score of each absent effect, |z|, the best ten.
 
     Args:
         ranking: candidates, best first.
         effect: the one that was found, if any.
-        indistinguishable: catalogue names that the data cannot tell from it.
+        indistinguishable: catalogue names that the data cannot distinguish from it.
         ax: axes to draw on.
 
     Returns:
@@ -39,7 +39,7 @@ def plot_ranking(
     kinds = [_kind(candidate, effect, indistinguishable) for candidate in shown]
     styles = {
         "found": (AFTER, "", AFTER),
-        "cannot be told apart": (_LIKE, "//", AFTER),
+        "not distinguishable": (_LIKE, "//", AFTER),
         "wrong sign or gains energy": (_WRONG, "xx", BEFORE),
         "weaker": (NEUTRAL, "", NEUTRAL),
     }
@@ -61,7 +61,7 @@ def plot_ranking(
     ax.set_xlabel("score |z| [standard deviations]")
     if shown:
         ax.legend(fontsize=7.5, loc="upper right", bbox_to_anchor=(1.0, -0.16), ncols=4, frameon=False)
-    entitle(ax, "how loudly the residual speaks for each effect")
+    entitle(ax, "score of each absent effect")
     return figure
 
 
@@ -70,7 +70,7 @@ def _kind(candidate: Candidate, effect: str | None, indistinguishable: Sequence[
         return "found"
     if not candidate.admissible:
         return "wrong sign or gains energy"
-    return "cannot be told apart" if candidate.effect in indistinguishable else "weaker"
+    return "not distinguishable" if candidate.effect in indistinguishable else "weaker"
 
 
 def _beside(candidate: Candidate) -> str:

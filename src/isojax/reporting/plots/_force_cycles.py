@@ -13,7 +13,7 @@ _POINTS = 256
 """Points of a cycle."""
 
 _SETTLING = 10
-"""Cycles that memories get to become periodic."""
+"""Cycles after which internal states count as periodic."""
 
 
 class Cycles(NamedTuple):
@@ -41,7 +41,7 @@ def trace_cycles(model: Isolator, amplitudes: Float[np.ndarray, " amplitude"], f
         frequency: [Hz].
 
     Returns:
-        The cycles, memories settled.
+        The cycles, internal states settled.
     """
     omega = 2.0 * np.pi * frequency
     phase = 2.0 * np.pi * np.arange(_POINTS) / _POINTS

@@ -25,7 +25,7 @@ def measured_forces(
     """Give the restoring force that a record implies: drive less inertia.
 
     Args:
-        fit: tells mass, excitation and what was measured.
+        fit: gives mass, excitation and what was measured.
         record: the record.
 
     Returns:
@@ -101,7 +101,7 @@ def _crossings(
 
 
 def _slice(model: Isolator, grid: Float[np.ndarray, " point"], what: str) -> Float[np.ndarray, " point"]:
-    """Give the force along one axis of the plane of x and v, memories at rest."""
+    """Give the force along one axis of the plane of x and v, internal states at rest."""
     along, zero = jnp.asarray(grid), jnp.zeros(grid.size)
     pair = (along, zero) if what == "stiffness" else (zero, along)
     return np.asarray(model.restoring_force((*pair, *(zero,) * model.internal_states)))

@@ -71,7 +71,7 @@ def plot_correlation(
     Args:
         before: residual of the declared model.
         after: residual of the extended model; omitted where there is none.
-        what: what the residual is held against.
+        what: what the residual is correlated with.
         ax: axes to draw on.
 
     Returns:
@@ -124,7 +124,7 @@ def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None)
     ax.set_ylabel("rms residual / noise [1]")
     ax.margins(y=0.25)
     ax.legend(fontsize=7.5, loc="upper right", ncols=2)
-    entitle(ax, "where the model errs: one point a " + ("dwell" if dwelling else "window"))
+    entitle(ax, "residual over the noise: one point a " + ("dwell" if dwelling else "window"))
     return figure
 
 

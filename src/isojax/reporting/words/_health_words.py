@@ -43,7 +43,7 @@ def dwell_words(dwells: Sequence[DwellStability], quantity: str) -> tuple[str, .
     if lost:
         others = len({one.reason for one in lost}) - 1
         lines.append(
-            f"Not told of {len(lost)} of {len(dwells)} dwells, such as {place_words(lost[0])}: "
+            f"{len(lost)} of {len(dwells)} dwells left out (for example {place_words(lost[0])}): "
             f"{lost[0].reason.rstrip('.')}" + (f" (or {others} other reasons)." if others else ".")
         )
     return tuple(lines)
@@ -72,7 +72,7 @@ def _fold_words(known: Sequence[DwellStability], unit: str) -> str:
     return (
         f"By the fitted model, the nearest fold (a jump) is {' or '.join(away)} from "
         f"{place_words(nearest)}; {near} of {len(known)} dwells are within {100 * _NEAR:.0f} % of the drive "
-        "of one. Close to a fold a small drift moves the motion far."
+        "of one. Close to a fold a small drift changes the motion a lot."
     )
 
 
@@ -83,9 +83,9 @@ def _settling_words(known: Sequence[DwellStability]) -> str:
     words = f"|μ| is at most {typeset_number(radius, 3)} ({place_words(slowest)})"
     if radius < 1.0:
         cycles = math.ceil(math.log(0.01) / math.log(max(radius, 1e-9)))
-        return f"{words}: there a disturbance falls to a hundredth in {cycles} cycles."
+        return f"{words}: there a disturbance decays to 1 % in {cycles} cycles."
     count = sum(one.spectral_radius >= 1.0 for one in known)
-    return f"{words}: of {count} measured dwells the model says that they are unstable."
+    return f"{words}: by the model {count} of the measured dwells are unstable."
 
 
 def mains_words(health: CampaignHealth, unit: str) -> tuple[str, ...]:
@@ -145,9 +145,9 @@ def budget_words(budget: DriftBudget, fit: Fit, findings: Sequence[Finding]) -> 
         lines.append(
             f"Repeatability limits {effect_words(finding.effect)}, {entry.spec.symbol} = {found}, to "
             f"± {typeset_number(share.repeatability, 2)} {unit}; noise alone to "
-            f"± {typeset_number(share.noise, 2)} {unit}. Were the scatter of the stiffness "
-            f"({scatter_words(budget.scatter, budget.within)}) not counted, it would pretend "
-            f"± {typeset_number(share.if_ignored, 2)} {unit}."
+            f"± {typeset_number(share.noise, 2)} {unit}. If the scatter of the stiffness "
+            f"({scatter_words(budget.scatter, budget.within)}) were ignored, it would appear "
+            f"as a false ± {typeset_number(share.if_ignored, 2)} {unit}."
         )
     return tuple(" ".join(line.split()) for line in lines)
 
@@ -160,8 +160,8 @@ def budget_rows(budget: DriftBudget, fit: Fit) -> list[tuple[str, str, str, str,
         fit: the final fit.
 
     Returns:
-        Name, value with error, error by noise alone, by repeatability, what the scatter would pretend, share
-        of repeatability in the variance.
+        Name, value with error, error by noise alone, by repeatability, its value if the scatter were
+        ignored, share of repeatability in the variance.
     """
     symbols = {entry.name: entry.spec.symbol for entry in list_parameters(fit.model)}
     rows = []

@@ -101,9 +101,9 @@ def headline(loop: Loop) -> str:
 
 
 def doubt_words(loop: Loop) -> str:
-    """Give what held-out records say against what was named.
+    """Give what held-out records say against the finding.
 
-    They never move a verdict, or they would not be held out; but who reads it must hear them.
+    They never change a verdict, or they would not be held out; but the reader must know.
 
     Args:
         loop: the closed loop.
@@ -116,20 +116,22 @@ def doubt_words(loop: Loop) -> str:
         return ""
     last, rise = after.chi2_per_dof, after.chi2_per_dof - before.chi2_per_dof
     if not math.isfinite(last):
-        return "The held-out records speak against it: the model runs away on them."
+        return "The held-out records contradict it: the model diverges on them."
     if last <= loop.rules.good or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
         return ""
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
     if rise > WORSE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
-        return "The held-out records speak against it: they are predicted worse than without it."
+        return "The held-out records contradict it: they are predicted worse than without it."
     if loop.verdict == "found":
-        return "The held-out records are not explained down to their noise: there the law may be another."
+        return (
+            "The model does not explain the held-out records down to their noise: another law may act there."
+        )
     return ""
 
 
 def _verdict_words(loop: Loop) -> str:
     if not is_successful(loop.after.result):
-        return f"The fit failed, so nothing can be said of the model. {RESULTS[loop.after.result]}"
+        return f"The fit failed, so there is no statement about the model. {RESULTS[loop.after.result]}"
     found = [_found(loop.after, one) for one in loop.findings]
     effects, error = " and ".join(found), error_words(loop.before, loop.after)
     verb = "were" if len(found) > 1 else "was"
@@ -139,7 +141,7 @@ def _verdict_words(loop: Loop) -> str:
         return f"{_capital(effects)}, {verb} missing; {error}."
     if loop.verdict == "partly_explained" and len(found) > 2 and loop.bounds:
         return (
-            f"{_capital(effects)}, explain the records together; so many may be parts that imitate one law "
+            f"{_capital(effects)}, explain the records together; so many may together imitate one law "
             f"which is not known here; {error} (noise alone: 1)."
         )
     if loop.verdict == "partly_explained" and found:
@@ -157,7 +159,11 @@ def _verdict_words(loop: Loop) -> str:
 def _found(fit: Fit, finding: Finding) -> str:
     others = [effect_words(name) for name in finding.indistinguishable if name != finding.effect]
     words = f"{effect_words(finding.effect)}, {strength_words(fit, finding.effect)}"
-    return f"{words} (or {' or '.join(others)}, which these data cannot tell from it)" if others else words
+    return (
+        f"{words} (or {' or '.join(others)}, which these data cannot distinguish from it)"
+        if others
+        else words
+    )
 
 
 def _capital(text: str) -> str:
@@ -189,9 +195,11 @@ def finding_words(finding: Finding) -> tuple[str, ...]:
         lines.append(f"On data that its refit did not see, it {removed}.")
     others = [name for name in finding.indistinguishable if name != finding.effect]
     if others:
-        lines.append(f"These data cannot tell it from: {', '.join(effect_words(name) for name in others)}.")
+        lines.append(
+            f"These data cannot distinguish it from: {', '.join(effect_words(name) for name in others)}."
+        )
         if finding.separating_experiment:
-            lines.append(f"What would part them: {finding.separating_experiment}")
+            lines.append(f"A test that separates them: {finding.separating_experiment}")
     return tuple(lines)
 
 
@@ -229,9 +237,9 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
         lines.append(
             "The scatter from cycle to cycle is not white: it peaks at "
             f"{typeset_number(peak.frequency, 2)} Hz, {typeset_number(peak.height, 2)} times its level at "
-            f"high frequency, and holds {typeset_number(peak.rms, 2)} {unit} rms there. So scatters an "
-            "isolator that something unmeasured shakes, such as a moving floor: measure the floor and "
-            "declare it as [floor]."
+            f"high frequency, and holds {typeset_number(peak.rms, 2)} {unit} rms there. An isolator "
+            "scatters so if something unmeasured shakes it, such as a moving floor: measure the floor "
+            "and declare it as [floor]."
         )
     if health.dwells:
         worst = sorted(health.unsettled, key=lambda one: -one.change)[:3]
@@ -245,8 +253,8 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
     if health.brief_blows:
         names = ", ".join(f"{blow.record} ({blow.samples})" for blow in health.brief_blows)
         lines.append(
-            "Blows of fewer than four samples, whose shape between them, and so the momentum that they "
-            f"gave, is a guess: {names}."
+            "Blows of fewer than four samples, whose shape between samples, and so whose momentum, is "
+            f"uncertain: {names}."
         )
     if health.repeats:
         lines.append(
