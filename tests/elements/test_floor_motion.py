@@ -58,6 +58,4 @@ def test_without_a_record_the_floor_stands_still():
     state = (jnp.asarray(1e-3), jnp.asarray(0.0))
     at = Instant(jnp.asarray(5.0))
     assert model.base(at) is None
-    assert float(model.acceleration(state, at)) == pytest.approx(
-        (5.0 - K * 1e-3) / MASS
-    )
+    assert float(model.acceleration(state, at)) == pytest.approx((5.0 - K * 1e-3) / MASS)
