@@ -9,8 +9,16 @@ import pytest
 
 from isojax import paper
 from isojax._parameters import parameter
-from isojax.elements import AbstractElement, CubicStiffness, LinearDamping, LinearStiffness, SensorGain
-from isojax.models import Instant, Isolator
+from isojax.elements import (
+    AbsQuadraticStiffness,
+    AbstractElement,
+    CoulombFriction,
+    CubicStiffness,
+    LinearDamping,
+    LinearStiffness,
+    SensorGain,
+)
+from isojax.models import ContinuedLaw, Instant, Isolator, Regime
 
 
 @pytest.fixture
@@ -140,3 +148,20 @@ def test_a_sensor_with_memory_follows_the_reading_of_the_instruments_before_it()
     )
     np.testing.assert_allclose(before.reading(state, Instant(zero), "displacement"), 2e-3, rtol=1e-14)
     np.testing.assert_allclose(after.reading(state, Instant(zero), "displacement"), 4e-3, rtol=1e-14)
+
+
+def test_the_law_that_is_meant_is_said_beside_the_state_and_not_guessed_from_it():
+    model = Isolator(2.0, (AbsQuadraticStiffness(3e6), CoulombFriction(10.0, 1e-3)))
+    state, at = (jnp.asarray(1e-3), jnp.asarray(0.0)), Instant(jnp.asarray(8.0))
+    one = jnp.ones(())
+    np.testing.assert_allclose(model.acceleration(state, at), (8.0 - 3.0) / 2.0, rtol=1e-14)
+    # The law of the other side of rest, carried on to a positive displacement.
+    beside = ContinuedLaw((-one,) * len(model.kinks(state)))
+    np.testing.assert_allclose(model.acceleration(state, at, beside), (8.0 + 3.0) / 2.0, rtol=1e-14)
+    for direction, expected in (
+        (1.0, (8.0 - 3.0 - 10.0) / 2.0),
+        (-1.0, (8.0 - 3.0 + 10.0) / 2.0),
+        (0.0, 0.0),
+    ):
+        sharp = Regime(direction * one, (one,) * len(model.corners(state)))
+        np.testing.assert_allclose(model.acceleration(state, at, sharp), expected, rtol=1e-14)
