@@ -1,10 +1,13 @@
 """A recorded drive at any time."""
 
+from typing import get_args
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from isojax.excitations import Sampled, tabulate
+from isojax.excitations import Hold, Sampled, tabulate
+from isojax.records._campaign import Hold as DeclaredHold
 
 RATE, COUNT = 1000.0, 2000
 OMEGA = 2 * np.pi * 11.0
@@ -18,6 +21,10 @@ def samples():
 @pytest.fixture(scope="module")
 def times():
     return np.random.default_rng(5).uniform(0.3, 1.7, 300)
+
+
+def test_a_campaign_declares_the_holds_that_a_drive_knows():
+    assert get_args(DeclaredHold) == get_args(Hold)
 
 
 def test_band_limited_is_the_sine_that_was_sampled(samples, times):

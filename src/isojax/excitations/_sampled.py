@@ -1,4 +1,4 @@
-"""A drive known at samples: what it does between them is a choice."""
+"""A drive known at samples, and how it runs between them."""
 
 from typing import ClassVar, Literal, cast, get_args
 
@@ -12,12 +12,12 @@ from .._types import Lanes
 from ._base import AbstractExcitation
 
 Hold = Literal["band_limited", "linear", "zero_order"]
+"""As in `isojax.records`, which stands beside this room: neither imports the other."""
 
+_JUST_INSIDE = 1e-9
+"""Distance from the ends of a sample, as a share of it, at which they are read: a jump there lies outside."""
 
-_INSIDE = 1e-9
-"""How far inside a sample its ends are read, as a share of it, so that a jump there falls outside."""
-
-_MARGIN = 256
+_CONTINUATION = 256
 """Samples of continuation on either side of a record that is interpolated by its spectrum."""
 
 
@@ -38,7 +38,7 @@ def tabulate(
     Args:
         values: the samples, at least four.
         rate: samples a second [Hz].
-        hold: what the drive does between samples.
+        hold: how the drive runs between samples.
         substeps: integration steps a sample.
         shift: time by which the drive is delayed [s]. Beyond either end of the record a band-limited drive
             keeps its odd continuation, any other the nearest sample.
@@ -69,7 +69,7 @@ def tabulate(
         windows = np.lib.stride_tricks.sliding_window_view
         return windows(fine, parts + 1)[::parts].copy(), windows(slope, parts + 1)[::parts].copy()
     stages = np.arange(parts + 1) / parts
-    stages[[0, -1]] += _INSIDE, -_INSIDE
+    stages[[0, -1]] += _JUST_INSIDE, -_JUST_INSIDE
     # Sample and share of the sample, kept apart until the shift is known: a long record rounds the sum.
     position = np.arange(values.size)[:, None] + (stages - shift * rate)
     last = values.size - 1
@@ -88,7 +88,7 @@ def _band_limited(
 ) -> tuple[Float[np.ndarray, " fine"], Float[np.ndarray, " fine"]]:
     """Interpolate by zero-padding the spectrum of the oddly continued record."""
     count = values.size
-    margin = min(count - 1, _MARGIN + int(abs(shift) * rate))
+    margin = min(count - 1, _CONTINUATION + int(abs(shift) * rate))
     length = cast(int, next_fast_len(count + 2 * margin, real=True))
     after = min(length - count - margin, count - 1)
     head = 2.0 * values[0] - values[margin:0:-1]
@@ -98,7 +98,7 @@ def _band_limited(
     slope = (extended[-1] - extended[0]) / (length - 1)
     flat = extended - extended[0] - slope * np.arange(length)
     # Faded to zero outside the record: a kink where the period closes would ring far into it.
-    fade = min(margin, after, _MARGIN)
+    fade = min(margin, after, _CONTINUATION)
     ramp = np.sin(0.5 * np.pi * (np.arange(fade) + 0.5) / fade) ** 2
     flat[:fade] *= ramp
     flat[length - fade :] *= ramp[::-1]
@@ -120,8 +120,8 @@ class Sampled(AbstractExcitation):
     Attributes:
         values: the samples [N, or m/s^2 for base excitation], from t = 0.
         sampling_rate: samples a second [Hz].
-        hold: what it does between samples.
-        fine: the drive on a grid `PARTS` times as fine as the samples; worked out from them.
+        hold: how it runs between samples.
+        fine: the drive on a grid `PARTS` times as fine as the samples; computed from them.
         slopes: its time derivative on that grid.
     """
 
@@ -139,7 +139,7 @@ class Sampled(AbstractExcitation):
         Args:
             values: the samples.
             sampling_rate: samples a second [Hz].
-            hold: what the drive does between samples.
+            hold: how the drive runs between samples.
 
         Raises:
             ValueError: if there are fewer than 4 samples or one is not finite, `sampling_rate` is not

@@ -25,7 +25,7 @@ class SteppedSine(AbstractExcitation):
 
     @property
     def starts(self) -> Float[Array, " frequency"]:
-        """Time at which each dwell begins [s]."""
+        """Time at which each dwell starts [s]."""
         lengths = self.cycles / self.frequencies
         return jnp.cumsum(lengths) - lengths
 

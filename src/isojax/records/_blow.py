@@ -11,7 +11,7 @@ ABOVE_NOISE = 5.0
 BRIEF = 0.05
 """Largest share of a record that a blow takes, and share of its peak below which the drive is off."""
 
-_END = 10
+_LAST_TENTH = 10
 """The mean of the last tenth of a record is taken for the position at rest."""
 
 _RELEASED = 0.5
@@ -57,7 +57,7 @@ def blow_samples(drive: Float[np.ndarray, " time"]) -> int:
 
 def rest_position(signal: Float[np.ndarray, " time"]) -> float:
     """Gives the value at which a motion ends: the mean over the last tenth of a record."""
-    return float(np.mean(signal[-max(signal.size // _END, 1) :]))
+    return float(np.mean(signal[-max(signal.size // _LAST_TENTH, 1) :]))
 
 
 def ring_down(record: Record) -> Float[np.ndarray, " time"]:

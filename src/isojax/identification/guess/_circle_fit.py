@@ -25,13 +25,13 @@ class CircleFit:
     lines: int
 
 
-_FEWEST_LINES = 4
+_FEWEST_POINTS = 4
 """Lines of large mobility without which no circle is fitted."""
 
 _FEWEST_NEAR = 3
 """Lines near the resonance without which it has no damping ratio."""
 
-_NEAR = 2.5
+_NEAR_RESONANCE = 2.5
 """Angle from the diameter up to which a line is near the resonance [rad]: beyond, noise dominates it."""
 
 _NO_CIRCLE = CircleFit(float("nan"), float("nan"), float("nan"), float("nan"), 0)
@@ -59,12 +59,12 @@ def fit_circle(
     Source: D. J. Ewins, Modal Testing, 2nd ed., sec. 4.3 (circle-fit method); named before eq. (9) of the
     paper.
     """
-    if frequency.size < _FEWEST_LINES:
+    if frequency.size < _FEWEST_POINTS:
         return _NO_CIRCLE
     omega = 2 * np.pi * frequency
     mobility = 1j * omega * receptance
     chosen = np.abs(mobility) >= share * np.max(np.abs(mobility))
-    if np.count_nonzero(chosen) < _FEWEST_LINES:
+    if np.count_nonzero(chosen) < _FEWEST_POINTS:
         return _NO_CIRCLE
     omega, mobility = omega[chosen], mobility[chosen]
     unit = float(np.max(np.abs(mobility)))
@@ -76,7 +76,7 @@ def fit_circle(
         return _NO_CIRCLE
     spokes = (x + 1j * y) - centre
     theta = -np.angle(spokes / (centre / abs(centre)))
-    near = np.abs(theta) < _NEAR
+    near = np.abs(theta) < _NEAR_RESONANCE
     if np.count_nonzero(near) < _FEWEST_NEAR:
         return _NO_CIRCLE
     # The half tangent grows without bound away from resonance: its derivative there weights each line.

@@ -6,10 +6,10 @@ import itertools
 import numpy as np
 from jaxtyping import Float
 
-_FEWEST = 3
+_FEWEST_HALF_CYCLES = 3
 """Half cycles without which no decrement is estimated."""
 
-_END = 5
+_LAST_FIFTH = 5
 """The mean of the last fifth of a decay is taken for the position at rest."""
 
 
@@ -58,7 +58,7 @@ def logarithmic_decrement(
         small = np.flatnonzero(amplitude[start:] < floor * amplitude[start])
         stop = start + int(small[0]) if small.size else amplitude.size
         amplitude, frequency = amplitude[start:stop], frequency[start:stop]
-    if amplitude.size < _FEWEST:
+    if amplitude.size < _FEWEST_HALF_CYCLES:
         return Decrement(amplitude, frequency, float("nan"), float("nan"))
     slope = np.polynomial.polynomial.polyfit(np.arange(amplitude.size), np.log(amplitude), 1)[1]
     delta = -2.0 * float(slope)
@@ -76,4 +76,4 @@ def about_rest(output: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]
     Returns:
         The decay less that mean.
     """
-    return output - np.mean(output[-max(1, output.size // _END) :])
+    return output - np.mean(output[-max(1, output.size // _LAST_FIFTH) :])

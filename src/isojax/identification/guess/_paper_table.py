@@ -36,7 +36,7 @@ class PaperTable:
     notes: tuple[str, ...]
 
 
-def _resonance_points(resonances: tuple[Resonance, ...], side: str) -> dict[str, Float[np.ndarray, "_ 2"]]:
+def _equivalent_points(resonances: tuple[Resonance, ...], side: str) -> dict[str, Float[np.ndarray, "_ 2"]]:
     """Give amplitude and equivalent coefficient by sweep direction."""
     rows: dict[str, list[tuple[float, float]]] = {}
     for one in resonances:
@@ -100,7 +100,7 @@ def paper_table(
         notes.append(f"No damping ratio from {', '.join(without)}: the sweep ends too early for it.")
     for order in (2, 1, 0):
         laws = {
-            side: fit_equivalent_law(_resonance_points(resonances, side), side, order)
+            side: fit_equivalent_law(_equivalent_points(resonances, side), side, order)
             for side in ("stiffness", "damping")
         }
         (spring, spring_notes), (damper, damper_notes) = laws["stiffness"], laws["damping"]

@@ -21,7 +21,7 @@ _FREE_ORDERS = 3
 _COMMON_ORDERS = 12
 """Highest harmonic that all these cycles have in common, where a cycle has 60 samples and more."""
 
-_UNSETTLED = 1e-3
+_FALSE_REPORT = 1e-3
 """Chance, over all dwells tested, that a settled one is reported as unsettled."""
 
 _FEW_SAMPLES = 4
@@ -118,7 +118,7 @@ def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth
         for dwell in record.dwells
         if (result := cycle_change(record, dwell)) is not None
     ]
-    limit = _UNSETTLED / max(len(tested), 1)
+    limit = _FALSE_REPORT / max(len(tested), 1)
     unsettled = tuple(one for one in tested if one.p_value < limit and one.change > smallest_change)
     peak = noise_peak(campaign) if campaign.floor is None else None
     return DataHealth(len(tested), unsettled, _repeat_differences(campaign), brief_blows(campaign), peak)

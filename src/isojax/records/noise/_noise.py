@@ -18,6 +18,9 @@ NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_f
 _SETTLED_QUANTILE = 0.25
 """Quantile of the dwells' scatters that is taken for noise: up to three quarters of them may be unsettled."""
 
+_FEWEST_DWELLS = 4
+"""Dwells without which the median is taken instead."""
+
 _UNSETTLED = 1e-3
 """Chance that a settled dwell scatters so much that it is left out."""
 
@@ -26,6 +29,9 @@ _TRANSIENT = 1.2
 
 _FLOOR_SPANS = ((0.35, 0.5), (0.5, 0.65), (0.65, 0.8), (0.8, 0.95))
 """Sections of the noise band, as shares of it, whose spectral floors are compared."""
+
+_WHOLE_SPAN = (0.4, 0.95)
+"""The section for a record that is too short for these."""
 
 _EQUAL_FLOORS = 3.0
 """Standard errors within which two floors count as equal."""
@@ -161,7 +167,7 @@ def cycle_scatter(record: Record, band: NoiseBand) -> float:
     if not scatters.size:
         return float("nan")
     squares, freedom = scatters.T
-    quantile = _SETTLED_QUANTILE if squares.size >= 4 else 0.5
+    quantile = _SETTLED_QUANTILE if squares.size >= _FEWEST_DWELLS else 0.5
     level = np.quantile(squares * freedom / scipy.stats.chi2.ppf(quantile, freedom), quantile)
     for _ in range(3):
         settled = squares * freedom <= level * scipy.stats.chi2.isf(_UNSETTLED, freedom)
@@ -218,11 +224,11 @@ def high_frequency_floor(record: Record, band: NoiseBand) -> float:
         rms per sample in the output's unit.
     """
     output = ring_down(record)
-    spans = [(low * band.highest, high * band.highest) for low, high in _FLOOR_SPANS]
+    whole, *spans = [(low * band.highest, high * band.highest) for low, high in (_WHOLE_SPAN, *_FLOOR_SPANS)]
     found = [(*spectral_floor(output, band, span), span) for span in spans]
     known = sorted(one for one in found if np.isfinite(one[0]))
     if not known:  # a short record has too few lines for narrow sections
-        density, _ = spectral_floor(output, band, (0.4 * band.highest, 0.95 * band.highest))
+        density, _ = spectral_floor(output, band, whole)
     else:
         density, error, quietest = known[0]
         alike = [quietest]
@@ -252,7 +258,7 @@ def _repeat_scatter(record: Record, group: list[Record], band: NoiseBand) -> flo
     for other in group:
         difference = repeat_difference(record, other)
         if difference is not None:
-            density, _ = spectral_floor(difference, band, (0.0, 0.95 * band.highest))
+            density, _ = spectral_floor(difference, band, (0.0, _WHOLE_SPAN[1] * band.highest))
             squares.append(0.5 * _rms_of_density(density, band) ** 2)
     known = [one for one in squares if np.isfinite(one)]
     return float(np.sqrt(np.mean(known))) if known else float("nan")

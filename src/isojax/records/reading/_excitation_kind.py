@@ -11,7 +11,7 @@ from ._find_dwells import rising_crossings, segment_dwells
 _TENTHS = 10
 """Sections of a record whose rms values are compared."""
 
-_EARLY = 3
+_EARLY_TENTHS = 3
 """A free motion is largest in one of so many first sections."""
 
 _DIED_OUT = 0.7
@@ -102,7 +102,7 @@ def _dies_out(response: Float[np.ndarray, " time"]) -> bool:
     """Whether the motion is largest near its start and has decayed by its end."""
     sections = np.array_split(response - rest_position(response), _TENTHS)
     size = np.array([np.sqrt(np.mean(section**2)) for section in sections])
-    return bool(np.argmax(size) < _EARLY and size[-1] < _DIED_OUT * np.max(size))
+    return bool(np.argmax(size) < _EARLY_TENTHS and size[-1] < _DIED_OUT * np.max(size))
 
 
 def _is_brief(drive: Float[np.ndarray, " time"]) -> bool:

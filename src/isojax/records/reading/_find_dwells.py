@@ -28,13 +28,13 @@ _SURE = 0.1
 _SHARED = 0.5
 """Share of the step in period within which the crossing between two dwells lies on both lines."""
 
-_GAP = 2.5
+_ADJACENT = 2.5
 """Periods by which two dwells that follow each other are apart at most."""
 
 _SAME_PERIOD, _SAME_PHASE = 2e-3, 0.1
 """Relative difference in period, and distance in periods, of two lines that are one dwell."""
 
-_END = 1.5
+_NEAR_END = 1.5
 """Periods within which a dwell reaches to the start or the end of the signal."""
 
 _RESOLUTION = 0.5
@@ -130,7 +130,7 @@ def segment_dwells(signal: Float[np.ndarray, " time"], rate: float) -> tuple[Dwe
             period - spans[-1][2]
         ):
             start = crossings[first - 1]
-        if spans and start - spans[-1][1] < _GAP * period:
+        if spans and start - spans[-1][1] < _ADJACENT * period:
             earlier = spans[-1]
             same = abs(earlier[2] / period - 1.0) < _SAME_PERIOD
             if same and abs(start - earlier[1]) < _SAME_PHASE * period:
@@ -141,9 +141,9 @@ def segment_dwells(signal: Float[np.ndarray, " time"], rate: float) -> tuple[Dwe
     if not spans:
         return ()
     length = signal.size / rate
-    if spans[0][0] < _END * spans[0][2]:
+    if spans[0][0] < _NEAR_END * spans[0][2]:
         spans[0] = (0.0, *spans[0][1:])
-    if length - spans[-1][1] < _END * spans[-1][2]:
+    if length - spans[-1][1] < _NEAR_END * spans[-1][2]:
         spans[-1] = (spans[-1][0], length, spans[-1][2])
     dwells = []
     for opening, end, period in spans:

@@ -84,7 +84,7 @@ def read_channels(
     ground = None if sections["floor"] is None else sections["floor"]["column"]
     columns = read_columns(file, list(dict.fromkeys(one for one in (drive, response, ground, clock) if one)))
     total = columns[drive].samples.size
-    start, stop = _span(where, file, entry, total)
+    start, stop = _checked_span(where, file, entry, total)
     raw_input = _finite(file, drive, columns[drive].samples[start:stop], start) * factors[0]
     raw_output = _finite(file, response, columns[response].samples[start:stop], start) * factors[1]
     floor = None
@@ -102,7 +102,7 @@ def read_channels(
     )
 
 
-def _span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:
+def _checked_span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:
     start, stop = entry["start"], total if entry["stop"] is None else entry["stop"]
     if start >= total or stop > total:
         wrong = f"start = {start}" if start >= total else f"stop = {stop}"

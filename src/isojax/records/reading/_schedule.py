@@ -11,7 +11,7 @@ from ..formats import numbers, read_table
 
 _HEADINGS = ("start_s", "frequency_hz", "cycles")
 
-_FEWEST_CYCLES = 2.0
+_SHORTEST_DWELL = 2.0
 """A dwell that the record cuts shorter is left out."""
 
 
@@ -93,7 +93,7 @@ def scheduled_dwells(
     for opening, end, (_, frequency, _) in zip(rows[:, 0], np.minimum(ends, following), rows, strict=True):
         first, last = max(round(opening * rate), start), min(round(end * rate), stop)
         cycles = (last - first) * frequency / rate
-        if cycles >= _FEWEST_CYCLES:
+        if cycles >= _SHORTEST_DWELL:
             dwells.append(Dwell(first - start, last - start, float(frequency), float(cycles)))
     if not dwells:
         raise ValueError(

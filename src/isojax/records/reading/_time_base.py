@@ -16,7 +16,7 @@ _GAP = 1.5
 _JITTER = 4.0
 """Jitters of the time steps by which a rounded time column may deviate from a uniform one."""
 
-_WHOLE = 1e-6
+_WHOLE_RATE = 1e-6
 """Relative distance from a whole number of samples per second below which a rate is rounded to it."""
 
 
@@ -104,4 +104,4 @@ def uniform_rate(file: Path, time: Float[np.ndarray, " time"], column: str, firs
             f"off the even grid of {step:.6g} s; resample the record"
         )
     rate = 1.0 / step
-    return float(round(rate)) if abs(rate / max(round(rate), 1) - 1.0) < _WHOLE else rate
+    return float(round(rate)) if abs(rate / max(round(rate), 1) - 1.0) < _WHOLE_RATE else rate

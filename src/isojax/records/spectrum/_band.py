@@ -16,19 +16,19 @@ from ._noise_band import NoiseBand
 _AVERAGES = 15
 """Segments over which the spectrum of a floor is averaged; they overlap by half."""
 
-_FEWEST_LINES = 8
+_FEWEST_FLOOR_LINES = 8
 """Lines of a spectrum without which no floor is estimated."""
 
-_QUIET = 0.1
+_NOISE_QUANTILE = 0.1
 """Quantile of the lines of an output's spectrum that is taken for its noise."""
 
-_ABOVE_NOISE = 30.0
+_SIGNAL_TO_NOISE = 30.0
 """Power density over that noise above which a line belongs to the signal."""
 
-_MARGIN = 1.25
+_HEADROOM = 1.25
 """The band ends at this multiple of the highest such line ..."""
 
-_HIGHEST = 0.8
+_HIGHEST_SIGNAL = 0.8
 """... but at this share of half the rate at most."""
 
 _FIRST_POWER = 1e-3
@@ -90,7 +90,7 @@ def spectral_floor(
     frequency, density = power_spectrum(signal, band.rate, _AVERAGES)
     inside = np.any([(frequency > low) & (frequency < high) for low, high in spans], axis=0)
     lines = np.count_nonzero(inside)
-    if lines < _FEWEST_LINES:
+    if lines < _FEWEST_FLOOR_LINES:
         return float("nan"), float("nan")
     freedom, alike = _freedom(signal.size, 2 * (frequency.size - 1))
     level = np.median(density[inside] / band.power_gain(frequency[inside]))
@@ -136,9 +136,9 @@ def _find_band(record: Record) -> Band:
     nyquist = 0.5 * record.rate
     slowest = 2.0 * record.rate / record.time.size
     frequency, output = power_spectrum(record.output, record.rate)
-    floor = float(np.quantile(output[frequency > 0.0], _QUIET))
-    above = frequency[output > _ABOVE_NOISE * max(floor, 1e-300)]
-    highest = min(_MARGIN * float(above[-1]) if above.size else nyquist, _HIGHEST * nyquist)
+    floor = float(np.quantile(output[frequency > 0.0], _NOISE_QUANTILE))
+    above = frequency[output > _SIGNAL_TO_NOISE * max(floor, 1e-300)]
+    highest = min(_HEADROOM * float(above[-1]) if above.size else nyquist, _HIGHEST_SIGNAL * nyquist)
     if record.dwells:
         lowest = 0.5 * min(dwell.frequency for dwell in record.dwells)
     elif record.rings_down:

@@ -12,7 +12,7 @@ from ._basis import drifting_harmonics, usable_orders
 MOST_HARMONICS = 120
 """The harmonics of dry friction fall as 1/n, so the fortieth may still exceed the noise."""
 
-_FEWEST_CYCLES = 4.0
+_NOISE_CYCLES = 4.0
 """Cycles at the end of a dwell, a quarter of them and at least so many, that its noise is estimated from."""
 
 _LONGEST_END = 0.7
@@ -33,7 +33,7 @@ class Rest(NamedTuple):
 
 def dwell_window(record: Record, dwell: Dwell) -> int | None:
     """Gives the samples of a dwell's settled end that its noise comes from; None if it is too short."""
-    window = round(max(dwell.cycles / 4.0, _FEWEST_CYCLES) * record.rate / dwell.frequency)
+    window = round(max(dwell.cycles / 4.0, _NOISE_CYCLES) * record.rate / dwell.frequency)
     return None if window > _LONGEST_END * (dwell.stop - dwell.start) else window
 
 

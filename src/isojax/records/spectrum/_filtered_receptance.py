@@ -61,7 +61,7 @@ def receptance(campaign: Campaign, record: Record) -> Receptance:
     Source:
         The paper's eq. (4); relative coordinate for base excitation.
     """
-    return _receptance(campaign, record, record.input, record.output)
+    return _receptance_of(campaign, record, record.input, record.output)
 
 
 def compare_filtered_receptance(
@@ -98,8 +98,8 @@ def compare_filtered_receptance(
         for one in (record.raw_input, record.raw_output)
     )
     return FilterComparison(
-        raw=_receptance(campaign, record, record.raw_input, record.raw_output),
-        filtered=_receptance(campaign, record, drive, response),
+        raw=_receptance_of(campaign, record, record.raw_input, record.raw_output),
+        filtered=_receptance_of(campaign, record, drive, response),
     )
 
 
@@ -112,7 +112,7 @@ def to_displacement(
     return amplitude / (2j * np.pi * frequency) ** TIME_DERIVATIVES[quantity]
 
 
-def _receptance(
+def _receptance_of(
     campaign: Campaign,
     record: Record,
     drive: Float[np.ndarray, " time"],
