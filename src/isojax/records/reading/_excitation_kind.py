@@ -17,6 +17,9 @@ _EARLY_TENTHS = 3
 _DIED_OUT = 0.7
 """A motion whose last section is above this share of its largest one has not died out."""
 
+_CLEAR_BLOW = 2.0
+"""The peak of a blow is so many times the level above which a sample is no noise."""
+
 _NO_DRIVE = 0.1
 """A drive below this share of the inertia, within the band of the motion, did not cause the motion ..."""
 
@@ -109,7 +112,7 @@ def _is_brief(drive: Float[np.ndarray, " time"]) -> bool:
     """Whether the drive exceeds its noise in a small share of the record only."""
     peak = float(np.max(np.abs(drive - np.median(drive))))
     share = np.count_nonzero(driven_samples(drive)) / drive.size
-    return bool(peak > 2.0 * ABOVE_NOISE * drive_noise(drive) and share < BRIEF)
+    return bool(peak > _CLEAR_BLOW * ABOVE_NOISE * drive_noise(drive) and share < BRIEF)
 
 
 def _is_idle(
