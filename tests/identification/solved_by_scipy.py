@@ -1,6 +1,6 @@
-"""Campaigns of an isolator whose equation SciPy integrates: the laws are the elements', the integrator is not.
+"""Campaigns of an isolator whose equation SciPy integrates, for effects that the simulated bench lacks.
 
-For effects that the simulated bench does not know. The elements are asked for numbers only.
+The laws are the elements'; the integrator shares nothing with isojax.
 """
 
 from pathlib import Path
