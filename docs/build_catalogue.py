@@ -3,9 +3,9 @@
     python docs/build_catalogue.py FOLDER
 
 A page has the law, the parameters, the look-alikes and the source of an effect, all from its class. What is
-written by hand, such as a signature or a picture, stands in `docs/effects/<name>.md` and is put in between; an
-effect without such a file has a complete page all the same. Pages are made when the site is built and are not
-kept in the repository, so that none can be out of date.
+written by hand, such as a signature or a picture, stands in `docs/effects/<name>.md` and is put in between.
+An effect without such a file has a complete page all the same. Pages are made when the site is built and are
+not kept in the repository, so that none can be out of date.
 """
 
 import inspect

@@ -48,8 +48,10 @@ def test_default_and_choices_of_a_field_are_those_of_the_reader(key):
 
 @pytest.mark.parametrize("side", ["stiffness", "damping"])
 def test_names_of_springs_and_dampers_are_those_of_the_catalogue(side):
-    listed = set(re.findall(r"`(\w+)`", described()["model", side][4]))
-    assert listed == {name.removesuffix(f"_{side}") for name in CATALOGUE if name.endswith(f"_{side}")}
+    ending, *listed = re.findall(r"`(\w+)`", described()["model", side][4])
+    assert ending == f"_{side}"
+    assert len(listed) >= 3
+    assert {f"{name}_{side}" for name in listed} <= set(CATALOGUE)
 
 
 @pytest.mark.parametrize(("title", "text"), EXAMPLES, ids=[title for title, _ in EXAMPLES])
