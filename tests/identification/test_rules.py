@@ -65,8 +65,7 @@ def test_no_two_constants_of_one_name_have_different_values():
     for file in ROOMS.rglob("*.py"):
         for name, value in _constants(file):
             values[name].add(value)
-    # Two thresholds of descriptions, each beside what it describes.
-    assert {name for name, known in values.items() if len(known) > 1} <= {"STANDS_OUT"}
+    assert {name for name, known in values.items() if len(known) > 1} == set()
 
 
 @pytest.fixture(scope="module")
