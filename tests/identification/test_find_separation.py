@@ -237,7 +237,7 @@ def test_gains_of_two_channels_no_test_parts_and_the_words_say_so(heavier):
     told = with_separating_experiment(
         Extension(heavier.before, gained, verdict._replace(finding=finding))
     ).verdict.finding
-    assert told.separating_experiment.startswith("No test that was simulated parts them")
+    assert told.separating_experiment.startswith("No test that was simulated separates them")
     assert told.separating_experiment.endswith("Calibrate.")
     assert told.separation.best.gain < 0.1
 

@@ -48,12 +48,12 @@ class Finding(NamedTuple):
 
     Attributes:
         effect: catalogue name.
-        indistinguishable: catalogue names that these data cannot tell from it.
+        indistinguishable: catalogue names of effects that these data do not distinguish from it.
         p_value: family-wise chance of so large a score without the effect.
         excess_explained: share of chi2 - dof that adding it removed.
         transfer: share of the excess that it removed on records (or halves) that its refit did not see.
         ranking: all candidates, best first.
-        separating_experiment: what test would part the indistinguishable ones, in words.
+        separating_experiment: what test would separate the indistinguishable ones, in words.
         rivals: the indistinguishable effects, with the shapes that imitate the finding best.
         separation: the candidate tests, weighed by simulation; None where none was simulated.
     """

@@ -69,7 +69,7 @@ def project(
     directions = one_hot(model, places, [*own, *units])
     point = fitted.simulator.evaluate(model, directions, fitted.point.nuisances, carried)
     by_record = point.reduced.by_record
-    # A memory that ran away along the motion has no trace: it is as good as hidden.
+    # An internal state that ran away along the motion leaves no trace: its effect is as good as hidden.
     lost = np.flatnonzero(~np.isfinite(np.diagonal(by_record, axis1=1, axis2=2).sum(axis=0)))
     residual = by_record.shape[-1] - 1
     if np.any(lost < count) or residual in lost:

@@ -221,8 +221,8 @@ def strength_place(found: Estimate, score: Score) -> int:
 def follows_freely(fitted: Estimate, found: Estimate) -> bool:
     """Say whether a refit still follows whole records when nothing is fed back.
 
-    Asked only where records are left whole: a memory that never fades can there fit a record from a hidden
-    state of its own choice, and lose it from rest.
+    Asked only where records are left whole: an internal state that never decays can there fit a record
+    from a hidden state of its own choice, and lose it from rest.
 
     Args:
         fitted: the estimate without the effect.

@@ -13,7 +13,7 @@ from ..fitting import Estimate, Nuisances, Search, step_nuisances
 from ..jacobian import effects_without_signal
 from ._projection import project
 
-DRAWS = 20_000
+NULL_DRAWS = 20_000
 
 
 _RAYLEIGH = (math.sqrt(0.5 * math.pi), math.sqrt(2.0 - 0.5 * math.pi))
@@ -179,8 +179,8 @@ def _family_wise(
         return sizes
     values, vectors = np.linalg.eigh(correlation)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = np.random.default_rng(seed).standard_normal((DRAWS, root.shape[0])) @ root.T
+    draws = np.random.default_rng(seed).standard_normal((NULL_DRAWS, root.shape[0])) @ root.T
     draws = np.where(either, np.abs(draws), draws).max(axis=1)
     drawn = np.mean(draws[:, None] >= sizes, axis=0)
     bound = np.minimum(1.0, (either.size + either.sum()) * stats.norm.sf(sizes))
-    return np.where(drawn > 50 / DRAWS, drawn, bound)
+    return np.where(drawn > 50 / NULL_DRAWS, drawn, bound)

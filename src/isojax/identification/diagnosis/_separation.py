@@ -1,4 +1,4 @@
-"""Experiments weighed by how far each would part a finding from its look-alikes."""
+"""Experiments ranked by how far each would separate a finding from its look-alikes."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class Experiment(NamedTuple):
         stepped: whether each stretch of a record is a sine.
         extra_mass: known mass that is bolted on [kg].
         load: known static force on the mass [N].
-        lacking: why the campaign's bench cannot make it; empty if it can.
+        lacking: why the campaign's test rig cannot make it; empty if it can.
     """
 
     name: str
@@ -63,10 +63,10 @@ class Prospect(NamedTuple):
         return min(self.gains, default=float("nan"))
 
     def separated(self, needed: float) -> int:
-        """Count the look-alikes that it parts.
+        """Count the look-alikes that it separates.
 
         Args:
-            needed: expected chi2 from which two effects are told apart.
+            needed: expected chi2 that separates two effects.
 
         Returns:
             How many.
@@ -75,14 +75,14 @@ class Prospect(NamedTuple):
 
 
 class Separation(NamedTuple):
-    """Which test parts a finding from its look-alikes.
+    """Which test separates a finding from its look-alikes.
 
     Attributes:
         effect: catalogue name of the finding.
         others: catalogue names of its look-alikes.
-        prospects: the candidate tests: most pairs parted first, then by their smallest gain; those left out
-            last.
-        needed: expected chi2 from which two effects are told apart.
+        prospects: the candidate tests: most pairs separated first, then by their smallest gain; those left
+            out last.
+        needed: expected chi2 that separates two effects.
         seconds: measuring time of the new test [s].
     """
 
@@ -113,7 +113,7 @@ class Separation(NamedTuple):
         words = best.experiment.words
         if separated == 0:
             return (
-                f"No test that was simulated parts them: the best, {words}, has an expected chi2 of "
+                f"No test that was simulated separates them: the best, {words}, has an expected chi2 of "
                 f"{self._promise(best)} where {self.needed:.2g} is needed."
             )
         promise = self._promise(best)
@@ -125,7 +125,7 @@ class Separation(NamedTuple):
             for name, gain in zip(self.others, best.gains, strict=True)
             if gain < self.needed
         ]
-        return f"{line} It does not part it from: {', '.join(left)}." if left else line
+        return f"{line} It does not separate it from: {', '.join(left)}." if left else line
 
     def _promise(self, prospect: "Prospect | None") -> str:
         """Word the gains: one number a look-alike, named where there are several."""
@@ -138,11 +138,11 @@ class Separation(NamedTuple):
 
 
 def rank_prospects(prospects: tuple[Prospect, ...], needed: float) -> tuple[Prospect, ...]:
-    """Put the tests that part most pairs, and part them farthest, first.
+    """Put the tests that separate most pairs, and separate them farthest, first.
 
     Args:
         prospects: the tests.
-        needed: expected chi2 from which two effects are told apart.
+        needed: expected chi2 that separates two effects.
 
     Returns:
         The same tests in order; those left out last.

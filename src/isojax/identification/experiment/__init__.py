@@ -2,7 +2,7 @@
 
 In: an `Extension` (a model before and after a finding). Out: a `Separation`, the candidate tests with their
 gain.
-Read `_find_separation` (the door), then `_candidate_experiments` (what the bench could do),
+Read `_find_separation` (the door), then `_candidate_experiments` (what the test rig could do),
 `_simulated_records` (what it would record) and `_known_load` (a static load as an element).
 """
 

@@ -1,4 +1,4 @@
-"""Candidate experiments: what a bench that made a campaign could also do.
+"""Candidate experiments: what the test rig of a campaign could also do.
 
 All of them have records of equal length, so that one compiled simulation serves them all.
 """
@@ -117,7 +117,7 @@ def drive_of(
             multisines whose period is the record.
 
     Returns:
-        The drive; its end meets its beginning.
+        The drive; its end meets its start.
     """
     samples, total = outline.samples, DWELLS * outline.samples
     rows = []

@@ -20,7 +20,7 @@ from ._known_load import KnownLoad
 from ._simulated_records import TrialRun, blank_records, missing_channels, trial_run
 
 LOOSE = 100.0
-"""Factor on the spread of the states in which stretches of a planned test begin."""
+"""Factor on the spread of the initial states of the stretches of a planned test."""
 
 
 class _Question(NamedTuple):
@@ -204,7 +204,7 @@ def _made(model: Isolator, experiment: Experiment, question: _Question, rest: fl
     if experiment.load:
         restless = [e.words for e in (*model.elements, *question.probes) if not _rests(e, rest)]
         if restless:
-            return f"the memory of {' and '.join(restless)} would first have to settle under the load"
+            return f"the internal state of {' and '.join(restless)} would first have to settle under the load"
     blank = blank_records(experiment)
     lost = missing_channels(model, blank)
     if lost:
@@ -220,7 +220,7 @@ def _as_tested(model: Isolator, experiment: Experiment) -> Isolator:
 
 
 def _rests(element: AbstractElement, position: float) -> bool:
-    """Say whether a memory that is empty stays empty away from the unloaded rest position."""
+    """Say whether internal states at rest stay at rest away from the unloaded rest position."""
     empty = (jnp.zeros(()),) * element.internal_states
     rates = element.state_rate(jnp.asarray(position), jnp.zeros(()), empty)
     return not any(float(rate) != 0.0 for rate in rates)
@@ -271,12 +271,12 @@ def _of_trial(
     )
     carried = len(model.elements)
     prepared = simulator.prepared(Isolator(model.mass, (*model.elements, *probes), model.excitation), carried)
-    # Nothing may be told by a prior: an offset is no less likely than the motion is large.
+    # Nothing may follow from a prior: an offset is no less likely than the motion is large.
     np.multiply(prepared.spread, LOOSE, out=prepared.spread)
     assumed, units = simulator.starts(model, prepared)
     nuisances = simulator.settle(None, model, carried, question.fitted.point.nuisances.spread)
     states = nuisances.states.copy()
-    # The records tell neither a mean nor a memory: the states are those of the simulation.
+    # The records show neither a mean nor an internal state: the states are those of the simulation.
     states[: starts.shape[1]] = ((starts - assumed[:, : starts.shape[1]]) / units[:, : starts.shape[1]]).T
     return _information(question, simulator, model, probes, nuisances._replace(states=states))
 

@@ -22,8 +22,8 @@ class TrialRun(NamedTuple):
     """An experiment on a model.
 
     Attributes:
-        records: what the bench would file, free of noise.
-        starts: state at the beginning of each stretch, records in turn.
+        records: what the test rig would record, free of noise.
+        starts: initial state of each stretch, records in turn.
         displacement: of each record [m].
     """
 
@@ -116,7 +116,7 @@ def trial_run(
 ) -> TrialRun:
     """Carry out an experiment on a model.
 
-    Each stretch sets out from rest a stretch earlier, so that it begins as the end of the one before it; the
+    Each stretch sets out from rest a stretch earlier, so that it starts as the one before it ends; the
     first of a record follows its last.
 
     Args:

@@ -24,12 +24,12 @@ def build_problem(
     """Cut records into segments for a model.
 
     Where the motion does not decay (a mass without a spring) records are left whole, and only their
-    beginnings may set their initial states, as in a free run: such a motion remembers its start for ever, and
-    a start that the whole record may choose would imitate a missing force.
+    first samples may set their initial states, as in a free run: such a motion remembers its start for ever,
+    and a start that the whole record may choose would imitate a missing force.
 
     Args:
         records: the records.
-        model: the isolator, for its memory.
+        model: the isolator, for its decay time.
         quantity: what the sensor measures.
         hold: what the drive does between samples.
         noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].

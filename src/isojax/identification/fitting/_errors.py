@@ -108,7 +108,7 @@ def restart_records(
         simulator: the records.
         model: the isolator.
         spread: prior standard deviations of the linear stiffness.
-        known: nuisances to begin with; the measured states if omitted.
+        known: nuisances to start from; the measured states if omitted.
         places: see `best_nuisances`.
 
     Returns:
@@ -146,7 +146,7 @@ def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
         One run a record.
     """
     records = problem.records
-    begin = find_initial_states(problem, model)
+    initial = find_initial_states(problem, model)
     whole = problem._replace(
         heads=(),
         segments=tuple(
@@ -154,8 +154,8 @@ def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
         ),
     )
     prepared = Simulator(whole).prepared(model, len(model.elements))
-    states = np.zeros((begin.shape[0], prepared.record.size))
-    states[:, : len(records)] = begin
+    states = np.zeros((initial.shape[0], prepared.record.size))
+    states[:, : len(records)] = initial
     simulated = readings(model, np.ones(prepared.record.size), states, prepared)
     return tuple(
         Run(

@@ -31,22 +31,22 @@ def _carried_over(found: Estimate, simulator: Simulator, places: list[int]) -> N
         places: place of each fitted record among them.
     """
     model, carried, old = found.model, len(found.model.elements), found.point.nuisances
-    begin = simulator.settle(None, model, carried, old.spread)
+    start = simulator.settle(None, model, carried, old.spread)
     own, scales = found.simulator.starts(model, found.simulator.prepared(model, carried))
     starts, units = simulator.starts(model, simulator.prepared(model, carried))
     reached = own + scales * old.states.T
     lanes = {
         (part.record, part.start, part.stop): lane for lane, part in enumerate(simulator.problem.segments)
     }
-    states, segments = begin.states.copy(), begin.segments.copy()
+    states, segments = start.states.copy(), start.segments.copy()
     for lane, part in enumerate(found.problem.segments):
         place = lanes.get((places[part.record], part.start, part.stop))
         if place is not None:
             states[place] = (reached[:, lane] - starts[:, place]) / units[:, place]
             segments[place] = old.segments[lane]
-    stiffness = begin.stiffness.copy()
+    stiffness = start.stiffness.copy()
     stiffness[places] = old.stiffness
-    return begin._replace(states=states, stiffness=stiffness, segments=segments)
+    return start._replace(states=states, stiffness=stiffness, segments=segments)
 
 
 class Evaluation:

@@ -274,7 +274,7 @@ def _not_determined(fit: Fit) -> list[str]:
         f"{fit.free[group[0]]} is not determined: the data hold no trace of it. Fix it."
         if len(group) == 1
         else f"{', '.join(fit.free[place] for place in group)} are not determined apart: the data fix only a "
-        "combination of them. Fix one, or add records that part them."
+        "combination of them. Fix one, or add records that separate them."
         for group in known.partners
     ]
     return lines + [

@@ -1,4 +1,4 @@
-"""Nuisances at given coefficients, and the state in which a record begins."""
+"""Nuisances at given coefficients, and the initial state of a record."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -14,7 +14,7 @@ ROUNDS = 3
 """Gauss-Newton steps for the nuisances at given coefficients; their effect is all but linear."""
 
 RELEASED_ROUNDS = 12
-"""The same where a record begins with a release: its first states are poorly known, its motion is large."""
+"""The same where a record starts with a release: its first states are poorly known, its motion is large."""
 
 WORSE = 1.1
 """Factor on the error of a record up to which a step stands: chi2 is that at the end of the next one."""
@@ -28,7 +28,7 @@ HELD = Spread(1e-9)
 SETTLED = 1e-2
 """Change of chi2, per max(chi2/dof, 1), below which the nuisances stand."""
 
-FIRST_SWINGS = 1.0
+FIRST_PERIODS = 1.0
 """Periods after a release over which its state is sought first."""
 
 SMALL_STEP = 1e-4
@@ -48,7 +48,7 @@ def best_nuisances(
         simulator: the records.
         model: the isolator.
         spread: prior standard deviations of the linear stiffness.
-        known: where to begin; at the measured states if omitted.
+        known: where to start; at the measured states if omitted.
         places: coefficients that have columns at the point; they stay as they are. A search for the same ones
             shares the compiled code.
 
@@ -56,19 +56,19 @@ def best_nuisances(
         The point.
     """
     released = any(record.kind == "free_decay" for record in simulator.problem.records)
-    begin = simulator.settle(known, model, len(model.elements), spread)
+    start = simulator.settle(known, model, len(model.elements), spread)
     if released and known is None:
-        begin = _first_swings(simulator, model, begin)
-    return _settle_from(simulator, model, begin, released, places)
+        start = _first_periods(simulator, model, start)
+    return _settle_from(simulator, model, start, released, places)
 
 
-def _first_swings(simulator: Simulator, model: Isolator, begin: Nuisances) -> Nuisances:
-    """Find the states from which the first swings of each segment follow: over them no phase can run off."""
+def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> Nuisances:
+    """Find the initial states of the first periods of each segment: over them no phase error can grow."""
     problem, carried = simulator.problem, len(model.elements)
 
     def first(segment: Segment) -> Segment:
         record = problem.records[segment.record]
-        length = round(FIRST_SWINGS * record.rate / ringing_frequency(record.output, record.rate))
+        length = round(FIRST_PERIODS * record.rate / ringing_frequency(record.output, record.rate))
         return segment._replace(stop=min(segment.stop, max(segment.start, segment.counted) + max(length, 8)))
 
     short = Simulator(
@@ -76,25 +76,25 @@ def _first_swings(simulator: Simulator, model: Isolator, begin: Nuisances) -> Nu
     )
     found = _settle_from(short, model, short.settle(None, model, carried, HELD), True)
     if not found.is_finite:
-        return begin
+        return start
     own, scales = short.starts(model, short.prepared(model, carried))
     starts, units = simulator.starts(model, simulator.prepared(model, carried))
     states = own + scales * found.nuisances.states.T
-    # Either bench may carry lanes beyond the segments, which hold nothing.
+    # Either simulator may carry lanes beyond the segments, which hold nothing.
     used = slice(len(problem.segments))
-    moved = begin.states.copy()
+    moved = start.states.copy()
     moved[used] = ((states[:, used] - starts[:, used]) / units[:, used]).T
-    return begin._replace(states=moved)
+    return start._replace(states=moved)
 
 
 def _settle_from(
-    simulator: Simulator, model: Isolator, begin: Nuisances, released: bool, places: tuple[int, ...] = ()
+    simulator: Simulator, model: Isolator, start: Nuisances, released: bool, places: tuple[int, ...] = ()
 ) -> Point:
     """Take Gauss-Newton steps of the nuisances until they stand."""
     directions = one_hot(model, places, [1.0] * len(places))
     still = np.zeros(len(places))
     carried = len(model.elements)
-    point = simulator.evaluate(model, directions, begin)
+    point = simulator.evaluate(model, directions, start)
     owner = simulator.prepared(model, carried).record
     for _ in range(RELEASED_ROUNDS if released else ROUNDS):
         if not point.is_finite:
@@ -144,7 +144,7 @@ def _between(old: np.ndarray, new: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
-    """Give the beginning of each record: the samples that the campaign gives for it, else the first second.
+    """Give the first samples of each record: those that the campaign gives for it, else the first second.
 
     Args:
         records: the records.
@@ -161,9 +161,9 @@ def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
 
 
 def find_initial_states(problem: Problem, model: Isolator) -> Float[np.ndarray, "state record"]:
-    """Find the state in which each record begins: the one from which the model follows its beginning best.
+    """Find the initial state of each record: the one from which the model follows its first samples best.
 
-    Internal states begin at rest.
+    Internal states start at rest.
 
     Args:
         problem: the records.

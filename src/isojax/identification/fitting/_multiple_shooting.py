@@ -16,7 +16,7 @@ def fit_by_multiple_shooting(
 
     A free run over a whole record sums up every error of the model, and where a law jumps the run goes
     another way at each reversal that it meets differently: the error has many least values, and a descent
-    ends in the one beside its start. Windows that begin from states of their own forget; what fits them all
+    ends in the one beside its start. Windows that start from states of their own forget; what fits them all
     is near what fits the whole.
 
     Args:

@@ -24,8 +24,8 @@ class Problem(NamedTuple):
         hold: what the drive does between samples.
         noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
         integrator: solver and steps.
-        heads: the beginning of each record, where records are left whole and only their beginnings may set
-            the initial states; empty where every segment settles its own.
+        heads: the first samples of each record, where records are left whole and only these may set the
+            initial states; empty where every segment settles its own.
         step_error: rms error of the integration over the noise of a sample.
         share: share of the samples of which the noise is independent; below 1 where a filter has limited it.
     """

@@ -53,7 +53,7 @@ def residual(fit: Fit) -> Residual:
         fit: the fit.
 
     Returns:
-        The residual of each fitting record, with the correlations by which it is told from white noise.
+        The residual of each fitting record, with the correlations that distinguish it from white noise.
 
     Source: Ljung 1999, System Identification, sec. 16.6 (residual tests with a 99 % band).
     """

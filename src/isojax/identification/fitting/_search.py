@@ -15,7 +15,7 @@ DEFAULT_SOLVER = eqx.tree_at(
     lambda solver: solver.search,
     optx.LevenbergMarquardt(rtol=1e-9, atol=1e-9),
     # optimistix lowers the damping only after a step that attains 99 % of the predicted decrease. Along the
-    # curved valley of coefficients that the records hardly tell apart none does, and the search would creep.
+    # curved valley of coefficients that the records hardly separate none does, and the search would creep.
     optx.ClassicalTrustRegion(high_cutoff=0.75),
 )
 """Levenberg-Marquardt whose damping falls after a step that attains 75 % of the predicted decrease of chi2.

@@ -109,8 +109,8 @@ def _matched(
 def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment, same: float) -> bool:
     """Say whether two segments passed the same test on the same branch.
 
-    Of a dwell frequency and level tell that, wherever in the record it lies; of other windows only a drive
-    that is the same sample by sample.
+    A dwell is the same at equal frequency and level, wherever in the record it lies; another window only
+    where its drive is the same sample by sample.
     """
     first, second = records[one.record], records[other.record]
     frequencies = _frequency(first, one), _frequency(second, other)

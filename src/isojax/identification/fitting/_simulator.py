@@ -23,8 +23,8 @@ HUGE = 1e150
 class Simulator:
     """Simulates a model against a problem; keeps the batches and start states that do not change.
 
-    The batches depend on the delay and on the steps a sample only, the start states on the memories of the
-    model only; both are remade when those change and at no other time.
+    The batches depend on the delay and on the steps a sample only, the start states on the internal states of
+    the model only; both are remade when those change and at no other time.
     """
 
     def __init__(self, problem: Problem, at_rest: bool = False, like: "Simulator | None" = None):
@@ -83,7 +83,7 @@ class Simulator:
         """Give measured start states and their scales.
 
         Args:
-            model: the isolator; the memories of its elements follow the measured motion.
+            model: the isolator; the internal states of its elements follow the measured motion.
             prepared: the batches.
             carried: count of its elements that move the state; all if omitted.
 
@@ -93,10 +93,10 @@ class Simulator:
         carried = len(model.elements) if carried is None else carried
         names = element_names(model)
         known = [self._internal.get(name) for name in names[:carried]] + [None] * len(names[carried:])
-        if any(memory is None for memory in known):
-            memories = np.stack(internal_starts(model, self.problem.records, prepared, carried))
+        if any(states is None for states in known):
+            internal = np.stack(internal_starts(model, self.problem.records, prepared, carried))
             ends = np.cumsum([element.internal_states for element in model.elements])
-            fresh = np.split(memories, ends[:-1], axis=1)
+            fresh = np.split(internal, ends[:-1], axis=1)
             # Nuisances are deviations from the starts, which must therefore stay while they are carried on.
             known = [new if old is None else old for old, new in zip(known, fresh, strict=True)]
             self._internal.update(zip(names[:carried], known[:carried], strict=True))
@@ -108,7 +108,7 @@ class Simulator:
         return rows[0], rows[1]
 
     def settle(self, nuisances: Nuisances | None, model: Isolator, carried: int, spread: Spread) -> Nuisances:
-        """Give nuisances to begin with: those given, else none but the measured states.
+        """Give nuisances to start from: those given, else none but the measured states.
 
         Args:
             nuisances: known ones, or None.

@@ -14,7 +14,7 @@ from ..._parameters import parameter
 from ..._types import Internal, Lanes, Scalar, as_float64
 from ...elements import AbstractElement, Scales
 
-_NEAR = 1e-3
+_NEAR_REST = 1e-3
 """Share of the largest displacement within which |x| is rounded."""
 
 _SLOW = 0.02
@@ -140,7 +140,7 @@ class PowerForce(AbstractFreeForce):
         """See `AbstractElement.force`."""
         far, fast = x / self.displacement, v / self.velocity
         width = _SLOW * self.slowest / self.velocity
-        size, speed = _rounded(far, _NEAR), _rounded(fast, width)
+        size, speed = _rounded(far, _NEAR_REST), _rounded(fast, width)
         side = jnp.where(self.odd > 0.5, far / size, 1.0)
         way = jnp.where(self.speed_odd > 0.5, fast / speed, 1.0)
         return self.size * side * way * size**self.power * speed**self.speed_power
@@ -293,7 +293,7 @@ class FadingForce(AbstractFreeForce):
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
         """See `AbstractElement.state_rate`."""
-        size = _rounded(x / self.displacement, _NEAR)
+        size = _rounded(x / self.displacement, _NEAR_REST)
         rate = self.power * size ** (self.power - 1.0) * v / self.displacement
         return (rate - s[0] / self.time_constant,)
 

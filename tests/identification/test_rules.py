@@ -1,0 +1,97 @@
+"""Every number that decides a verdict stands in Rules, once, with its meaning."""
+
+import ast
+import dataclasses
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+import isojax
+from isojax import rig
+from isojax.elements import LinearDamping, LinearStiffness
+from isojax.identification import Rules, close_loop, diagnose, fit
+from isojax.identification._rules import Rules as DefinedRules
+from isojax.models import Integrator, Isolator
+
+ROOMS = Path(isojax.__file__).parent / "identification"
+GUARDS = {"NULL_DRAWS", "CYCLES", "STEPS", "STEADY"}
+"""Numbers of the diagnosis that set the accuracy of a computation and decide nothing."""
+
+
+def _constants(file):
+    """Names and values of the numbers that a file defines for itself."""
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            try:
+                value = ast.literal_eval(node.value)
+            except ValueError:
+                continue
+            if isinstance(value, int | float):
+                yield node.targets[0].id.lstrip("_"), value
+
+
+def test_each_rule_has_a_positive_default_and_its_meaning_below_it():
+    body = next(
+        node
+        for node in ast.parse((ROOMS / "_rules.py").read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ClassDef)
+    ).body
+    for place, node in enumerate(body):
+        if isinstance(node, ast.AnnAssign):
+            words = body[place + 1]
+            assert isinstance(words, ast.Expr), ast.unparse(node)
+            assert len(ast.literal_eval(words.value)) > 30
+    values = dataclasses.asdict(Rules())
+    assert all(min(value) > 0 if isinstance(value, tuple) else value > 0 for value in values.values())
+    assert Rules is DefinedRules
+
+
+def test_each_rule_is_read_somewhere():
+    code = "".join(
+        file.read_text(encoding="utf-8") for file in ROOMS.rglob("*.py") if file.name != "_rules.py"
+    )
+    unread = [name for name in dataclasses.asdict(Rules()) if f"ules.{name}" not in code]
+    assert unread == []
+
+
+def test_the_diagnosis_has_no_numbers_of_its_own():
+    found = {name for file in (ROOMS / "diagnosis").glob("*.py") for name, _ in _constants(file)}
+    assert found <= GUARDS
+
+
+def test_no_two_constants_of_one_name_have_different_values():
+    values = defaultdict(set)
+    for file in ROOMS.rglob("*.py"):
+        for name, value in _constants(file):
+            values[name].add(value)
+    assert {name for name, known in values.items() if len(known) > 1} == set()
+
+
+@pytest.fixture(scope="module")
+def rubbing(simulated):
+    """A campaign of a plant with dry friction that the declared model lacks."""
+    plant = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4), rig.CoulombFriction(4.0)))
+    plan = rig.Multisine((40.0, 70.0, 110.0), 2.0, 14.0, period=2.0, periods=4, lines="full")
+    bench = rig.Bench(rate=250.0, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+    return simulated(plant, plan, 7, bench, stiffness=("linear",), damping=("linear",))
+
+
+def test_other_rules_give_another_verdict(rubbing):
+    start = Isolator(800.0, (LinearStiffness(1.05e6), LinearDamping(1.1e4)))
+    found = fit(start, rubbing, integrator=Integrator())
+    strict = diagnose(found, rules=Rules(smallest_gain=100.0))
+    assert strict.finding is None
+    assert strict.verdict == "unexplained"
+    assert diagnose(found, rules=Rules(smallest_gain=100.0, good=1e3)).verdict == "none"
+    assert diagnose(found).finding.effect == "coulomb_friction"
+
+
+def test_a_loop_hands_its_rules_on(rubbing):
+    rules = Rules(smallest_visibility=2.0)
+    loop = close_loop(rubbing, rules=rules)
+    assert loop.last.ranking == ()
+    assert "coulomb_friction" in loop.last.hidden
+    assert loop.rules == rules
+    assert loop.remainder is not None
+    assert loop.remainder.pursuit.laws == ()
