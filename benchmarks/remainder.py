@@ -45,7 +45,7 @@ from typing import Any, NamedTuple
 import jax
 
 from _trial_campaign import kind_of, sketch
-from _trial_run import _simulated, crowded
+from _trial_run import crowded, simulated
 from isojax import compile_quickly
 from isojax.identification import classical_guess, explain_remainder, fit, read_campaign
 
@@ -89,7 +89,7 @@ def run(case: Case) -> Row:
     start = time.perf_counter()
     drawn = sketch(case.seed, kind_of(case.seed))
     with TemporaryDirectory() as folder:
-        hidden, path, _ = _simulated(drawn, Path(folder))
+        hidden, path, _ = simulated(drawn, Path(folder))
         campaign = read_campaign(path)
     names = ", ".join(sorted((one.name for one in hidden), key=lambda name: case.hides.index(name)))
     if names != case.hides:
