@@ -4,6 +4,8 @@ From records to a model: `read_campaign`, `classical_guess`, `fit`, `residual`, 
 of them with `close_loop`. From a model to its stability: `find_periodic_orbit`, `stability_map`,
 `continue_branch`, `sensitivity`. Namespaces hold the rest: `elements` every physical effect, `excitations`
 what drives it, `plot` the pictures, `reporting` the tables; the others hold the classes of the results.
+
+Examples in docstrings assume `import isojax as ij`, `import numpy as np` and JAX's 64-bit mode.
 """
 
 from importlib.metadata import version as _version

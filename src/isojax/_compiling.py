@@ -20,6 +20,10 @@ def compile_quickly() -> bool:
     Returns:
         Whether the flag is set; it is left alone where `XLA_FLAGS` names it already, and where jaxlib is
         newer than was tried.
+
+    Example:
+        >>> ij.compile_quickly()  # doctest: +SKIP
+        True
     """
     flags = os.environ.get("XLA_FLAGS", "")
     if _FLAG in flags or jaxlib.version.__version_info__ >= _UNTRIED:

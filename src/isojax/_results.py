@@ -32,5 +32,9 @@ def is_successful(result: RESULTS) -> bool:
 
     Returns:
         True for `RESULTS.successful`.
+
+    Example:
+        >>> ij.is_successful(ij.RESULTS.successful)
+        True
     """
     return bool(result == RESULTS.successful)

@@ -13,6 +13,10 @@ class Harmonic(AbstractExcitation):
     Attributes:
         amplitude: F0 [N, or m/s^2 for base excitation].
         frequency: f [Hz].
+
+    Example:
+        >>> float(ij.Harmonic(amplitude=100.0, frequency=5.0).frequency)
+        5.0
     """
 
     amplitude: Scalar = parameter(symbol="F0", unit="N")

@@ -84,6 +84,13 @@ def extend(before: Fit, verdict: Verdict) -> Extension:
 
     Raises:
         ValueError: if the diagnosis found nothing to add.
+
+    Example:
+        With the verdict of `diagnose`'s example; the demo hides friction of 30 N:
+
+        >>> better = ij.extend(fitted, verdict)
+        >>> print(f"{float(better.after.model['coulomb_friction.force_level']):.1f} N")
+        30.0 N
     """
     if verdict.refit is None:
         raise ValueError(

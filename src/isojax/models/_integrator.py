@@ -23,6 +23,10 @@ class Integrator(eqx.Module):
 
     Raises:
         ValueError: if `rtol` is given to a solver that estimates no error, or the steps a period are odd.
+
+    Example:
+        >>> ij.Integrator().with_steps(256).steps_per_period
+        256
     """
 
     solver: diffrax.AbstractSolver = eqx.field(default_factory=RK4)

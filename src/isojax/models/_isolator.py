@@ -32,6 +32,14 @@ class Isolator(eqx.Module):
         ValueError: if the mass is not positive, `elements` holds something else, or `excitation` is neither.
 
     Source: the paper, eq. (4).
+
+    Example:
+        >>> elements = (ij.elements.LinearStiffness(1e6), ij.elements.LinearDamping(4e3))
+        >>> model = ij.Isolator(800.0, elements)
+        >>> [entry.name for entry in model.parameters]
+        ['mass', 'linear_stiffness.coefficient', 'linear_damping.coefficient']
+        >>> float(model["linear_damping.coefficient"])
+        4000.0
     """
 
     mass: Scalar = parameter(symbol="m", unit="kg", lower=0.0, fitted=False)

@@ -65,6 +65,9 @@ def save_model(model: Isolator, path: str | Path) -> None:
 
     Raises:
         ValueError: if a parameter is not finite.
+
+    Example:
+        >>> ij.save_model(ij.paper.y_direction(), "model.json")
     """
     for entry in model.parameters:
         if not math.isfinite(entry.value):
@@ -85,6 +88,12 @@ def load_model(path: str | Path) -> Isolator:
         ValueError: if the file is missing, is no isojax model, names an unknown element or parameter, or
             holds something else than a finite number for one.
         RuntimeError: if JAX is not in 64-bit mode.
+
+    Example:
+        >>> ij.save_model(ij.paper.y_direction(), "model.json")
+        >>> model = ij.load_model("model.json")
+        >>> [element.name for element in model.elements][:2]
+        ['linear_stiffness', 'abs_quadratic_stiffness']
     """
     check_float64()
     path = Path(path)

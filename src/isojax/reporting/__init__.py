@@ -1,4 +1,9 @@
-"""What people see: pictures, tables, the report. The only floor that imports matplotlib."""
+"""What people see: pictures, tables, the report. The only floor that imports matplotlib.
+
+In: fits, verdicts, closed loops and answers of stability. Out: figures, tables for the terminal,
+report.html, result.json and model.json. Read `words` (numbers and sentences), `plots` (one figure each),
+`page` (what is written), then `_closed_loop.py`, which ties the loop to its report.
+"""
 
 from ._closed_loop import ClosedLoop as ClosedLoop
 from ._closed_loop import close_loop as close_loop

@@ -103,6 +103,14 @@ def close_loop(
     Raises:
         ValueError: if the campaign has no record to fit, or names an effect that is not in the catalogue.
         RuntimeError: if JAX is not in 64-bit mode.
+
+    Example:
+        With the campaign of `read_campaign`'s example:
+
+        >>> loop = ij.close_loop(campaign)
+        >>> loop.verdict, [finding.effect for finding in loop.findings]
+        ('found', ['coulomb_friction'])
+        >>> loop.report("out")
     """
     loop = find_loop(campaign, max_iterations=max_iterations, solver=solver, progress=progress, rules=rules)
     return ClosedLoop(loop)

@@ -1,12 +1,16 @@
 """A simulated test bench, to judge the identification by.
 
+It stays in the package although nothing else here imports it: with it a user can simulate a planned test,
+hide an effect in it, and see before the measurement whether `close_loop` would find that effect. It also
+writes the demo campaign (`python -m isojax.rig.demo_campaign FOLDER`).
+
 It shares no code with the models that it judges: NumPy and SciPy only. A `Plant` is a mass with force laws
 and instruments; a `Plan` says what to test; `run` returns the records and `write_campaign` files them as a
 campaign with its truth beside it.
 
-Accuracy: with the default tolerance the motion is good to 1e-7 of its rms (tests/rig compares it with closed
-forms and with SciPy). Discontinuous laws are exact: each turning, sticking and breaking away is located and
-ends a step.
+Accuracy: with the default tolerance the motion is good to 1e-7 of its rms (tests/rig compares it with
+closed forms and with SciPy). Discontinuous laws are exact: each turning, sticking and breaking away is
+located and ends a step.
 """
 
 from ._bench import DEFAULT_BENCH as DEFAULT_BENCH

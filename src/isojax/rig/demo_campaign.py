@@ -33,15 +33,15 @@ def write_demo_campaign(folder: str | Path, seed: int = SEED) -> Path:
     Returns:
         Path of campaign.toml.
     """
-    spring, damper = (LinearStiffness(1.12e6), CubicStiffness(1.5e11)), LinearDamping(6e3)
-    frequencies = tuple((np.arange(40, 65, 3) / 10).tolist())
+    spring, damper = (LinearStiffness(1.12e6), CubicStiffness(1.5e11)), LinearDamping(4e3)
+    frequencies = tuple((np.arange(46, 71, 3) / 10).tolist())
     return write_campaign(
         folder,
         Plant((*spring, damper, CoulombFriction(30.0))),
         SteppedSine((60.0, 150.0), frequencies, cycles=15, holdout_levels=(100.0,)),
         seed,
         "isojax demo: stepped sine, horizontal",
-        Bench(rate=500.0, noise=0.008, drift=0.0005),
+        Bench(rate=500.0, noise=0.01, drift=0.0005),
         declared=("linear_stiffness", "cubic_stiffness", "linear_damping"),
     )
 

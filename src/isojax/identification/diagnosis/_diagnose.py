@@ -75,6 +75,13 @@ def diagnose(
 
     Returns:
         The verdict.
+
+    Example:
+        With the fit of `fit`'s example:
+
+        >>> verdict = ij.diagnose(fitted)
+        >>> verdict.verdict, verdict.finding.effect
+        ('found', 'coulomb_friction')
     """
     search = search_of(fit.campaign, rules, solver, progress, max_steps)
     return diagnose_with(search, fit, first_excess, significance, excluded)

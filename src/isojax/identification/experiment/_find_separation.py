@@ -65,6 +65,12 @@ def find_separating_experiment(
         ValueError: if the extension holds no finding, or `seconds` is not positive.
 
     Source: expected information for discrimination, Hunter & Reiner 1965, Technometrics 7:307.
+
+    Example:
+        With the extension of `extend`'s example, where no look-alike is left to separate:
+
+        >>> ij.find_separating_experiment(better).others
+        ()
     """
     finding = extension.verdict.finding
     if finding is None:

@@ -56,6 +56,12 @@ def residual(fit: Fit) -> Residual:
         The residual of each fitting record, with the correlations that distinguish it from white noise.
 
     Source: Ljung 1999, System Identification, sec. 16.6 (residual tests with a 99 % band).
+
+    Example:
+        With the fit of `fit`'s example; white noise would leave 0.99 of the lags inside its band:
+
+        >>> print(f"{ij.residual(fitted).whiteness.mean():.1f} of the lags inside")
+        0.0 of the lags inside
     """
     runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
     lags = np.arange(-MOST_LAGS, MOST_LAGS + 1, dtype=float)

@@ -119,6 +119,13 @@ def classical_guess(
     Raises:
         ValueError: if the campaign names an effect that is not in the catalogue, or has no record to fit.
         RuntimeError: if JAX is not in 64-bit mode.
+
+    Example:
+        With the campaign of `read_campaign`'s example:
+
+        >>> guess = ij.classical_guess(campaign)
+        >>> [element.name for element in guess.model.elements]
+        ['linear_stiffness', 'cubic_stiffness', 'linear_damping']
     """
     check_float64()
     base = base_model(campaign)

@@ -24,6 +24,14 @@ def read_campaign(path: str | Path) -> Campaign:
             row, what was found and what was expected.
 
     Source: the form of campaign.toml is described in docs/campaign.md.
+
+    Example:
+        The demo campaign is in the package:
+
+        >>> from isojax.demo import campaign_folder
+        >>> campaign = ij.read_campaign(campaign_folder())
+        >>> len(campaign.fit_records), len(campaign.holdout_records)
+        (4, 2)
     """
     declared = read_declaration(path)
     model = declared.sections["model"]

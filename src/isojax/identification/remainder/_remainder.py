@@ -72,6 +72,13 @@ def explain_remainder(
 
     Raises:
         ValueError: if the fit failed, so that its residual means nothing.
+
+    Example:
+        With the fit of `fit`'s example:
+
+        >>> remainder = ij.explain_remainder(fitted, refit=False)
+        >>> len(remainder.dwells)
+        36
     """
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")

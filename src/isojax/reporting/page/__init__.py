@@ -1,4 +1,9 @@
-"""isojax.reporting.page."""
+"""What is written and printed: the report, the summary on the terminal, the files of a map.
+
+In: a closed loop with its data health, or a stability map. Out: report.html, result.json, model.json,
+tables for rich, map.npz with its pictures. Read `_summary.py` (terminal), `_result.py` (numbers),
+`_pictures.py` and `_page.py` (HTML), `_write.py` (files whole or not at all), then the two files on maps.
+"""
 
 from ._map_files import folds_around as folds_around
 from ._map_files import map_arrays as map_arrays

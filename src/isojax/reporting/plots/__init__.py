@@ -1,4 +1,9 @@
-"""isojax.reporting.plots."""
+"""One figure a function: `plot_record(record, campaign, ax=ax)` draws on given axes, returns the Figure.
+
+In: records, fits, residuals, maps, branches. Out: matplotlib figures; nothing is shown or saved. Read
+`_style.py` and `_stability_style.py` (colours, axes, marks) first; then any file, none needs another.
+`isojax.plot` offers them under short names.
+"""
 
 from ._attractor_plots import plot_basins as plot_basins
 from ._attractor_plots import plot_bifurcation_diagram as plot_bifurcation_diagram

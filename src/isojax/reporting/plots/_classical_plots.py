@@ -171,6 +171,7 @@ def plot_equivalent(
     side = "displacement amplitude X [mm]" if what == "stiffness" else "velocity amplitude V [mm/s]"
     ax.set_xlabel(side)
     ax.set_ylabel(r"$K_\mathrm{eq}$ [N/mm]" if what == "stiffness" else r"$C_\mathrm{eq}$ [N s/mm]")
-    ax.legend(fontsize=7.5)
+    if ax.get_legend_handles_labels()[1]:
+        ax.legend(fontsize=7.5)
     entitle(ax, f"equivalent {what} at {frequency:.3g} Hz, visited amplitudes")
     return figure

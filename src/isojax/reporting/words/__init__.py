@@ -1,4 +1,9 @@
-"""isojax.reporting.words."""
+"""Numbers and sentences of every report.
+
+In: findings, fits, data health, an unexplained remainder. Out: strings, typeset with unit and error, and
+plain dictionaries for result.json. Read `_quantities.py` (one number), `_sentences.py` (the verdict), then
+the words on data health and on the remainder.
+"""
 
 from ._health_words import budget_rows as budget_rows
 from ._health_words import budget_words as budget_words

@@ -115,6 +115,11 @@ def bifurcation_diagram(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Thompson & Stewart 2002, Nonlinear Dynamics and Chaos, ch. 4 and 6.
+
+    Example:
+        >>> diagram = ij.bifurcation_diagram(ij.paper.y_direction(), np.array([50.0, 100.0]), frequency=3.0)
+        >>> diagram.period.ravel().tolist()
+        [1, 1]
     """
     check_float64()
     integrator = Integrator() if integrator is None else integrator

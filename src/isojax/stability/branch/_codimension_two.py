@@ -68,6 +68,12 @@ def fold_curve(
 
     Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, secs. 9.5 (cusp) and 10.3; Govaerts 2000,
     Numerical Methods for Bifurcations of Dynamical Equilibria, ch. 4.
+
+    Example:
+        >>> model = ij.paper.y_direction()
+        >>> folds = ij.fold_curve(model, amplitude_range=(100.0, 250.0), frequency_range=(3.8, 4.8))
+        >>> ij.is_successful(folds.result)
+        True
     """
     window = (amplitude_range, frequency_range)
     curve = _curve("fold", model, window, start, search, step, most, integrator)

@@ -101,6 +101,12 @@ def continue_branch(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Nayfeh & Balachandran 1995, sec. 6.1.
+
+    Example:
+        >>> model = ij.paper.y_direction()
+        >>> branch = ij.continue_branch(model, parameter="amplitude", frequency=4.3, start=1.0, stop=400.0)
+        >>> [point.kind for point in branch.special_points]
+        ['fold', 'fold']
     """
     check_float64()
     refuse_traced(model, amplitude, frequency, start, stop)

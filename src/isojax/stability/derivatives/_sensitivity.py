@@ -104,6 +104,14 @@ def sensitivity(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: implicit function theorem; first-order propagation of errors.
+
+    Example:
+        >>> drive = ij.Harmonic(amplitude=150.0, frequency=4.3)
+        >>> orbit = ij.find_periodic_orbit(ij.paper.y_direction(), drive)
+        >>> sens = ij.sensitivity(orbit)
+        >>> place = sens.parameters.index("linear_damping.coefficient")
+        >>> bool(sens.derivatives["spectral_radius"][place] < 0.0)
+        True
     """
     check_float64()
     function = not isinstance(subject, Orbit | StabilityMap | SpecialPoint)

@@ -142,6 +142,12 @@ def stability_map(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
+
+    Example:
+        >>> amplitudes, frequencies = np.linspace(20.0, 300.0, 8), np.linspace(3.5, 6.0, 11)
+        >>> smap = ij.stability_map(ij.paper.y_direction(), amplitudes, frequencies, coexisting=True)
+        >>> smap.count.shape, int(smap.count.max())
+        ((8, 11), 3)
     """
     check_float64()
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)

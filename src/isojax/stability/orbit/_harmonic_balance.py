@@ -126,6 +126,11 @@ def harmonic_balance(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Cameron & Griffin 1989, J. Appl. Mech. 56:149.
+
+    Example:
+        >>> found = ij.harmonic_balance(ij.paper.y_direction(), ij.Harmonic(amplitude=150.0, frequency=4.3))
+        >>> ij.is_successful(found.result)
+        True
     """
     check_float64()
     tolerance = (Integrator() if integrator is None else integrator).orbit_tolerance

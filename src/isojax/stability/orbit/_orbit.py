@@ -126,6 +126,12 @@ def find_periodic_orbit(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Aprille & Trick 1972, Proc. IEEE 60:108 (shooting); Nayfeh & Balachandran 1995, ch. 3 and 5.
+
+    Example:
+        >>> drive = ij.Harmonic(amplitude=150.0, frequency=4.3)
+        >>> orbit = ij.find_periodic_orbit(ij.paper.y_direction(), drive)
+        >>> ij.is_successful(orbit.result), float(orbit.floquet.spectral_radius) < 1.0
+        (True, True)
     """
     check_float64()
     integrator = Integrator() if integrator is None else integrator

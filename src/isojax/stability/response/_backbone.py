@@ -67,6 +67,11 @@ def backbone_curve(
 
     Source: Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 2.1 (free vibration); Peeters et al. 2011, J.
     Sound Vib. 330:486 (phase resonance).
+
+    Example:
+        >>> backbone = ij.backbone_curve(ij.paper.y_direction(), np.array([1e-4, 5e-4]))
+        >>> bool(backbone.frequency[1] < backbone.frequency[0])  # this spring softens
+        True
     """
     check_float64()
     amplitudes = jnp.asarray(ascending("displacements", displacements))

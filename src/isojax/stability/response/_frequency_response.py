@@ -92,6 +92,12 @@ def frequency_response(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 4.1.
+
+    Example:
+        >>> response = ij.frequency_response(ij.paper.y_direction(), 50.0, (4.0, 7.0))
+        >>> place = int(abs(response.receptance).argmax())
+        >>> print(f"resonance near {float(response.branch.points.frequency[place]):.1f} Hz")
+        resonance near 5.7 Hz
     """
     check_float64()
     forces, ends = np.asarray(amplitude, dtype=float), np.asarray(frequencies, dtype=float)

@@ -80,6 +80,12 @@ def transmissibility(
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Carrella et al. 2012, Int. J. Mech. Sci. 55:22 (force and displacement, nonlinear isolators).
+
+    Example:
+        >>> model = ij.Isolator(800.0, (ij.elements.LinearStiffness(1e6), ij.elements.LinearDamping(4e3)))
+        >>> ratio = ij.transmissibility(model, 100.0, np.array([5.0, 20.0])).ratio
+        >>> [f"{size:.2f}" for size in abs(ratio).ravel().tolist()]
+        ['3.81', '0.09']
     """
     check_float64()
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
