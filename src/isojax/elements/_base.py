@@ -1,4 +1,4 @@
-"""The contract of an element: that of a force, of an instrument, and of what follows a signal, all neutral."""
+"""The contract of an element: those of a force, of an instrument and of what follows a signal, together."""
 
 from ._effect import Channels as Channels
 from ._effect import Group as Group

@@ -2,11 +2,11 @@
 
 import abc
 from collections.abc import Mapping
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, TypeVar
 
 import equinox as eqx
 
-from .._types import Internal, Lanes
+from .._types import Lanes
 
 Channels = Mapping[str, Lanes]
 """Signals made from a record beside its drive, by name."""
@@ -84,6 +84,9 @@ class Scales(eqx.Module):
     largest_reading: float = 0.0
 
 
+_Effect = TypeVar("_Effect", bound="AbstractEffect")
+
+
 class AbstractEffect(eqx.Module):
     """One physical effect: what it is called, when it is absent, and what else may be asked of any.
 
@@ -124,7 +127,7 @@ class AbstractEffect(eqx.Module):
         """
 
     @classmethod
-    def grid(cls, scales: Scales) -> "tuple[AbstractEffect, ...]":
+    def grid(cls: type[_Effect], scales: Scales) -> tuple[_Effect, ...]:
         """Give the absent effect over a grid of the parameters that mean nothing at zero strength.
 
         Args:
