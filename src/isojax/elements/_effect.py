@@ -1,8 +1,7 @@
 """What every physical effect declares, whatever it acts on."""
 
-import abc
 from collections.abc import Mapping
-from typing import ClassVar, Literal, NamedTuple, TypeVar
+from typing import ClassVar, Literal, NamedTuple
 
 import equinox as eqx
 
@@ -84,11 +83,8 @@ class Scales(eqx.Module):
     largest_reading: float = 0.0
 
 
-_Effect = TypeVar("_Effect", bound="AbstractEffect")
-
-
 class AbstractEffect(eqx.Module):
-    """One physical effect: what it is called, when it is absent, and what else may be asked of any.
+    """One physical effect: what it is called, when it is absent, and what else every one declares.
 
     Attributes:
         name: catalogue name.
@@ -113,60 +109,3 @@ class AbstractEffect(eqx.Module):
     group: ClassVar[Group]
     freed_by: ClassVar[str] = ""
     look_alikes: ClassVar[tuple[LookAlike, ...]] = ()
-
-    @classmethod
-    @abc.abstractmethod
-    def guess(cls, scales: Scales) -> "AbstractEffect":
-        """Give the absent effect (zero strength) with sensible shape parameters.
-
-        Args:
-            scales: magnitudes of the record.
-
-        Returns:
-            The element at zero strength.
-        """
-
-    @classmethod
-    def grid(cls: type[_Effect], scales: Scales) -> tuple[_Effect, ...]:
-        """Give the absent effect over a grid of the parameters that mean nothing at zero strength.
-
-        Args:
-            scales: magnitudes of the record.
-
-        Returns:
-            Elements at zero strength; one if there is nothing to vary.
-        """
-        return (cls.guess(scales),)
-
-    @classmethod
-    @abc.abstractmethod
-    def typical_strength(cls, scales: Scales) -> float:
-        """Give the strength at which the effect would be as large as the motion itself.
-
-        Args:
-            scales: magnitudes of the record.
-
-        Returns:
-            Strength [its SI unit], positive; the scale of columns and of bounds.
-        """
-
-    def twins(self) -> "tuple[AbstractEffect, ...]":
-        """Give this law as its exact look-alikes of other kinds, which no search need find.
-
-        Returns:
-            One element for each of the exact `look_alikes`, with the shape and strength that make it this
-            law, but for a force of the effects beside which they are alike.
-        """
-        return ()
-
-    @classmethod
-    def twin_of(cls, other: "AbstractEffect") -> "AbstractEffect | None":
-        """Give the law of an exact look-alike as one of this kind: the way back from `twins`.
-
-        Args:
-            other: an element of any kind.
-
-        Returns:
-            The element of this kind, with one of the shapes that do; None where there is none.
-        """
-        return None
