@@ -15,7 +15,7 @@ from isojax import paper
 from isojax._parameters import list_parameters, own_parameters, replace_parameters, to_free, to_physical
 from isojax._results import is_successful
 from isojax.elements import CATALOGUE, AbstractElement, Scales
-from isojax.elements._base import Group
+from isojax.elements._base import CONTRACTS, Group
 from isojax.excitations import Harmonic
 from isojax.models import Instant, Integrator, Isolator, load_model, save_model, simulate
 from isojax.stability.orbit._describing_function import response_start
@@ -114,6 +114,16 @@ def test_an_element_is_alone_in_the_file_of_its_name(kind):
     ]
     assert module.__name__ == f"isojax.elements._{kind.name}"
     assert own == [kind]
+
+
+@every_element
+def test_an_element_overrides_methods_of_one_contract_alone(kind):
+    methods = [
+        {name for name, what in vars(contract).items() if callable(what) and not name.startswith("_")}
+        for contract in CONTRACTS
+    ]
+    assert [len(names) for names in methods] == [10, 4, 4]
+    assert sum(bool(names & set(vars(kind))) for names in methods) == 1
 
 
 @every_element
@@ -375,7 +385,8 @@ def test_an_orbit_of_the_isolator_with_the_effect_has_finite_multipliers(kind):
 
 def test_the_catalogue_holds_every_element_file():
     folder = Path(inspect.getfile(AbstractElement)).parent
-    files = {path.stem[1:] for path in folder.glob("_*.py")} - {"_init__", "base"}
+    contracts = {"_init__", "base", "effect", "force", "instrument", "follower"}
+    files = {path.stem[1:] for path in folder.glob("_*.py")} - contracts
     assert files == set(CATALOGUE)
 
 

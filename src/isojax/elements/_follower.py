@@ -1,0 +1,66 @@
+"""The contract of what follows a signal of the record beside its drive, such as the clock or the floor."""
+
+from typing import ClassVar
+
+from .._types import Lanes
+from ._effect import AbstractEffect, Channels
+
+
+class AbstractFollower(AbstractEffect):
+    """What follows signals made from the record; without a record it is absent.
+
+    Attributes:
+        channels: names of the signals.
+        phased: whether they carry a phase of each record's own, which is read from the record.
+    """
+
+    channels: ClassVar[tuple[str, ...]] = ()
+    phased: ClassVar[bool] = False
+
+    def channel_drive(self, channels: Channels) -> Lanes | float:
+        """Give what signals of the record add to the drive that acted.
+
+        Args:
+            channels: the signals, by name; those in `channels` are there.
+
+        Returns:
+            Drive [N, or m/s^2 for base excitation].
+        """
+        return 0.0
+
+    def channel_force(self, x: Lanes, v: Lanes, channels: Channels) -> Lanes | float:
+        """Give a force on the left-hand side of the balance that follows signals of the record [N].
+
+        Args:
+            x: displacement [m].
+            v: velocity [m/s].
+            channels: the signals, by name.
+
+        Returns:
+            Force [N].
+        """
+        return 0.0
+
+    def channel_base(self, channels: Channels) -> Lanes | None:
+        """Give the acceleration that the ground under the isolator has by signals of the record.
+
+        The coordinate then moves with the ground, and an acceleration reading is the absolute one.
+
+        Args:
+            channels: the signals, by name.
+
+        Returns:
+            Acceleration [m/s^2]; None where the element leaves the ground alone.
+        """
+        return None
+
+    def channel_reading(self, channels: Channels) -> Lanes | float:
+        """Give what signals of the record add to the reading.
+
+        Args:
+            channels: the signals, by name.
+
+        Returns:
+            Reading [its SI unit].
+        """
+        return 0.0
