@@ -33,8 +33,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 import isojax as ij
-from isojax.stability.orbit._drive import recorded_sine
 from isojax.stability.orbit._period_map import period_map
+from isojax.stability.orbit._sine import recorded_sine
 
 jax.config.update("jax_enable_x64", True)
 

@@ -19,9 +19,9 @@ from isojax.elements._base import CONTRACTS, Group
 from isojax.excitations import Harmonic
 from isojax.models import Instant, Integrator, Isolator, load_model, save_model, simulate
 from isojax.stability.orbit._describing_function import response_start
-from isojax.stability.orbit._drive import recorded_sine
 from isojax.stability.orbit._floquet import multipliers
 from isojax.stability.orbit._period_map import period_map
+from isojax.stability.orbit._sine import recorded_sine
 
 SCALES = Scales(
     mass=800.0,

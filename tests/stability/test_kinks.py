@@ -10,9 +10,9 @@ import pytest
 from scipy_orbits import Y_DIRECTION, flow, polynomial
 
 from isojax import Harmonic, Integrator, find_periodic_orbit, paper
-from isojax.stability.orbit._drive import recorded_sine
+from isojax.stability.orbit._kink_crossings import advance_across_kinks, find_crossings
 from isojax.stability.orbit._period_map import period_map, trajectory
-from isojax.stability.orbit._pieces import advance_in_pieces, find_crossings
+from isojax.stability.orbit._sine import recorded_sine
 
 
 def crossings_of(model, drive, state, steps=512):
@@ -50,7 +50,7 @@ def test_split_at_its_kinks_a_motion_converges_with_fourth_order_to_that_of_scip
     )
 
     def moved(state, steps):
-        there, reached = advance_in_pieces(model, Integrator(), drive, state, exact, 2.0 * math.pi, steps)
+        there, reached = advance_across_kinks(model, Integrator(), drive, state, exact, 2.0 * math.pi, steps)
         return jnp.stack(there), reached
 
     scale = np.abs(end)

@@ -98,6 +98,11 @@ class Integrator(eqx.Module):
         return 1e-10
 
     @property
+    def residual_tolerance(self) -> float:
+        """Largest residual of the equations of an orbit or a bifurcation that counts as solved."""
+        return 1e3 * self.orbit_tolerance
+
+    @property
     def multiplier_tolerance(self) -> float:
         """Integration error of the multipliers of a single orbit to which it is refined."""
         return 1e-11

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import diffrax
 import jax.tree_util as jtu
 
-_INSIDE = 1e-9
+_INSIDE_STEP = 1e-9
 """How far inside the step its first and last stage lie, as a share of it: far more than a sample count
 rounds off."""
 
@@ -52,7 +52,7 @@ class RK4(diffrax.AbstractSolver):
         """Advance one step; see `diffrax.AbstractSolver.step`."""
         control = terms.contr(t0, t1)
         length = t1 - t0
-        start, middle, end = t0 + _INSIDE * length, t0 + 0.5 * length, t1 - _INSIDE * length
+        start, middle, end = t0 + _INSIDE_STEP * length, t0 + 0.5 * length, t1 - _INSIDE_STEP * length
         k1 = terms.vf_prod(start, y0, args, control)
         k2 = terms.vf_prod(middle, _add(y0, 0.5, k1), args, control)
         k3 = terms.vf_prod(middle, _add(y0, 0.5, k2), args, control)

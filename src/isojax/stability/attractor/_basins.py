@@ -14,9 +14,9 @@ from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State
 from ..orbit import ascending, period_map, recorded_sine
-from ._stroboscope import bounded_or_not, check_counts, repeats_after, settle_down
+from ._stroboscope import Repetition, Watch, bounded_or_not, check_counts, repeats_after, settle_down
 
-_NEAR = 1000.0
+_SAME_ATTRACTOR = 1000.0
 """Distance over the tolerance of a repetition up to which two settled motions are one: a motion that repeats
 to the tolerance, but creeps, lies further from its end than one period moves it."""
 
@@ -94,10 +94,11 @@ def basins_of_attraction(
     x, v = (grid.ravel() for grid in np.meshgrid(places, speeds, indexing="ij"))
     state = (jnp.asarray(x), jnp.asarray(v), *(jnp.zeros(x.size),) * model.internal_states)
     looks = math.ceil(most / (settle + 2 * longest))
-    settled = _settled(model, excitation, integrator, state, settle, looks, longest, tolerance)
+    repetition = Repetition(longest, tolerance)
+    settled = _settled(model, excitation, Watch(integrator, settle, 2 * longest), state, looks, repetition)
     samples, period = (np.asarray(value) for value in settled)
     omega = 2.0 * math.pi * float(excitation.frequency)
-    index, periods, attractors = _sorted(samples, period, omega, _NEAR * tolerance)
+    index, periods, attractors = _sorted(samples, period, omega, _SAME_ATTRACTOR * tolerance)
     shape = (len(places), len(speeds))
     return BasinsOfAttraction(
         jnp.asarray(places),
@@ -113,24 +114,22 @@ def basins_of_attraction(
 def _settled(
     model: Isolator,
     excitation: Harmonic,
-    integrator: Integrator,
+    how: Watch,
     state: State,
-    settle: int,
     looks: int,
-    longest: int,
-    tolerance: float,
+    repetition: Repetition,
 ) -> tuple[Float[Array, "sample lane state"], Int[Array, " lane"]]:
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
 
     def sample(here: State, _: None) -> tuple[State, State]:
-        moved = period_map(model, integrator, drive, here)
+        moved = period_map(model, how.integrator, drive, here)
         return moved, moved
 
     def look(carry: tuple[Array, State, Array, Array]) -> tuple[Array, State, Array, Array]:
         count, here, _, _ = carry
-        here = settle_down(model, integrator, drive, here, settle)
-        here, seen = jax.lax.scan(sample, here, length=2 * longest)
-        period = repeats_after(seen[0], seen[1], drive.angular_frequency, longest, tolerance)
+        here = settle_down(model, how.integrator, drive, here, how.settle)
+        here, seen = jax.lax.scan(sample, here, length=how.periods)
+        period = repeats_after(seen[0], seen[1], drive.angular_frequency, repetition)
         return count + 1, here, jnp.stack(seen, axis=-1), period
 
     def unsettled(carry: tuple[Array, State, Array, Array]) -> Array:
@@ -139,10 +138,10 @@ def _settled(
         return (count < looks) & jnp.any(moving)
 
     lanes, states = state[0].size, len(state)
-    blank = jnp.zeros((2 * longest, lanes, states))
+    blank = jnp.zeros((how.periods, lanes, states))
     begin = (jnp.array(0), state, blank, jnp.zeros(lanes, dtype=int))
     _, _, samples, period = jax.lax.while_loop(unsettled, look, begin)
-    return samples[longest:], period
+    return samples[repetition.longest :], period
 
 
 def _sorted(

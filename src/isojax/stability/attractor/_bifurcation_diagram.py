@@ -14,6 +14,8 @@ from ..._types import check_float64
 from ...models import Integrator, Isolator, State
 from ..orbit import ascending, recorded_sine
 from ._stroboscope import (
+    Repetition,
+    Watch,
     any_disturbance,
     bounded_or_not,
     check_counts,
@@ -22,7 +24,7 @@ from ._stroboscope import (
     watch_settled,
 )
 
-Direction = Literal["up", "down", "both", "anew"]
+SweepDirection = Literal["up", "down", "both", "anew"]
 
 _CHAOS = math.log(100.0)
 """Growth of a disturbance over the samples, as a logarithm, beyond which a motion that repeats nowhere counts
@@ -76,7 +78,7 @@ def bifurcation_diagram(
     *,
     amplitude: Any = None,
     frequencies: Any = None,
-    direction: Direction | str = "up",
+    direction: SweepDirection | str = "up",
     starts: Any = None,
     settle: int = 200,
     samples: int = 64,
@@ -124,8 +126,10 @@ def bifurcation_diagram(
     check_float64()
     integrator = Integrator() if integrator is None else integrator
     parameter, forces, band = _points(amplitudes, frequency, amplitude, frequencies)
-    if direction not in get_args(Direction):
-        raise ValueError(f"Argument `direction` must be one of {get_args(Direction)}, but is {direction!r}.")
+    if direction not in get_args(SweepDirection):
+        raise ValueError(
+            f"Argument `direction` must be one of {get_args(SweepDirection)}, but is {direction!r}."
+        )
     check_counts(settle=settle, samples=samples, longest=longest)
     if 2 * longest > samples:
         raise ValueError(f"Argument `longest` must be at most half of {samples} samples, but is {longest}.")
@@ -133,14 +137,19 @@ def bifurcation_diagram(
     lanes = tuple(jnp.atleast_1d(value) for value in begin)
     single = begin[0].ndim == 0 and direction != "both"
     points = jnp.asarray(forces), jnp.asarray(band)
+    how = Watch(integrator, settle, samples)
     if direction == "anew":
-        seen = _anew(model, integrator, *points, lanes, settle, samples)
+        path, growth = _anew(model, how, points, lanes)
         legs = ("anew",)
     else:
         legs = ("up", "down") if direction == "both" else (direction,)
-        seen = _turned(model, integrator, *points, legs, lanes, settle, samples)
+        path, growth = _turned(model, how, points, legs, lanes)
     runs = tuple(leg for leg in legs for _ in range(lanes[0].size))
-    return _diagram(model, parameter, *points, runs, *seen, longest, tolerance, single)
+    judged = _judge(points[1], path, growth, Repetition(longest, tolerance))
+    shown = (values[:, 0] if single else jnp.swapaxes(values, 0, 1) for values in judged)
+    kept, period, exponent, chaotic, finite = shown
+    result = bounded_or_not(finite)
+    return BifurcationDiagram(model, parameter, *points, runs, kept, period, exponent, chaotic, result)
 
 
 def _points(
@@ -166,101 +175,68 @@ def _points(
     return "frequency", still, varied
 
 
+Points = tuple[Float[Array, " point"], Float[Array, " point"]]
+"""Amplitude and frequency at each point."""
+
+
 def _seen(
-    model: Isolator,
-    integrator: Integrator,
-    setting: tuple[Array, Array],
-    state: State,
-    tangent: State,
-    settle: int,
-    samples: int,
+    model: Isolator, how: Watch, setting: tuple[Array, Array], state: State, tangent: State
 ) -> tuple[tuple[State, State], tuple[Array, Array]]:
     """Give where motion and disturbance end, and the samples and the disturbance's growth, motion first."""
     drive = recorded_sine(model, *setting)
-    seen = watch_settled(model, integrator, drive, state, tangent, settle, samples)
+    seen = watch_settled(model, how, drive, state, tangent)
     path = jnp.moveaxis(jnp.stack(seen.samples, axis=-1), 0, 1)
     return (seen.state, seen.tangent), (path, seen.growth.T)
 
 
 @eqx.filter_jit
 def _turned(
-    model: Isolator,
-    integrator: Integrator,
-    amplitudes: Float[Array, " point"],
-    frequencies: Float[Array, " point"],
-    legs: tuple[str, ...],
-    begin: State,
-    settle: int,
-    samples: int,
+    model: Isolator, how: Watch, points: Points, legs: tuple[str, ...], begin: State
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
     def point(carry: tuple[State, State], setting: tuple[Array, Array]) -> Any:
         state, tangent = carry
         finite = jnp.all(jnp.isfinite(jnp.stack(state + tangent)), axis=0)
         state = tuple(jnp.where(finite, now, first) for now, first in zip(state, begin, strict=True))
         tangent = tuple(jnp.where(finite, now, 1.0) for now in tangent)
-        return _seen(model, integrator, setting, state, tangent, settle, samples)
+        return _seen(model, how, setting, state, tangent)
 
     ways = [slice(None, None, -1 if leg == "down" else 1) for leg in legs]
-    forces = jnp.concatenate([amplitudes[way] for way in ways])
-    band = jnp.concatenate([frequencies[way] for way in ways])
+    forces, band = (jnp.concatenate([values[way] for way in ways]) for values in points)
     _, kept = jax.lax.scan(point, (begin, any_disturbance(begin)), (forces, band))
     # From leg after leg to runs side by side, each by rising amplitude or frequency.
-    count = amplitudes.size
+    count = points[0].size
     parts = [[v[n * count : (n + 1) * count][way] for n, way in enumerate(ways)] for v in kept]
     return jnp.concatenate(parts[0], axis=1), jnp.concatenate(parts[1], axis=1)
 
 
 @eqx.filter_jit
 def _anew(
-    model: Isolator,
-    integrator: Integrator,
-    amplitudes: Float[Array, " point"],
-    frequencies: Float[Array, " point"],
-    begin: State,
-    settle: int,
-    samples: int,
+    model: Isolator, how: Watch, points: Points, begin: State
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
-    points, runs = amplitudes.size, begin[0].size
-    setting = jnp.repeat(amplitudes, runs), jnp.repeat(frequencies, runs)
-    state = tuple(jnp.tile(value, points) for value in begin)
-    _, kept = _seen(model, integrator, setting, state, any_disturbance(state), settle, samples)
-    path, growth = kept
-    return path.reshape(points, runs, samples, -1), growth.reshape(points, runs, samples)
+    count, runs = points[0].size, begin[0].size
+    setting = jnp.repeat(points[0], runs), jnp.repeat(points[1], runs)
+    state = tuple(jnp.tile(value, count) for value in begin)
+    _, (path, growth) = _seen(model, how, setting, state, any_disturbance(state))
+    return path.reshape(count, runs, how.periods, -1), growth.reshape(count, runs, how.periods)
 
 
 @eqx.filter_jit
-def _diagram(
-    model: Isolator,
-    parameter: str,
-    amplitudes: Float[Array, " point"],
+def _judge(
     frequencies: Float[Array, " point"],
-    runs: tuple[str, ...],
     path: Float[Array, "point run sample state"],
     growth: Float[Array, "point run sample"],
-    longest: int,
-    tolerance: float,
-    single: bool,
-) -> BifurcationDiagram:
+    repetition: Repetition,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Give samples, period, Lyapunov exponent, whether chaotic, and whether finite, of each point and run."""
     finite = jnp.all(jnp.isfinite(path), axis=(2, 3))
-    samples = path.shape[2]
     strobe = jnp.moveaxis(path, 2, 0)
     omega = jnp.broadcast_to(2.0 * math.pi * frequencies[:, None], strobe.shape[:-1])
-    period = repeats_after(strobe[..., 0], strobe[..., 1], omega, longest, tolerance)
-    period = jnp.where(finite, period, 0)
+    period = jnp.where(finite, repeats_after(strobe[..., 0], strobe[..., 1], omega, repetition), 0)
     total = jnp.where(finite, jnp.sum(growth, axis=2), jnp.nan)
-
-    def shown(values: Array) -> Array:
-        return values[:, 0] if single else jnp.swapaxes(values, 0, 1)
-
-    return BifurcationDiagram(
-        model,
-        parameter,
-        amplitudes,
-        frequencies,
-        runs,
-        shown(jnp.where(finite[..., None, None], path, jnp.nan)),
-        shown(period),
-        shown(total * frequencies[:, None] / samples),
-        shown((period == 0) & (total > _CHAOS)),
-        bounded_or_not(shown(finite)),
+    return (
+        jnp.where(finite[..., None, None], path, jnp.nan),
+        period,
+        total * frequencies[:, None] / path.shape[2],
+        (period == 0) & (total > _CHAOS),
+        finite,
     )

@@ -12,7 +12,7 @@ from ..._types import Lanes, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State
 from ..orbit import recorded_sine
-from ._stroboscope import any_disturbance, bounded_or_not, check_counts, start_states, watch_settled
+from ._stroboscope import Watch, any_disturbance, bounded_or_not, check_counts, start_states, watch_settled
 
 _BLOCKS = 20
 """Stretches of the motion whose scatter gives the standard error."""
@@ -80,7 +80,7 @@ def _exponent(
     model: Isolator, excitation: Harmonic, state: State, integrator: Integrator, settle: int, periods: int
 ) -> LyapunovExponent:
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
-    seen = watch_settled(model, integrator, drive, state, any_disturbance(state), settle, periods)
+    seen = watch_settled(model, Watch(integrator, settle, periods), drive, state, any_disturbance(state))
     rate = seen.growth * excitation.frequency
     blocks = jnp.mean(rate[: periods // _BLOCKS * _BLOCKS].reshape(_BLOCKS, -1), axis=1)
     end = jnp.stack(seen.state)

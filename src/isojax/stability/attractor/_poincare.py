@@ -14,7 +14,7 @@ from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, advance
 from ..orbit import Sine, recorded_sine, trajectory
-from ._stroboscope import bounded_or_not, check_counts, settle_down, start_states
+from ._stroboscope import Watch, bounded_or_not, check_counts, settle_down, start_states
 
 
 class PoincareSection(eqx.Module):
@@ -82,7 +82,8 @@ def poincare_section(
     if bad.size:
         raise ValueError(f"Argument `phases` must lie in [0, 2 pi), but phases[{bad[0]}] = {turns[bad[0]]}.")
     state = start_states(model, "start", start)
-    return _section(model, excitation, jnp.asarray(turns), state, integrator, settle, periods)
+    how = Watch(integrator, settle, periods)
+    return _section(model, excitation, jnp.asarray(turns), state, how)
 
 
 @eqx.filter_jit
@@ -91,12 +92,10 @@ def _section(
     excitation: Harmonic,
     phases: Float[Array, " phase"],
     state: State,
-    integrator: Integrator,
-    settle: int,
-    periods: int,
+    how: Watch,
 ) -> PoincareSection:
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
-    steps = integrator.steps_a_period(model)
+    integrator, steps = how.integrator, how.integrator.steps_a_period(model)
     place = phases * steps / (2.0 * math.pi)
     node = jnp.floor(place).astype(int)
 
@@ -108,8 +107,8 @@ def _section(
         moved = _short_step(model, integrator, drive, begin, 2.0 * math.pi * node / steps, share)
         return tuple(along[-1] for along in path), moved
 
-    settled = settle_down(model, integrator, drive, state, settle)
-    end, seen = jax.lax.scan(body, settled, length=periods)
+    settled = settle_down(model, integrator, drive, state, how.settle)
+    end, seen = jax.lax.scan(body, settled, length=how.periods)
     states = jnp.swapaxes(jnp.stack(seen, axis=-1), 0, 1)
     finite = jnp.all(jnp.isfinite(jnp.stack(end)))
     return PoincareSection(phases, jnp.where(finite, states, jnp.nan), bounded_or_not(finite))

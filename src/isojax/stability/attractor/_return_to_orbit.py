@@ -16,10 +16,10 @@ from ...models import Integrator, Isolator, State
 from ..orbit import Orbit, Sine, modulus, multipliers, period_map, recorded_sine
 from ._stroboscope import bounded_or_not, check_counts
 
-_NEWTON = 4
+_FIXED_POINT_STEPS = 4
 """Steps of Newton's method from the orbit to the fixed point of the fixed steps, 1e-5 of it away."""
 
-_ROUNDING = 1e-9
+_LOST_IN_ROUNDING = 1e-9
 """Distance, in sizes of the motion, below which rounding shows in the rate."""
 
 _PAIRS = 3
@@ -145,7 +145,7 @@ def _fixed_point(
     def improve(_: Array, scaled: Array) -> Array:
         return scaled - jnp.linalg.solve(jax.jacfwd(gap)(scaled), gap(scaled))
 
-    return jax.lax.fori_loop(0, _NEWTON, improve, orbit.y0 / size) * size
+    return jax.lax.fori_loop(0, _FIXED_POINT_STEPS, improve, orbit.y0 / size) * size
 
 
 def _rate(away: Float[Array, "period state"], distance: Float[Array, " period"]) -> Float[Array, ""]:
@@ -155,7 +155,7 @@ def _rate(away: Float[Array, "period state"], distance: Float[Array, " period"])
     if wanted < states:
         return jnp.array(math.nan)
     smallest = jnp.minimum(distance[:-1], distance[1:])
-    usable = jnp.where(smallest > _ROUNDING, smallest, jnp.inf)
+    usable = jnp.where(smallest > _LOST_IN_ROUNDING, smallest, jnp.inf)
     order = jnp.argsort(usable)[:wanted]
     weight = jnp.where(jnp.isfinite(usable[order]), 1.0 / distance[order], 0.0)[:, None]
     before, after = away[:-1][order] * weight, away[1:][order] * weight

@@ -17,6 +17,33 @@ _TURNING = 20
 """Periods before the first sample in which a disturbance turns to the direction in which it grows most."""
 
 
+class Watch(NamedTuple):
+    """How long a motion settles and is then watched.
+
+    Attributes:
+        integrator: steps a period and solver.
+        settle: drive periods before.
+        periods: drive periods that are watched.
+    """
+
+    integrator: Integrator
+    settle: int
+    periods: int
+
+
+class Repetition(NamedTuple):
+    """When a motion counts as repeating.
+
+    Attributes:
+        longest: drive periods to try.
+        tolerance: largest distance between a sample and its repetition, displacement and velocity over the
+            angular frequency, as a share of the largest sample.
+    """
+
+    longest: int
+    tolerance: float
+
+
 class Watched(NamedTuple):
     """What the stroboscope saw.
 
@@ -105,41 +132,30 @@ def settle_down(model: Isolator, integrator: Integrator, drive: Sine, state: Sta
     return jax.lax.scan(body, state, length=periods)[0]
 
 
-def watch_settled(
-    model: Isolator,
-    integrator: Integrator,
-    drive: Sine,
-    state: State,
-    tangent: State,
-    settle: int,
-    periods: int,
-) -> Watched:
+def watch_settled(model: Isolator, how: Watch, drive: Sine, state: State, tangent: State) -> Watched:
     """Watch the motion once it has settled; a disturbance follows it from shortly before.
 
     Args:
         model: the isolator.
-        integrator: steps a period and solver.
+        how: steps, and how long to settle and to watch.
         drive: the drive that acts.
         state: at t = 0; any leading shape.
         tangent: disturbance, same shapes.
-        settle: drive periods before.
-        periods: drive periods to watch.
 
     Returns:
         What was seen.
     """
-    turning = min(settle, _TURNING)
-    state = settle_down(model, integrator, drive, state, settle - turning)
-    before = watch(model, integrator, drive, state, tangent, turning)
-    return watch(model, integrator, drive, before.state, before.tangent, periods)
+    turning = min(how.settle, _TURNING)
+    state = settle_down(model, how.integrator, drive, state, how.settle - turning)
+    before = watch(model, how.integrator, drive, state, tangent, turning)
+    return watch(model, how.integrator, drive, before.state, before.tangent, how.periods)
 
 
 def repeats_after(
     displacement: Float[Array, "sample ..."],
     velocity: Float[Array, "sample ..."],
     angular_frequency: Lanes,
-    longest: int,
-    tolerance: float,
+    repetition: Repetition,
 ) -> Int[Array, "..."]:
     """Give the drive periods after which a motion repeats.
 
@@ -147,13 +163,12 @@ def repeats_after(
         displacement: once a period [m].
         velocity: once a period [m/s].
         angular_frequency: of the drive [rad/s].
-        longest: periods to try.
-        tolerance: largest distance between a sample and its repetition, displacement and velocity over the
-            angular frequency, as a share of the largest sample.
+        repetition: when it counts as repeating.
 
     Returns:
-        The smallest count of periods; 0 where there is none up to `longest`, or the motion is not finite.
+        The smallest count of periods; 0 where there is none up to the longest, or the motion is not finite.
     """
+    longest, tolerance = repetition
     reduced = velocity / angular_frequency
     size = jnp.max(jnp.hypot(displacement, reduced), axis=0)
     found = jnp.zeros(size.shape, dtype=int)

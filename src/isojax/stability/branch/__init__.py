@@ -10,7 +10,8 @@ from ._branch_switching import switch_branch as switch_branch
 from ._codimension_two import fold_curve as fold_curve
 from ._codimension_two import period_doubling_curve as period_doubling_curve
 from ._continuation import continue_branch as continue_branch
+from ._extended_system import PointGuess as PointGuess
 from ._nearest_folds import NearestFolds as NearestFolds
 from ._nearest_folds import find_nearest_folds as find_nearest_folds
-from ._parameter_family import Family as Family
+from ._parameter_family import ParameterFamily as ParameterFamily
 from ._special_points import special_point as special_point

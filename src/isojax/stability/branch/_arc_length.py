@@ -7,21 +7,52 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-TOLERANCE = 1e-8
+_TOLERANCE = 1e-8
 """Largest step of Newton's method after which a point counts as found, in scaled unknowns: at a kink of the
 law Newton may stall below it."""
 
 _PATIENCE, _FIRST_PATIENCE = 7, 30
 """Steps of Newton's method for a point before a shorter step is tried, and for the first point."""
 
-_SHORTEST = 1e-5
+_SHORTEST_STEP = 1e-5
 """Smallest step along the curve, over the largest."""
 
 _ANGLE = 0.25
 """Turn of the tangent between two points that counts as large [rad]; twice of it is refused."""
 
-RAN_OUT, REACHED_BOUND, CLOSED, STALLED, NEVER_BEGAN = range(5)
-"""Why a curve ends."""
+_CLOSES_FROM, _CLOSES_WITHIN = 5, 0.2
+"""Points after which a curve may close, and the distance of its first point from a step, over the step, below
+which it does."""
+
+_RAN_OUT, REACHED_BOUND, RETURNED, _STALLED, _NEVER_STARTED = range(5)
+"""Why a curve ends: out of points, on a bound, back at its first point, no step short enough, no first
+point."""
+
+
+class Departure(NamedTuple):
+    """Where a curve starts, and which way it is followed.
+
+    Attributes:
+        first: start of the search for the first point.
+        row: direction across which the first point is sought; a unit vector picks the unknown held fixed.
+        tangent: direction in which to leave.
+    """
+
+    first: Float[Array, " unknown"]
+    row: Float[Array, " unknown"]
+    tangent: Float[Array, " unknown"]
+
+
+class Stride(NamedTuple):
+    """Steps along a curve.
+
+    Attributes:
+        longest: largest step, in scaled unknowns.
+        most: points to make room for.
+    """
+
+    longest: float
+    most: int
 
 
 class Followed(NamedTuple):
@@ -56,14 +87,9 @@ class _Walk(NamedTuple):
 
 def follow(
     equations: Callable[[Float[Array, " unknown"]], Float[Array, " equation"]],
-    first: Float[Array, " unknown"],
-    row: Float[Array, " unknown"],
-    tangent: Float[Array, " unknown"],
-    lower: Float[Array, " unknown"],
-    upper: Float[Array, " unknown"],
-    *,
-    step: float,
-    most: int,
+    departure: Departure,
+    free: int,
+    stride: Stride,
 ) -> Followed:
     """Follow the curve `equations(u) = 0`, one equation fewer than unknowns.
 
@@ -72,13 +98,9 @@ def follow(
 
     Args:
         equations: what vanishes on the curve; unknowns scaled to order one.
-        first: start of the search for the first point.
-        row: direction across which the first point is sought; a unit vector picks the unknown held fixed.
-        tangent: direction in which to leave.
-        lower: bounds of the unknowns, minus infinity where there is none.
-        upper: in the same way.
-        step: largest step.
-        most: points to make room for.
+        departure: where the curve starts.
+        free: count of unknowns without bounds; those after them are shares between 0 and 1.
+        stride: steps along it.
 
     Returns:
         The curve.
@@ -86,8 +108,13 @@ def follow(
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Doedel, Keller & Kernevez 1991, Int. J.
     Bifurcation and Chaos 1:493.
     """
+    first, row, tangent = departure
+    step, most = stride
     size = first.shape[0]
     units = jnp.eye(size)
+    unbounded = jnp.full(free, jnp.inf)
+    lower = jnp.concatenate([-unbounded, jnp.zeros(size - free)])
+    upper = jnp.concatenate([unbounded, jnp.ones(size - free)])
 
     def predict(base: Array, tangent: Array, length: Array) -> tuple[Array, Array, Array]:
         ahead = base + length * tangent
@@ -105,21 +132,22 @@ def follow(
     def accept(walk: _Walk, found: Array, ahead: Array) -> _Walk:
         past = walk.followed
         length = jnp.linalg.norm(found - walk.base)
-        begin, way = past.unknowns[0], past.tangents[0]
+        origin, way = past.unknowns[0], past.tangents[0]
         share = jnp.clip(
-            jnp.dot(begin - walk.base, found - walk.base) / jnp.maximum(length, 1e-300) ** 2, 0, 1
+            jnp.dot(origin - walk.base, found - walk.base) / jnp.maximum(length, 1e-300) ** 2, 0, 1
         )
-        apart = jnp.linalg.norm(walk.base + share * (found - walk.base) - begin)
-        closed = (past.found >= 5) & (apart < 0.2 * length) & (jnp.dot(way, ahead) > 0.5)
-        found, ahead = jnp.where(closed, begin, found), jnp.where(closed, way, ahead)
+        apart = jnp.linalg.norm(walk.base + share * (found - walk.base) - origin)
+        near = apart < _CLOSES_WITHIN * length
+        closed = (past.found >= _CLOSES_FROM) & near & (jnp.dot(way, ahead) > 0.5)
+        found, ahead = jnp.where(closed, origin, found), jnp.where(closed, way, ahead)
         done = walk.landing | closed
         bend = jnp.arccos(jnp.clip(jnp.dot(ahead, walk.tangent), -1.0, 1.0))
-        ease = jnp.where(walk.tries <= 2, 1.5, jnp.where(walk.tries <= 3, 1.2, 0.7))
-        ease = jnp.minimum(ease, jnp.clip(_ANGLE / jnp.maximum(bend, 1e-12), 0.5, 1.5))
-        following = jnp.where(past.found == 0, walk.step, jnp.minimum(walk.step * ease, step))
+        growth = jnp.where(walk.tries <= 2, 1.5, jnp.where(walk.tries <= 3, 1.2, 0.7))
+        growth = jnp.minimum(growth, jnp.clip(_ANGLE / jnp.maximum(bend, 1e-12), 0.5, 1.5))
+        following = jnp.where(past.found == 0, walk.step, jnp.minimum(walk.step * growth, step))
         predicted, row, landing = predict(found, ahead, following)
         count = past.found + 1
-        ending = jnp.where(closed, CLOSED, jnp.where(done, REACHED_BOUND, past.ending))
+        ending = jnp.where(closed, RETURNED, jnp.where(done, REACHED_BOUND, past.ending))
         followed = Followed(
             past.unknowns.at[past.found].set(found), past.tangents.at[past.found].set(ahead), count, ending
         )
@@ -129,8 +157,8 @@ def follow(
         shorter = 0.5 * jnp.minimum(walk.step, jnp.linalg.norm(walk.predicted - walk.base))
         past = walk.followed
         predicted, row, landing = predict(walk.base, walk.tangent, shorter)
-        stuck = jnp.where(past.found == 0, NEVER_BEGAN, STALLED)
-        ending = jnp.where((shorter < _SHORTEST * step) | (past.found == 0), stuck, past.ending)
+        stuck = jnp.where(past.found == 0, _NEVER_STARTED, _STALLED)
+        ending = jnp.where((shorter < _SHORTEST_STEP * step) | (past.found == 0), stuck, past.ending)
         return _Walk(
             predicted,
             predicted,
@@ -152,27 +180,27 @@ def follow(
         moved = walk.here - change
         ahead = jnp.linalg.solve(jnp.concatenate([slope, walk.tangent[None]]), units[-1])
         ahead = ahead / jnp.linalg.norm(ahead)
-        beginning = walk.followed.found == 0
+        starting = walk.followed.found == 0
         span = jnp.linalg.norm(walk.predicted - walk.base)
         sane = jnp.all(jnp.isfinite(change)) & (
-            beginning | (jnp.linalg.norm(moved - walk.predicted) < 0.5 * span + 1e-9)
+            starting | (jnp.linalg.norm(moved - walk.predicted) < 0.5 * span + 1e-9)
         )
-        found = sane & (jnp.max(jnp.abs(change)) < TOLERANCE)
-        straight = beginning | (jnp.dot(ahead, walk.tangent) > jnp.cos(2.0 * _ANGLE))
-        patience = jnp.where(beginning, _FIRST_PATIENCE, _PATIENCE)
+        found = sane & (jnp.max(jnp.abs(change)) < _TOLERANCE)
+        straight = starting | (jnp.dot(ahead, walk.tangent) > jnp.cos(2.0 * _ANGLE))
+        patience = jnp.where(starting, _FIRST_PATIENCE, _PATIENCE)
         over = ~sane | (walk.tries >= patience) | (found & ~(straight & jnp.all(jnp.isfinite(ahead))))
         going = walk._replace(here=moved, tries=walk.tries + 1)
         choices = (accept(walk, moved, ahead), refuse(walk), going)
         return jax.tree.map(lambda yes, no, on: jnp.where(over, no, jnp.where(found, yes, on)), *choices)
 
     def running(walk: _Walk) -> Array:
-        return (walk.followed.ending == RAN_OUT) & (walk.followed.found < most)
+        return (walk.followed.ending == _RAN_OUT) & (walk.followed.found < most)
 
-    nothing = Followed(jnp.zeros((most, size)), jnp.zeros((most, size)), jnp.array(0), jnp.array(RAN_OUT))
-    begin = _Walk(
+    nothing = Followed(jnp.zeros((most, size)), jnp.zeros((most, size)), jnp.array(0), jnp.array(_RAN_OUT))
+    walk = _Walk(
         first, first, first, tangent, row, jnp.asarray(0.25 * step), jnp.array(False), jnp.array(0), nothing
     )
-    followed = jax.lax.while_loop(running, improve, begin).followed
+    followed = jax.lax.while_loop(running, improve, walk).followed
     last = jnp.maximum(followed.found - 1, 0)
     used = (jnp.arange(most) < followed.found)[:, None]
     return followed._replace(

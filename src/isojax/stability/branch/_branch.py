@@ -9,9 +9,9 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
 from ...models import Integrator, Isolator, State
-from ..orbit import Sine, modulus, multipliers, trajectory
-from ._extended_system import Kind
-from ._parameter_family import Family
+from ..orbit import ShootingMethod, Sine, modulus, multipliers, trajectory
+from ._extended_system import BifurcationKind
+from ._parameter_family import ParameterFamily
 
 
 class BranchPoints(eqx.Module):
@@ -70,7 +70,7 @@ class SpecialPoint(eqx.Module):
         symmetric: whether it was closed with the half-period map.
     """
 
-    kind: Kind = eqx.field(static=True)
+    kind: BifurcationKind = eqx.field(static=True)
     periods: int = eqx.field(static=True)
     branch: int = eqx.field(static=True)
     value: Float[Array, ""]
@@ -81,9 +81,14 @@ class SpecialPoint(eqx.Module):
     half_period_multipliers: Complex[Array, " multiplier"]
     direction: Float[Array, " state"]
     result: RESULTS
-    family: Family
+    family: ParameterFamily
     integrator: Integrator
     symmetric: bool = eqx.field(static=True)
+
+    @property
+    def method(self) -> ShootingMethod:
+        """How the orbit is closed."""
+        return ShootingMethod(self.integrator, self.periods, self.symmetric)
 
     @property
     def spectral_radius(self) -> Float[Array, ""]:
@@ -118,7 +123,7 @@ class Branch(eqx.Module):
     points: BranchPoints
     special_points: tuple[SpecialPoint, ...]
     result: RESULTS
-    family: Family
+    family: ParameterFamily
     integrator: Integrator
     scale: Float[Array, "*branch state"]
     longest: float = eqx.field(static=True)
@@ -149,9 +154,8 @@ def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float
 
 
 def branch_point(
-    family: Family,
-    integrator: Integrator,
-    turns: float,
+    family: ParameterFamily,
+    method: ShootingMethod,
     scale: Float[Array, " state"],
     unknown: Float[Array, " unknown"],
     tangent: Float[Array, " unknown"],
@@ -160,8 +164,7 @@ def branch_point(
 
     Args:
         family: isolators and drives.
-        integrator: steps and solver.
-        turns: drive periods of the map.
+        method: how the orbits are closed.
         scale: size of each state.
         unknown: scaled state and share of the parameter.
         tangent: along the branch.
@@ -172,27 +175,22 @@ def branch_point(
     states = scale.shape[0]
     frozen = jax.lax.stop_gradient(family)
 
-    def open_end(at: Family, here: Array) -> Array:
-        moved = at.image(integrator, turns, scale, here[:states], here[states:])
-        return moved - here[:states]
-
-    slope = jax.jacfwd(lambda here: open_end(frozen, here))(unknown)
-    left = jnp.concatenate([open_end(family, unknown), jnp.zeros(1)])
+    slope = jax.jacfwd(lambda here: frozen.open_end(method, scale, here))(unknown)
+    left = jnp.concatenate([family.open_end(method, scale, unknown), jnp.zeros(1)])
     unknown = unknown - jnp.linalg.solve(jnp.concatenate([slope, tangent[None]]), left)
     scaled, shares = unknown[:states], unknown[states:]
     setting = family.at(shares)
-    matrix = jax.jacfwd(lambda z: family.image(integrator, turns, scale, z, shares))(scaled)
+    matrix = jax.jacfwd(lambda z: family.image(method, scale, z, shares))(scaled)
     roots = multipliers(matrix)
-    half = turns == 0.5
-    lasting = max(turns, 1.0)
-    path = trajectory(setting.model, integrator, setting.drive, tuple(scaled * scale), turns=lasting)
+    lasting = float(method.periods)
+    path = trajectory(setting.model, method.integrator, setting.drive, tuple(scaled * scale), turns=lasting)
     return BranchPoints(
         family.values(shares)[0],
         jnp.asarray(setting.amplitude),
         jnp.asarray(setting.frequency),
         scaled * scale,
         half_range(setting.model, setting.drive, path, lasting),
-        roots * roots if half else roots,
-        roots if half else jnp.full(states, jnp.nan + 0j),
+        roots * roots if method.half else roots,
+        roots if method.half else jnp.full(states, jnp.nan + 0j),
         tangent,
     )

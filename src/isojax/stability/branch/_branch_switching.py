@@ -5,9 +5,13 @@ import jax.numpy as jnp
 
 from ..._results import is_successful
 from ..._types import check_float64
-from ..orbit import is_odd
+from ..orbit import ShootingMethod
+from ._arc_length import Departure, Stride
 from ._branch import Branch, SpecialPoint
-from ._continuation import assemble, one_of, refuse_traced, trace
+from ._continuation import assemble, refuse_traced, trace
+
+_ASIDE = 0.25
+"""Distance from the bifurcation at which the new branch is looked for, over the largest step."""
 
 
 def switch_branch(
@@ -60,17 +64,14 @@ def switch_branch(
         )
     lane = slice(special_point.branch, special_point.branch + 1)
     scale = scales[lane]
-    family = branch.family
-    family = one_of(family, jnp.atleast_1d(family.amplitude)[lane], jnp.atleast_1d(family.frequency)[lane])
+    drives = (jnp.atleast_1d(one)[lane] for one in (branch.family.amplitude, branch.family.frequency))
+    family = branch.family.driven(*drives)
     periods = special_point.periods * (2 if special_point.kind == "period_doubling" else 1)
     frozen, point = jax.lax.stop_gradient((family, special_point))
     direction = point.direction / scale[0]
     tangent = jnp.concatenate([direction / jnp.linalg.norm(direction), jnp.zeros(1)])
-    share = (point.value - frozen.start) / (frozen.stop - frozen.start)
-    origin = jnp.concatenate([point.y0 / scale[0], share])
-    first = (origin + 0.25 * step * tangent)[None]
-    followed = trace(
-        frozen, branch.integrator, float(periods), scale, first, tangent[None], tangent[None], step, most
-    )
-    odd = is_odd(frozen.model)
-    return assemble(family, branch.integrator, periods, False, odd, scale, followed, batched=False, step=step)
+    origin = jnp.concatenate([point.y0 / scale[0], frozen.shares(point.value[None])])
+    departure = Departure((origin + _ASIDE * step * tangent)[None], tangent[None], tangent[None])
+    method = ShootingMethod(branch.integrator, periods, False)
+    followed = trace(frozen, method, scale, departure, Stride(step, most))
+    return assemble(family, method, scale, followed, batched=False, step=step)

@@ -1,6 +1,7 @@
 """Curves of bifurcations over the plane of the drive's amplitude and frequency."""
 
 import math
+from typing import NamedTuple
 
 import diffrax
 import equinox as eqx
@@ -12,23 +13,32 @@ from jaxtyping import Array, Float
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
 from ...models import Integrator, Isolator
-from ..orbit import multipliers, state_scale, trajectory
-from ._arc_length import CLOSED, REACHED_BOUND, Followed, follow
+from ..orbit import ShootingMethod, multipliers, state_scale, trajectory
+from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._bifurcation_curves import Cusp, FoldCurve, PeriodDoublingCurve
 from ._branch import SpecialPoint
 from ._branch_switching import switch_branch
 from ._continuation import continue_branch, refuse_traced, tracing_steps
-from ._extended_system import CRITICAL, Kind, Polished, first_places, null_vector, polish
-from ._parameter_family import Family
+from ._extended_system import (
+    CRITICAL,
+    MOST_PLACES,
+    BifurcationKind,
+    PointGuess,
+    Polished,
+    first_places,
+    null_vector,
+    polish,
+)
+from ._parameter_family import ParameterFamily
 
-_LANES = 64
+_POLISHED_AT_ONCE = 64
 """Points of a curve found anew together."""
 
 _ERROR = 1e-9
 """Error of the multipliers that the integration of a curve's points may leave."""
 
-_SECTIONS = 3
-"""Times the step with a cusp is cut into as many parts as there are lanes."""
+_CUSP_SECTIONS = 3
+"""Times the step with a cusp is cut into as many parts as there are points polished together."""
 
 
 def fold_curve(
@@ -75,24 +85,18 @@ def fold_curve(
         >>> ij.is_successful(folds.result)
         True
     """
-    window = (amplitude_range, frequency_range)
-    curve = _curve("fold", model, window, start, search, step, most, integrator)
-    family, symmetric = curve.family, curve.turns == 0.5
-    unknowns, normals, closed, ended = curve.follow()
-    found = curve.polished(unknowns, normals)
+    search_for = _Search("fold", (amplitude_range, frequency_range), search, Stride(step, most))
+    curve = _curve(model, search_for, start, integrator)
+    followed = curve.follow()
+    found = curve.polished(followed.unknowns, followed.tangents)
     cusps = []
-    for point in curve.cusps(unknowns, found):
-        amplitude, frequency = family.values(point.shares)
+    for point in curve.cusps(followed.unknowns, found):
+        amplitude, frequency = curve.family.values(point.shares)
         cusps.append(Cusp(amplitude, frequency, point.state))
-    numbers = curve.numbers(found)
-    return FoldCurve(
-        *numbers[:4],
-        tuple(cusps),
-        jnp.array(closed),
-        curve.start.periods,
-        symmetric,
-        _outcome(ended, numbers[4]),
-    )
+    numbers, good = curve.numbers(found)
+    method, closed = curve.method, jnp.array(followed.closed)
+    result = followed.result(good)
+    return FoldCurve(*numbers, tuple(cusps), closed, method.periods, method.half, result)
 
 
 def period_doubling_curve(
@@ -108,170 +112,158 @@ def period_doubling_curve(
 ) -> PeriodDoublingCurve:
     """Follow the period doublings over the plane of the drive's amplitude and frequency.
 
-    Args:
-        model: the isolator.
-        amplitude_range: window of F0 [N, or m/s^2 for base excitation], ascending.
-        frequency_range: window of f [Hz], ascending.
-        start: a period doubling inside the window; the first met by branches along the amplitude, or by those
-            that leave them at a broken symmetry, if omitted.
-        search: frequencies at which it is then looked for.
-        step: largest step, over the size of the motion and the window.
-        most: points to give up after.
-        integrator: solver and steps; 256 a period if omitted.
+    The arguments are those of `fold_curve`, `start` a period doubling inside the window; if omitted, the
+    first met by branches along the amplitude, or by those that leave them at a broken symmetry.
 
     Returns:
         The curve: closed, or from edge to edge of the window.
 
     Raises:
-        ValueError: if a range is not positive and ascending, `start` is no period doubling that was found,
-            none was met inside the window, or `search`, `step` or `most` is not positive.
+        ValueError: as `fold_curve` does.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: as of `fold_curve`; Swift & Wiesenfeld 1984, Phys. Rev. Lett. 52:705.
     """
-    window = (amplitude_range, frequency_range)
-    curve = _curve("period_doubling", model, window, start, search, step, most, integrator)
-    unknowns, normals, closed, ended = curve.follow()
-    numbers = curve.numbers(curve.polished(unknowns, normals))
-    periods = curve.start.periods
-    return PeriodDoublingCurve(*numbers[:4], jnp.array(closed), periods, _outcome(ended, numbers[4]))
+    search_for = _Search("period_doubling", (amplitude_range, frequency_range), search, Stride(step, most))
+    curve = _curve(model, search_for, start, integrator)
+    followed = curve.follow()
+    numbers, good = curve.numbers(curve.polished(followed.unknowns, followed.tangents))
+    closed, result = jnp.array(followed.closed), followed.result(good)
+    return PeriodDoublingCurve(*numbers, closed, curve.method.periods, result)
 
 
-def _outcome(ended: bool, good: Array) -> RESULTS:
-    well = jnp.asarray(ended) & jnp.all(good)
-    return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
+class _Search(NamedTuple):
+    """What curve is asked for.
+
+    Attributes:
+        kind: of its bifurcations.
+        window: ranges of amplitude and frequency.
+        frequencies: count of those at which a first point is looked for.
+        stride: steps along the curve.
+    """
+
+    kind: BifurcationKind
+    window: tuple[tuple[float, float], tuple[float, float]]
+    frequencies: int
+    stride: Stride
+
+
+class _Whole(NamedTuple):
+    """A curve followed both ways: its points, and whether it closes and ends as it should."""
+
+    unknowns: Array
+    tangents: Array
+    closed: bool
+    ended: bool
+
+    def result(self, good: Array) -> RESULTS:
+        """Give the outcome, from which points were found."""
+        well = jnp.asarray(self.ended) & jnp.all(good)
+        return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
 
 
 def _curve(
-    kind: Kind,
-    model: Isolator,
-    window: tuple[tuple[float, float], tuple[float, float]],
-    start: SpecialPoint | None,
-    search: int,
-    step: float,
-    most: int,
-    integrator: Integrator | None,
+    model: Isolator, search: _Search, start: SpecialPoint | None, integrator: Integrator | None
 ) -> "_Curve":
     """Check what was asked for, and give the search for a curve from its start on."""
     check_float64()
     refuse_traced(model)
-    for name, ends in zip(("amplitude_range", "frequency_range"), window, strict=True):
+    for name, ends in zip(("amplitude_range", "frequency_range"), search.window, strict=True):
         if not (len(ends) == 2 and 0.0 < ends[0] < ends[1] < math.inf):
             raise ValueError(f"Argument `{name}` must be two positive ascending numbers, but is {ends}.")
-    for name, value in (("search", search), ("step", step), ("most", most)):
+    counts = (("search", search.frequencies), ("step", search.stride.longest), ("most", search.stride.most))
+    for name, value in counts:
         if not value > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
     integrator = tracing_steps() if integrator is None else integrator
-    start = _meet(model, kind, *window, search, step, integrator) if start is None else start
-    family = _plane(model, *window, start, kind)
+    start = _meet(model, search, integrator) if start is None else start
+    if start.kind != search.kind or not is_successful(start.result):
+        raise ValueError(f"Argument `start` must be a {search.kind} that was found, but is a {start.kind}.")
+    low, high = (jnp.array(ends) for ends in zip(*search.window, strict=True))
+    zero = jnp.zeros(())
+    family = ParameterFamily(model, zero, zero, low, high, ("amplitude", "frequency"))
     # Only a symmetric orbit has multipliers over half a period; a doubling never is of one.
     symmetric = bool(np.isfinite(np.asarray(start.half_period_multipliers)).all())
-    return _Curve(family, integrator, kind, 0.5 if symmetric else float(start.periods), start, step, most)
+    method = ShootingMethod(integrator, start.periods, symmetric)
+    return _Curve(family, method, search.kind, start, search.stride)
 
 
-def _meet(
-    model: Isolator,
-    kind: Kind,
-    amplitude_range: tuple[float, float],
-    frequency_range: tuple[float, float],
-    search: int,
-    step: float,
-    integrator: Integrator,
-) -> SpecialPoint:
+def _meet(model: Isolator, search: _Search, integrator: Integrator) -> SpecialPoint:
     """Give the first bifurcation of a kind that branches along the amplitude meet."""
-    frozen = jax.lax.stop_gradient(model)
+    (low, high), frequency_range = search.window
     branch = continue_branch(
-        frozen,
+        jax.lax.stop_gradient(model),
         parameter="amplitude",
-        frequency=jnp.linspace(*frequency_range, search),
-        start=amplitude_range[0],
-        stop=amplitude_range[1],
-        step=step,
+        frequency=jnp.linspace(*frequency_range, search.frequencies),
+        start=low,
+        stop=high,
+        step=search.stride.longest,
         integrator=integrator,
     )
     met = [point for point in branch.special_points if is_successful(point.result)]
     for point in met:
-        if point.kind == kind:
+        if point.kind == search.kind:
             return point
     for point in met:
-        if kind == "period_doubling" and point.kind == "symmetry_breaking":
+        if search.kind == "period_doubling" and point.kind == "symmetry_breaking":
             for further in switch_branch(branch, point).special_points:
-                if further.kind == kind and is_successful(further.result):
+                if further.kind == search.kind and is_successful(further.result):
                     return further
     raise ValueError(
-        f"Argument `start` must be given where branches along the amplitude at {search} frequencies meet no "
-        f"{kind.replace('_', ' ')}, as in {amplitude_range} x {frequency_range}, but is None."
+        f"Argument `start` must be given where branches along the amplitude at {search.frequencies} "
+        f"frequencies meet no {search.kind.replace('_', ' ')}, as in {(low, high)} x {frequency_range}, but "
+        "is None."
     )
-
-
-def _plane(
-    model: Isolator,
-    amplitude_range: tuple[float, float],
-    frequency_range: tuple[float, float],
-    start: SpecialPoint,
-    kind: Kind,
-) -> Family:
-    if start.kind != kind or not is_successful(start.result):
-        raise ValueError(f"Argument `start` must be a {kind} that was found, but is a {start.kind}.")
-    low, high = (
-        jnp.array([first, second]) for first, second in zip(amplitude_range, frequency_range, strict=True)
-    )
-    zero = jnp.zeros(())
-    return Family(model, zero, zero, low, high, ("amplitude", "frequency"))
 
 
 class _Curve(eqx.Module):
     """The search for one curve: traced by fixed steps, found anew with the motion split at its kinks."""
 
-    family: Family
-    integrator: Integrator
-    kind: Kind = eqx.field(static=True)
-    turns: float = eqx.field(static=True)
+    family: ParameterFamily
+    method: ShootingMethod
+    kind: BifurcationKind = eqx.field(static=True)
     start: SpecialPoint
-    step: float = eqx.field(static=True)
-    most: int = eqx.field(static=True)
+    stride: Stride = eqx.field(static=True)
 
     @property
-    def frozen(self) -> Family:
+    def frozen(self) -> ParameterFamily:
         """The isolators and drives without derivatives."""
         return jax.lax.stop_gradient(self.family)
 
     def begin(self) -> tuple[Float[Array, " state"], Float[Array, " unknown"]]:
         """Give the size of the states, and the first point: scaled state, direction, shares."""
         family, start = self.frozen, jax.lax.stop_gradient(self.start)
-        shares = jnp.stack([start.amplitude, start.frequency])
-        shares = (shares - family.start) / (family.stop - family.start)
-        setting = family.at(shares)
-        path = trajectory(
-            setting.model, self.integrator, setting.drive, tuple(start.y0), turns=max(self.turns, 1.0)
-        )
+        shares = family.shares(jnp.stack([start.amplitude, start.frequency]))
+        there, turns = family.at(shares), float(self.method.periods)
+        path = trajectory(there.model, self.method.integrator, there.drive, tuple(start.y0), turns=turns)
         scale = state_scale(path)
         scaled = start.y0 / scale
-        matrix = jax.jacfwd(lambda z: family.image(self.integrator, self.turns, scale, z, shares))(scaled)
+        matrix = jax.jacfwd(lambda z: family.image(self.method, scale, z, shares))(scaled)
         direction = null_vector(matrix - CRITICAL[self.kind] * jnp.eye(scale.shape[0]))
         return scale, jnp.concatenate([scaled, direction, shares])
 
-    def follow(self) -> tuple[Array, Array, bool, bool]:
-        """Give points and tangents, whether they close, and whether they end as they should."""
+    def follow(self) -> _Whole:
+        """Follow the curve from its start both ways."""
         scale, first = _begin(self)
         forth, back = (_walk(self, scale, first, sign) for sign in (1.0, -1.0))
         ends, counts = [int(way.ending) for way in (forth, back)], [int(way.found) for way in (forth, back)]
-        if ends[0] == CLOSED:
-            return forth.unknowns[: counts[0]], forth.tangents[: counts[0]], True, True
+        if ends[0] == RETURNED:
+            return _Whole(forth.unknowns[: counts[0]], forth.tangents[: counts[0]], True, True)
         unknowns = jnp.concatenate([back.unknowns[: counts[1]][:0:-1], forth.unknowns[: counts[0]]])
         tangents = jnp.concatenate([-back.tangents[: counts[1]][:0:-1], forth.tangents[: counts[0]]])
-        return unknowns, tangents, False, all(end == REACHED_BOUND for end in ends)
+        return _Whole(unknowns, tangents, False, all(end == REACHED_BOUND for end in ends))
 
     def polished(self, unknowns: Array, normals: Array) -> Polished:
         """Give the points found anew."""
         scale, _ = _begin(self)
         count = unknowns.shape[0]
-        places = np.resize(np.arange(count), -(-count // _LANES) * _LANES).reshape(-1, _LANES)
-        room = first_places(self.family, scale.shape[0], self.turns)
+        rows = -(-count // _POLISHED_AT_ONCE)
+        places = np.resize(np.arange(count), (rows, _POLISHED_AT_ONCE))
+        room = first_places(self.family, scale.shape[0], self.method.turns)
         while True:
-            parts = [_polish_lanes(self, room, scale, unknowns[part], normals[part]) for part in places]
+            parts = [_polish_points(self, room, scale, unknowns[part], normals[part]) for part in places]
             whole = jax.tree.map(lambda *values: jnp.concatenate(values)[:count], *parts)
-            if bool(jnp.all(jax.lax.stop_gradient(whole.complete))) or room > 1000:
+            if bool(jnp.all(jax.lax.stop_gradient(whole.complete))) or room > MOST_PLACES:
                 return whole
             room *= 2
 
@@ -281,9 +273,9 @@ class _Curve(eqx.Module):
         cusps = []
         for place in np.nonzero(bends[:-1] * bends[1:] < 0.0)[0]:
             low, high, cusp = unknowns[place], unknowns[place + 1], found
-            for _ in range(_SECTIONS):
+            for _ in range(_CUSP_SECTIONS):
                 chord = (high - low) / jnp.linalg.norm(high - low)
-                shares = jnp.linspace(0.0, 1.0, _LANES)[:, None]
+                shares = jnp.linspace(0.0, 1.0, _POLISHED_AT_ONCE)[:, None]
                 along = low[None] + shares * (high - low)[None]
                 section = self.polished(along, jnp.broadcast_to(chord, along.shape))
                 bent = np.asarray(section.bend)
@@ -297,14 +289,14 @@ class _Curve(eqx.Module):
                 cusps.append(cusp)
         return cusps
 
-    def numbers(self, found: Polished) -> tuple[Array, Array, Array, Array, Array]:
-        """Give amplitude, frequency, state, multipliers, and which points were found."""
+    def numbers(self, found: Polished) -> tuple[tuple[Array, Array, Array, Array], Array]:
+        """Give amplitude, frequency, state and multipliers, and which points were found."""
         good = jax.lax.stop_gradient(found.found & found.complete)
         blank = jnp.where(good, 1.0, jnp.nan)
         values = jax.vmap(self.family.values)(found.shares) * blank[:, None]
         roots = multipliers(found.matrix * blank[:, None, None])
-        roots = roots * roots if self.turns == 0.5 else roots
-        return values[:, 0], values[:, 1], found.state * blank[:, None], roots, good
+        roots = roots * roots if self.method.half else roots
+        return (values[:, 0], values[:, 1], found.state * blank[:, None], roots), good
 
 
 @eqx.filter_jit
@@ -321,35 +313,23 @@ def _walk(curve: _Curve, scale: Array, first: Array, sign: float) -> Followed:
         scaled, direction, shares = u[:states], u[states : 2 * states], u[2 * states :]
 
         def image(z: Array) -> Array:
-            return family.image(curve.integrator, curve.turns, scale, z, shares)
+            return family.image(curve.method, scale, z, shares)
 
         moved, shift = jax.jvp(image, (scaled,), (direction,))
         norm = (jnp.dot(direction, direction) - 1.0)[None]
         return jnp.concatenate([moved - scaled, shift - critical * direction, norm])
 
     fixed = jnp.zeros_like(first).at[-1].set(1.0)
-    free = jnp.full(2 * states, jnp.inf)
-    lower, upper = jnp.concatenate([-free, jnp.zeros(2)]), jnp.concatenate([free, jnp.ones(2)])
-    return follow(equations, first, fixed, sign * fixed, lower, upper, step=curve.step, most=curve.most)
+    return follow(equations, Departure(first, fixed, sign * fixed), 2 * states, curve.stride)
 
 
 @eqx.filter_jit
-def _polish_lanes(curve: _Curve, places: int, scale: Array, unknowns: Array, normals: Array) -> Polished:
+def _polish_points(curve: _Curve, places: int, scale: Array, unknowns: Array, normals: Array) -> Polished:
     states = scale.shape[0]
 
     def lane(unknown: Array, normal: Array) -> Polished:
         plane = (normal, scale, unknown[states : 2 * states])
-        state, shares = unknown[:states] * scale, unknown[2 * states :]
-        return polish(
-            curve.family,
-            curve.integrator,
-            curve.kind,
-            curve.turns,
-            places,
-            state,
-            shares,
-            plane,
-            _ERROR,
-        )
+        guess = PointGuess(unknown[:states] * scale, unknown[2 * states :], plane)
+        return polish(curve.family, curve.method, curve.kind, guess, places, _ERROR)
 
     return jax.vmap(lane)(unknowns, normals)

@@ -15,13 +15,13 @@ from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import Integrator, Isolator
-from ..orbit import is_odd, response_start
-from ._arc_length import CLOSED, REACHED_BOUND, Followed, follow
+from ..orbit import ShootingMethod, is_odd, response_start
+from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._branch import Branch, BranchPoints, branch_point
-from ._parameter_family import Family
+from ._parameter_family import ParameterFamily
 from ._special_points import find_special_points
 
-_TRIALS = 33
+_SIZED_AT = 33
 """Parameters at which the size of the motion is estimated beforehand."""
 
 
@@ -118,8 +118,8 @@ def continue_branch(
     for name, value in (("periods", periods), ("step", step), ("most", most)):
         if not value > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
-    odd = is_odd(jax.lax.stop_gradient(model))
-    half = odd and periods == 1 and (bool(symmetric) or (symmetric is None and start_state is None))
+    wanted = periods == 1 and (bool(symmetric) or (symmetric is None and start_state is None))
+    half = wanted and is_odd(jax.lax.stop_gradient(model))
     if symmetric and not half:
         raise ValueError(
             "Argument `symmetric` must be False for a model that is not odd and for orbits of several "
@@ -129,9 +129,9 @@ def continue_branch(
     frozen = jax.lax.stop_gradient(family)
     first, scale = _starts(frozen, begin)
     fixed = jnp.zeros((*scale.shape[:1], states + 1)).at[:, -1].set(1.0)
-    turns = 0.5 if half else float(periods)
-    followed = trace(frozen, integrator, turns, scale, first, fixed, fixed, step, most)
-    return assemble(family, integrator, periods, half, odd, scale, followed, batched, step)
+    method, stride = ShootingMethod(integrator, periods, half), Stride(step, most)
+    followed = trace(frozen, method, scale, Departure(first, fixed, fixed), stride)
+    return assemble(family, method, scale, followed, batched, step)
 
 
 def _family(
@@ -141,7 +141,7 @@ def _family(
     stop: Scalar | float,
     amplitude: Lanes | float | None,
     frequency: Lanes | float | None,
-) -> tuple[Family, bool]:
+) -> tuple[ParameterFamily, bool]:
     """Check what is varied and what is held; give the family, drive with an axis, and whether asked so."""
     if parameter not in ("amplitude", "frequency"):
         names = [entry.name for entry in list_parameters(model)]
@@ -174,32 +174,18 @@ def _family(
     if len(shape) > 1:
         raise ValueError(f"Argument `{parameter}`'s partner must be a number or a list, but has {shape}.")
     lanes = {name: jnp.broadcast_to(value, shape or (1,)) for name, value in drive.items()}
-    family = Family(model, lanes["amplitude"], lanes["frequency"], start[None], stop[None], (parameter,))
-    return family, bool(shape)
-
-
-def one_of(family: Family, amplitude: Array, frequency: Array) -> Family:
-    """Give one member of a batch.
-
-    Args:
-        family: the batch.
-        amplitude: F0 of the one.
-        frequency: f of the one [Hz].
-
-    Returns:
-        The member.
-    """
-    return eqx.tree_at(lambda f: (f.amplitude, f.frequency), family, (amplitude, frequency))
+    drives = lanes["amplitude"], lanes["frequency"]
+    return ParameterFamily(model, *drives, start[None], stop[None], (parameter,)), bool(shape)
 
 
 @eqx.filter_jit
 def _starts(
-    family: Family, begin: Float[Array, " state"] | None
+    family: ParameterFamily, begin: Float[Array, " state"] | None
 ) -> tuple[Float[Array, "branch unknown"], Float[Array, "branch state"]]:
     """Give the first point of each branch, and the size of its states over the range."""
 
     def lane(amplitude: Array, frequency: Array) -> tuple[Array, Array]:
-        here = one_of(family, amplitude, frequency)
+        here = family.driven(amplitude, frequency)
 
         def answer(share: Array) -> tuple[Array, Array]:
             setting = here.at(share[None])
@@ -208,7 +194,7 @@ def _starts(
             motion = jnp.hypot(state[0], state[1] / omega)
             return state, jnp.concatenate([jnp.stack([motion, motion * omega]), jnp.abs(state[2:])])
 
-        state, sizes = jax.vmap(answer)(jnp.linspace(0.0, 1.0, _TRIALS))
+        state, sizes = jax.vmap(answer)(jnp.linspace(0.0, 1.0, _SIZED_AT))
         size = jnp.max(jnp.where(jnp.isfinite(sizes), sizes, 0.0), axis=0)
         scale = jnp.where(size > 0.0, size, 1.0)
         first = state[0] if begin is None else begin
@@ -219,68 +205,49 @@ def _starts(
 
 @eqx.filter_jit
 def trace(
-    family: Family,
-    integrator: Integrator,
-    turns: float,
+    family: ParameterFamily,
+    method: ShootingMethod,
     scale: Float[Array, "branch state"],
-    first: Float[Array, "branch unknown"],
-    row: Float[Array, "branch unknown"],
-    tangent: Float[Array, "branch unknown"],
-    step: float,
-    most: int,
+    departure: Departure,
+    stride: Stride,
 ) -> Followed:
     """Follow a batch of branches.
 
     Args:
         family: isolators and drives, drive with a leading axis.
-        integrator: steps and solver.
-        turns: drive periods of the map.
+        method: how the orbits are closed.
         scale: size of each state.
-        first: start of each: scaled state and share.
-        row: see `follow`.
-        tangent: see `follow`.
-        step: largest step.
-        most: points at most.
+        departure: where each starts: scaled state and share.
+        stride: steps along the branches.
 
     Returns:
         The curves.
     """
     states = scale.shape[1]
-    free = jnp.full(states, jnp.inf)
 
-    def lane(
-        amplitude: Array, frequency: Array, scale: Array, first: Array, row: Array, way: Array
-    ) -> Followed:
-        here = one_of(family, amplitude, frequency)
+    def lane(amplitude: Array, frequency: Array, scale: Array, departure: Departure) -> Followed:
+        here = family.driven(amplitude, frequency)
+        return follow(lambda u: here.open_end(method, scale, u), departure, states, stride)
 
-        def open_end(u: Array) -> Array:
-            return here.image(integrator, turns, scale, u[:states], u[states:]) - u[:states]
-
-        lower, upper = jnp.concatenate([-free, jnp.zeros(1)]), jnp.concatenate([free, jnp.ones(1)])
-        return follow(open_end, first, row, way, lower, upper, step=step, most=most)
-
-    return jax.vmap(lane)(family.amplitude, family.frequency, scale, first, row, tangent)
+    return jax.vmap(lane)(family.amplitude, family.frequency, scale, departure)
 
 
 @eqx.filter_jit
 def _points(
-    family: Family, integrator: Integrator, turns: float, scale: Array, unknowns: Array, tangents: Array
+    family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
 ) -> BranchPoints:
     def lane(
         amplitude: Array, frequency: Array, scale: Array, unknown: Array, tangent: Array
     ) -> BranchPoints:
-        here = one_of(family, amplitude, frequency)
-        return jax.vmap(lambda u, t: branch_point(here, integrator, turns, scale, u, t))(unknown, tangent)
+        here = family.driven(amplitude, frequency)
+        return jax.vmap(lambda u, t: branch_point(here, method, scale, u, t))(unknown, tangent)
 
     return jax.vmap(lane)(family.amplitude, family.frequency, scale, unknowns, tangents)
 
 
 def assemble(
-    family: Family,
-    integrator: Integrator,
-    periods: int,
-    half: bool,
-    odd: bool,
+    family: ParameterFamily,
+    method: ShootingMethod,
     scale: Float[Array, "branch state"],
     followed: Followed,
     batched: bool,
@@ -290,10 +257,7 @@ def assemble(
 
     Args:
         family: isolators and drives, drive with a leading axis.
-        integrator: steps and solver.
-        periods: drive periods after which the orbits repeat.
-        half: whether they were closed with the half-period map.
-        odd: whether the model is odd.
+        method: how the orbits are closed.
         scale: size of each state.
         followed: the traced points.
         batched: whether to keep the leading axis.
@@ -302,13 +266,12 @@ def assemble(
     Returns:
         The branch.
     """
-    turns = 0.5 if half else float(periods)
     counts = np.asarray(followed.found)
     # Rounded up, so that few shapes are compiled.
     room = min(-(-max(int(counts.max()), 2) // 128) * 128, followed.unknowns.shape[1])
     unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
-    points = _points(family, integrator, turns, scale, unknowns, tangents)
-    special = find_special_points(family, integrator, periods, half, odd, scale, unknowns, tangents, counts)
+    points = _points(family, method, scale, unknowns, tangents)
+    special = find_special_points(family, method, scale, unknowns, tangents, counts)
     longest = int(counts.max())
 
     def crop(values: Array) -> Array:
@@ -320,21 +283,21 @@ def assemble(
     def single(values: Array) -> Array:
         return values if batched else values[0]
 
-    ended = (followed.ending == REACHED_BOUND) | (followed.ending == CLOSED)
+    ended = (followed.ending == REACHED_BOUND) | (followed.ending == RETURNED)
     good = RESULTS.promote(diffrax.RESULTS.successful)
     result = jax.vmap(lambda well: RESULTS.where(well, good, RESULTS.not_converged))(ended)
-    kept = one_of(family, single(family.amplitude), single(family.frequency))
+    kept = family.driven(single(family.amplitude), single(family.frequency))
     return Branch(
         family.model,
         family.names[0],
-        periods,
-        half,
-        single(followed.ending == CLOSED),
+        method.periods,
+        method.half,
+        single(followed.ending == RETURNED),
         jax.tree.map(crop, points),
         special,
         result if batched else jax.tree.map(lambda value: value[0], result),
         kept,
-        integrator,
+        method.integrator,
         single(scale),
         step,
     )

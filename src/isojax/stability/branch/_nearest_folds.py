@@ -14,24 +14,24 @@ from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import Integrator, Isolator
 from ..orbit import is_odd, modulus, multipliers, period_map, recorded_sine, state_scale, trajectory
-from ._arc_length import REACHED_BOUND, Followed, follow
+from ._arc_length import REACHED_BOUND, Departure, Followed, Stride, follow
 from ._continuation import tracing_steps
 
-_SETTLING = 4
-"""Periods that a start is simulated for first: memories, which no one measures, settle, and the motion leans
-to the stable side of a fold."""
+_SETTLING_PERIODS = 4
+"""Periods that a start is simulated for first: internal states, which no one measures, settle, and the
+motion leans to the stable side of a fold."""
 
-_PASSES = 12
+_ORBIT_STEPS = 12
 """Steps of Newton's method for an orbit."""
 
-_CLOSED = 1e-6
+_CLOSED_TO = 1e-6
 """Largest last step of Newton's method, over the size of the motion: at a kink of the law it may stall far
 above rounding."""
 
-_STEP, _MOST = 0.1, 96
-"""Largest step along a branch, over the size of the motion and the reach, and points to make room for."""
+_STRIDE = Stride(longest=0.1, most=96)
+"""Steps along a branch, over the size of the motion and the reach, and points to make room for."""
 
-_LANES = 128
+_FOLLOWED_AT_ONCE = 128
 """Motions followed together."""
 
 _WAYS = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
@@ -128,14 +128,14 @@ def find_nearest_folds(
         raise ValueError(f"Argument `reach` must lie between 0 and 1, but is {reach}.")
     integrator = tracing_steps() if integrator is None else integrator
     turns = 0.5 if is_odd(model) else 1.0
-    lanes = min(_LANES, 1 << max(2, (count - 1).bit_length()))
+    lanes = min(_FOLLOWED_AT_ONCE, 1 << max(2, (count - 1).bit_length()))
     parts = []
     for first in range(0, count, lanes):
         # Filled up by repeating the last, so that few shapes are compiled.
         chosen = np.minimum(np.arange(first, first + lanes), count - 1)
         pushes, rates = jnp.asarray(drive[0, chosen]), jnp.asarray(drive[1, chosen])
         orbit = _orbits(model, integrator, turns, pushes, rates, jnp.asarray(begin[chosen]))
-        folds = _folds(model, integrator, turns, pushes, rates, jnp.asarray(reach), orbit.y0, orbit.scale)
+        folds = _folds(model, integrator, turns, (pushes, rates), jnp.asarray(reach), orbit)
         fold_at = jnp.where(orbit.found[:, None], folds, jnp.nan)
         parts.append(jax.tree.map(lambda it, n=count - first: it[:n], (orbit, fold_at)))
     orbit, fold_at = jax.tree.map(lambda *each: jnp.concatenate(each), *parts)
@@ -188,8 +188,8 @@ def _orbits(
         def period(_: Array | int, state: tuple[Array, ...]) -> tuple[Array, ...]:
             return period_map(model, integrator, drive, state)
 
-        begin = jax.lax.fori_loop(0, _SETTLING, period, tuple(start))
-        scale = state_scale(trajectory(model, integrator, drive, begin))
+        settled = jax.lax.fori_loop(0, _SETTLING_PERIODS, period, tuple(start))
+        scale = state_scale(trajectory(model, integrator, drive, settled))
 
         def image(scaled: Array) -> Array:
             moved = period_map(model, integrator, drive, tuple(scaled * scale), turns=turns)
@@ -203,14 +203,15 @@ def _orbits(
             # Far off, a full step may leave the basin of the orbit that the start is near to.
             return scaled + jnp.minimum(1.0, 0.3 / jnp.maximum(size, 1e-300)) * change, size
 
-        scaled, last = jax.lax.fori_loop(0, _PASSES, newton, (jnp.stack(begin) / scale, jnp.asarray(jnp.inf)))
+        begin = (jnp.stack(settled) / scale, jnp.asarray(jnp.inf))
+        scaled, last = jax.lax.fori_loop(0, _ORBIT_STEPS, newton, begin)
         roots = multipliers(scale[:, None] * jax.jacfwd(image)(scaled) / scale[None])
         roots = roots * roots if turns == 0.5 else roots
         path = trajectory(model, integrator, drive, tuple(scaled * scale))
         own = state_scale(path)
         response = 0.5 * (jnp.max(path[0]) - jnp.min(path[0]))
         finite = jnp.all(jnp.isfinite(scaled)) & jnp.all(jnp.isfinite(jnp.abs(roots)))
-        return _Orbits(scaled * scale, own, response, roots, finite & (last < _CLOSED), finite)
+        return _Orbits(scaled * scale, own, response, roots, finite & (last < _CLOSED_TO), finite)
 
     return jax.vmap(lane)(amplitude, frequency, starts)
 
@@ -220,15 +221,12 @@ def _folds(
     model: Isolator,
     integrator: Integrator,
     turns: float,
-    amplitude: Float[Array, " motion"],
-    frequency: Float[Array, " motion"],
+    drives: tuple[Float[Array, " motion"], Float[Array, " motion"]],
     reach: Float[Array, "2"],
-    states: Float[Array, "motion state"],
-    scales: Float[Array, "motion state"],
+    orbits: _Orbits,
 ) -> Float[Array, "motion way"]:
     """Give the first fold each way, as a share of the own drive; infinite where there is none."""
-    size = states.shape[1]
-    free = jnp.full(size, jnp.inf)
+    size = orbits.y0.shape[1]
     last = jnp.zeros(size + 1).at[-1].set(1.0)
 
     def lane(push: Array, rate: Array, state: Array, scale: Array, way: Array) -> Array:
@@ -240,13 +238,12 @@ def _folds(
             return jnp.stack(moved) / scale - u[:-1]
 
         first = jnp.concatenate([state / scale, jnp.zeros(1)])
-        lower, upper = jnp.concatenate([-free, jnp.zeros(1)]), jnp.concatenate([free, jnp.ones(1)])
-        curve = follow(open_end, first, last, last, lower, upper, step=_STEP, most=_MOST)
+        curve = follow(open_end, Departure(first, last, last), size, _STRIDE)
         return _first_turn(curve) * jnp.sum(jnp.abs(change))
 
     ways = jnp.asarray(_WAYS)
     over_ways = jax.vmap(lane, in_axes=(None, None, None, None, 0))
-    return jax.vmap(over_ways, in_axes=(0, 0, 0, 0, None))(amplitude, frequency, states, scales, ways)
+    return jax.vmap(over_ways, in_axes=(0, 0, 0, 0, None))(*drives, orbits.y0, orbits.scale, ways)
 
 
 def _first_turn(curve: Followed) -> Float[Array, ""]:

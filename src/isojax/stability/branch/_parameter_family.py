@@ -8,8 +8,8 @@ from jaxtyping import Array, Float
 
 from ..._parameters import find_parameter, list_parameters, replace_parameters
 from ..._types import Lanes
-from ...models import Integrator, Isolator
-from ..orbit import Sine, period_map, recorded_sine
+from ...models import Isolator
+from ..orbit import ShootingMethod, Sine, period_map, recorded_sine
 
 
 class Setting(NamedTuple):
@@ -31,7 +31,7 @@ class Setting(NamedTuple):
         return recorded_sine(self.model, self.amplitude, self.frequency)
 
 
-class Family(eqx.Module):
+class ParameterFamily(eqx.Module):
     """Isolators and drives over a range of one or two parameters.
 
     Attributes:
@@ -49,6 +49,22 @@ class Family(eqx.Module):
     start: Float[Array, " parameter"]
     stop: Float[Array, " parameter"]
     names: tuple[str, ...] = eqx.field(static=True)
+
+    def driven(self, amplitude: Lanes, frequency: Lanes) -> "ParameterFamily":
+        """Give the same isolators under another drive.
+
+        Args:
+            amplitude: F0 [N, or m/s^2 for base excitation].
+            frequency: f [Hz].
+
+        Returns:
+            The family.
+        """
+        return eqx.tree_at(lambda one: (one.amplitude, one.frequency), self, (amplitude, frequency))
+
+    def shares(self, values: Float[Array, " parameter"]) -> Float[Array, " parameter"]:
+        """Give parameters as shares of their ranges, the inverse of `values`."""
+        return (values - self.start) / (self.stop - self.start)
 
     def values(self, shares: Float[Array, " parameter"]) -> Float[Array, " parameter"]:
         """Give the parameters.
@@ -79,17 +95,15 @@ class Family(eqx.Module):
 
     def image(
         self,
-        integrator: Integrator,
-        turns: float,
+        method: ShootingMethod,
         scale: Float[Array, " state"],
         scaled: Float[Array, " state"],
         shares: Float[Array, " parameter"],
     ) -> Float[Array, " state"]:
-        """Give the state after `turns` periods by fixed steps, in scaled units.
+        """Give the state after the turns of the method by fixed steps, in scaled units.
 
         Args:
-            integrator: steps and solver.
-            turns: drive periods; 0.5 for minus the state after half of one.
+            method: how the orbits are closed.
             scale: size of each state.
             scaled: state at t = 0 over `scale`.
             shares: parameters.
@@ -97,6 +111,22 @@ class Family(eqx.Module):
         Returns:
             The state then, over `scale`.
         """
-        setting = self.at(shares)
-        moved = period_map(setting.model, integrator, setting.drive, tuple(scaled * scale), turns=turns)
+        there, begin = self.at(shares), tuple(scaled * scale)
+        moved = period_map(there.model, method.integrator, there.drive, begin, turns=method.turns)
         return jnp.stack(moved) / scale
+
+    def open_end(
+        self, method: ShootingMethod, scale: Float[Array, " state"], unknown: Float[Array, " unknown"]
+    ) -> Float[Array, " state"]:
+        """Give how far a motion misses its own start, in scaled units.
+
+        Args:
+            method: how the orbits are closed.
+            scale: size of each state.
+            unknown: scaled state at t = 0, then the shares of the parameters.
+
+        Returns:
+            Zero for a periodic orbit.
+        """
+        states = scale.shape[0]
+        return self.image(method, scale, unknown[:states], unknown[states:]) - unknown[:states]

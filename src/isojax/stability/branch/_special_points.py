@@ -1,5 +1,7 @@
 """Bifurcations along a branch: test function, change of sign, bisection, and then the extended equations."""
 
+import functools
+
 import diffrax
 import equinox as eqx
 import jax
@@ -8,21 +10,23 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._results import RESULTS, is_successful
-from ...models import Integrator
-from ..orbit import multipliers, period_map
+from ..orbit import ShootingMethod, is_odd, multipliers, period_map
 from ._branch import SpecialPoint
-from ._extended_system import Kind, first_places, polish_jitted
-from ._parameter_family import Family
+from ._extended_system import MOST_PLACES, BifurcationKind, PointGuess, first_places, polish_jitted
+from ._parameter_family import ParameterFamily
 
 _BISECTIONS, _CORRECTIONS = 14, 4
 """Halvings of the step in which a test function changes sign, and steps of Newton's method in each."""
 
-_LANES = 4
-"""Located together; their count is rounded up to this, so that few shapes are compiled."""
+_LOCATED_AT_ONCE = 4
+"""Bifurcations located together; their count is rounded up to this, so that few shapes are compiled."""
 
-_MIRRORED = 1e-3
-"""Distance of the two halves of a motion, over its size, below which it counts as symmetric: bisection leaves
-a ten-thousandth of a step."""
+_REPEATED = 1e-3
+"""Distance of a motion from its mirror image half a period on, or from itself a period on, over its size,
+below which it counts as symmetric or repeated: bisection leaves a ten-thousandth of a step."""
+
+_REAL = 1e-6
+"""Imaginary part below which a pair of multipliers counts as two real ones, one the inverse of the other."""
 
 
 def critical_values(
@@ -55,27 +59,25 @@ def critical_values(
 
 
 def _slopes(
-    family: Family, integrator: Integrator, turns: float, scale: Array, here: Array
+    family: ParameterFamily, method: ShootingMethod, scale: Array, here: Array
 ) -> tuple[Array, Array]:
     """Give what is left open at a point and its derivative by state and share."""
-    states = scale.shape[0]
 
     def open_end(u: Array) -> Array:
-        return family.image(integrator, turns, scale, u[:states], u[states:]) - u[:states]
+        return family.open_end(method, scale, u)
 
     return open_end(here), jax.jacfwd(open_end)(here)
 
 
 @eqx.filter_jit
 def critical_values_along(
-    family: Family, integrator: Integrator, turns: float, scale: Array, unknowns: Array, tangents: Array
+    family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
 ) -> Float[Array, "branch point test"]:
     """Give the test functions at every point of a batch of branches.
 
     Args:
         family: isolators and drives, drive with a leading axis.
-        integrator: steps and solver.
-        turns: drive periods of the map.
+        method: how the orbits are closed.
         scale: size of each state, branch first.
         unknowns: points, branch first.
         tangents: along the branches.
@@ -85,11 +87,11 @@ def critical_values_along(
     """
 
     def lane(amplitude: Array, frequency: Array, scale: Array, unknown: Array, tangent: Array) -> Array:
-        here = eqx.tree_at(lambda f: (f.amplitude, f.frequency), family, (amplitude, frequency))
+        here = family.driven(amplitude, frequency)
         states = scale.shape[0]
 
         def point(u: Array, t: Array) -> Array:
-            _, slope = _slopes(here, integrator, turns, scale, u)
+            _, slope = _slopes(here, method, scale, u)
             return critical_values(slope[:, :states] + jnp.eye(states), t)
 
         return jax.vmap(point)(unknown, tangent)
@@ -99,27 +101,29 @@ def critical_values_along(
 
 @eqx.filter_jit
 def _locate(
-    family: Family,
-    integrator: Integrator,
-    turns: float,
+    family: ParameterFamily,
+    method: ShootingMethod,
     scale: Float[Array, "lane state"],
     ends: tuple[Array, Array],
-    before: Float[Array, " lane"],
-    which: Int[Array, " lane"],
+    change: tuple[Float[Array, " lane"], Int[Array, " lane"]],
     bisections: int,
 ) -> tuple[Array, Array, Array]:
-    """Bisect; give the points, their matrices, and how far the two halves of each motion differ."""
+    """Bisect between the ends for a test function, its value at the first and its number given in `change`.
+
+    Returns:
+        The points, their matrices, and how far each motion is from repeating; see `_repeats`.
+    """
 
     def lane(
-        amplitude: Array, frequency: Array, scale: Array, low: Array, high: Array, sign: Array, kind: Array
-    ):
-        here = eqx.tree_at(lambda f: (f.amplitude, f.frequency), family, (amplitude, frequency))
+        drive: tuple[Array, Array], scale: Array, ends: tuple[Array, Array], sign: Array, kind: Array
+    ) -> tuple[Array, Array, Array]:
+        here, (low, high) = family.driven(*drive), ends
         states = scale.shape[0]
         chord = (high - low) / jnp.linalg.norm(high - low)
 
         def correct(guess: Array) -> Array:
             def newton(_: Array | int, u: Array) -> Array:
-                left, slope = _slopes(here, integrator, turns, scale, u)
+                left, slope = _slopes(here, method, scale, u)
                 across = jnp.dot(chord, u - guess)
                 return u - jnp.linalg.solve(
                     jnp.concatenate([slope, chord[None]]), jnp.concatenate([left, across[None]])
@@ -130,7 +134,7 @@ def _locate(
         def halve(_: Array | int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
             low, high = ends
             middle = correct(0.5 * (low + high))
-            _, slope = _slopes(here, integrator, turns, scale, middle)
+            _, slope = _slopes(here, method, scale, middle)
             ahead = jnp.linalg.solve(
                 jnp.concatenate([slope, chord[None]]), jnp.zeros(states + 1).at[-1].set(1.0)
             )
@@ -140,20 +144,20 @@ def _locate(
 
         low, high = jax.lax.fori_loop(0, bisections, halve, (low, high))
         found = correct(0.5 * (low + high))
-        _, slope = _slopes(here, integrator, turns, scale, found)
-        repeats = _repeats(here, integrator, scale, found[:states], found[states:])
+        _, slope = _slopes(here, method, scale, found)
+        repeats = _repeats(here, method, scale, found[:states], found[states:])
         return found, slope[:, :states] + jnp.eye(states), repeats
 
-    return jax.vmap(lane)(family.amplitude, family.frequency, scale, *ends, before, which)
+    return jax.vmap(lane)((family.amplitude, family.frequency), scale, ends, *change)
 
 
 def _repeats(
-    family: Family, integrator: Integrator, scale: Array, scaled: Array, shares: Array
+    family: ParameterFamily, method: ShootingMethod, scale: Array, scaled: Array, shares: Array
 ) -> Float[Array, "2"]:
     """Give the distance of the motion from its mirror image half a period on, and from itself a period on."""
-    setting = family.at(shares)
-    begin = tuple(scaled * scale)
-    later = (period_map(setting.model, integrator, setting.drive, begin, turns=turns) for turns in (0.5, 1.0))
+    there, begin = family.at(shares), tuple(scaled * scale)
+    maps = functools.partial(period_map, there.model, method.integrator, there.drive, begin)
+    later = (maps(turns=turns) for turns in (0.5, 1.0))
     off = [jnp.max(jnp.abs(jnp.stack(state) / scale - scaled)) for state in later]
     return jnp.stack(off) / jnp.max(jnp.abs(scaled))
 
@@ -162,11 +166,8 @@ _repeats_jitted = eqx.filter_jit(_repeats)
 
 
 def find_special_points(
-    live: Family,
-    integrator: Integrator,
-    periods: int,
-    half: bool,
-    odd: bool,
+    live: ParameterFamily,
+    method: ShootingMethod,
     scale: Float[Array, "branch state"],
     unknowns: Float[Array, "branch point unknown"],
     tangents: Float[Array, "branch point unknown"],
@@ -176,10 +177,7 @@ def find_special_points(
 
     Args:
         live: isolators and drives, drive with a leading axis; its derivatives reach the points.
-        integrator: steps and solver.
-        periods: drive periods after which the orbits repeat.
-        half: whether the orbits were closed with the half-period map.
-        odd: whether the model is odd, so that asymmetric orbits may end in symmetric ones.
+        method: how the orbits are closed.
         scale: size of each state.
         unknowns: points.
         tangents: along the branches.
@@ -189,55 +187,51 @@ def find_special_points(
         The points, branch after branch.
     """
     family = jax.lax.stop_gradient(live)
-    turns = 0.5 if half else float(periods)
-    tests = np.asarray(critical_values_along(family, integrator, turns, scale, unknowns, tangents))
+    tests = np.asarray(critical_values_along(family, method, scale, unknowns, tangents))
     changes = (np.sign(tests[:, :-1]) != np.sign(tests[:, 1:])) & np.isfinite(tests[:, :-1] * tests[:, 1:])
     changes &= (np.arange(tests.shape[1] - 1) < counts[:, None] - 1)[..., None]
     lanes, places, kinds = np.nonzero(changes)
     if not lanes.size:
         return ()
-    padded = np.resize(np.arange(lanes.size), -(-lanes.size // _LANES) * _LANES)
+    padded = np.resize(np.arange(lanes.size), -(-lanes.size // _LOCATED_AT_ONCE) * _LOCATED_AT_ONCE)
     lane, place, which = lanes[padded], places[padded], kinds[padded]
     ends = (unknowns[lane, place], unknowns[lane, place + 1])
-    drives = (family.amplitude[lane], family.frequency[lane])
-    there = eqx.tree_at(lambda f: (f.amplitude, f.frequency), family, drives)
-    before = jnp.asarray(tests[lane, place, which])
-    found, matrices, repeats = _locate(
-        there, integrator, turns, scale[lane], ends, before, jnp.asarray(which), _BISECTIONS
-    )
-    points = []
-    for index in range(lanes.size):
-        kind, own_periods, own_half = _judge(
-            which[index], periods, half, odd, np.asarray(matrices[index]), np.asarray(repeats[index])
-        )
-        if kind is not None:
-            own = eqx.tree_at(
-                lambda f: (f.amplitude, f.frequency),
-                live,
-                (live.amplitude[lanes[index]], live.frequency[lanes[index]]),
-            )
-            states = scale.shape[1]
-            size, lane_number = scale[lanes[index]], int(lanes[index])
-            state, shares = found[index, :states] * size, found[index, states:]
-            point = special_point(own, integrator, kind, own_periods, own_half, lane_number, state, shares)
-            crossed = _crossed(periods, half, odd) if kind == "fold" else None
-            if crossed is not None and not _is_fold(own, integrator, size, point, crossed[0]):
-                other = special_point(own, integrator, *crossed, lane_number, state, shares)
+    there = family.driven(family.amplitude[lane], family.frequency[lane])
+    change = jnp.asarray(tests[lane, place, which]), jnp.asarray(which)
+    located = _locate(there, method, scale[lane], ends, change, _BISECTIONS)
+    crossed, points = _crossed(family, method), []
+    for branch, test, found, matrix, repeats in zip(lanes, kinds, *located, strict=False):
+        judged = _judge(int(test), method, np.asarray(matrix))
+        if test == 0 and crossed is not None and _distance(crossed[0], repeats) < _REPEATED:
+            judged = crossed
+        if judged is not None:
+            own = live.driven(live.amplitude[branch], live.frequency[branch])
+            size = scale[branch]
+            guess = PointGuess(found[: size.size] * size, found[size.size :])
+            point = special_point(own, judged[1], judged[0], int(branch), guess)
+            if judged[0] == "fold" and crossed is not None and not _is_fold(own, size, point, crossed[0]):
+                other = special_point(own, crossed[1], crossed[0], int(branch), guess)
                 point = other if is_successful(other.result) else point
             points.append(point)
     return tuple(points)
 
 
-def _crossed(periods: int, half: bool, odd: bool) -> tuple[Kind, int, bool] | None:
-    """Give what a branch meets where it crosses the one that it may have left."""
-    if odd and not half and periods == 1:
-        return "symmetry_breaking", 1, True
-    return ("period_doubling", 1, False) if periods == 2 else None
+def _crossed(
+    family: ParameterFamily, method: ShootingMethod
+) -> tuple[BifurcationKind, ShootingMethod] | None:
+    """Give what a branch meets where it crosses the one that it may have left, and how orbits close there."""
+    once = ShootingMethod(method.integrator, 1, False)
+    if method.periods == 1 and not method.half and is_odd(family.model):
+        return "symmetry_breaking", ShootingMethod(method.integrator, 1, True)
+    return ("period_doubling", once) if method.periods == 2 else None
 
 
-def _is_fold(
-    family: Family, integrator: Integrator, scale: Array, point: SpecialPoint, crossing: Kind
-) -> bool:
+def _distance(crossing: BifurcationKind, repeats: Float[Array, "2"]) -> float:
+    """Give how far a motion is from one of the branch that is crossed there; see `_repeats`."""
+    return float(repeats[0 if crossing == "symmetry_breaking" else 1])
+
+
+def _is_fold(family: ParameterFamily, scale: Array, point: SpecialPoint, crossing: BifurcationKind) -> bool:
     """Whether a point was found and is not where the branch crosses the one that it left.
 
     At a crossing the equations of the search are singular, so that it may stop beside it, too far for the
@@ -246,67 +240,49 @@ def _is_fold(
     if not is_successful(point.result):
         return False
     family, point = jax.lax.stop_gradient((family, point))
-    shares = (point.value - family.start) / (family.stop - family.start)
-    mirrored, repeated = _repeats_jitted(family, integrator, scale, point.y0 / scale, shares)
-    return float(mirrored if crossing == "symmetry_breaking" else repeated) >= _MIRRORED
+    shares = family.shares(point.value[None])
+    repeats = _repeats_jitted(family, point.method, scale, point.y0 / scale, shares)
+    return _distance(crossing, repeats) >= _REPEATED
 
 
 def _judge(
-    which: int | np.integer,
-    periods: int,
-    half: bool,
-    odd: bool,
-    matrix: np.ndarray,
-    repeats: np.ndarray,
-) -> tuple[Kind | None, int, bool]:
-    """Say which bifurcation a sign change is, of which orbit."""
-    mirrored, repeated = repeats < _MIRRORED
+    which: int, method: ShootingMethod, matrix: np.ndarray
+) -> tuple[BifurcationKind, ShootingMethod] | None:
+    """Say which bifurcation a sign change is that is no crossing, or None for two real multipliers."""
     if which == 0:
-        crossed = _crossed(periods, half, odd)
-        if crossed is not None and (mirrored if crossed[0] == "symmetry_breaking" else repeated):
-            return crossed
-        return "fold", periods, half
+        return "fold", method
     if which == 1:
-        return ("symmetry_breaking" if half else "period_doubling"), periods, half
+        return ("symmetry_breaking" if method.half else "period_doubling"), method
     values = np.linalg.eigvals(matrix)
     first, second = np.triu_indices(values.size, 1)
     pair = np.argmin(np.abs(values[first] * values[second] - 1.0))
-    if abs(values[first[pair]].imag) < 1e-6:
-        return None, periods, half
-    return "neimark_sacker", periods, half
+    return None if abs(values[first[pair]].imag) < _REAL else ("neimark_sacker", method)
 
 
 def special_point(
-    family: Family,
-    integrator: Integrator,
-    kind: Kind,
-    periods: int,
-    half: bool,
+    family: ParameterFamily,
+    method: ShootingMethod,
+    kind: BifurcationKind,
     branch: int,
-    state: Float[Array, " state"],
-    shares: Float[Array, " parameter"],
+    guess: PointGuess,
 ) -> SpecialPoint:
     """Give a bifurcation found from a start, the motion split at its kinks.
 
     Args:
         family: isolators and drives along one parameter.
-        integrator: steps and solver.
+        method: how the orbit is closed.
         kind: which bifurcation.
-        periods: drive periods after which the orbit repeats.
-        half: whether to close it with the half-period map.
         branch: which branch of a batch it lies on.
-        state: start at t = 0, SI units.
-        shares: start of the parameter.
+        guess: start of the search.
 
     Returns:
         The point.
     """
-    turns = 0.5 if half else float(periods)
-    places = first_places(family, state.shape[0], turns)
-    found = polish_jitted(family, integrator, kind, turns, places, state, shares)
-    while not bool(jax.lax.stop_gradient(found.complete)) and places < 1000:
+    places = first_places(family, guess.state.shape[0], method.turns)
+    found = polish_jitted(family, method, kind, guess, places)
+    while not bool(jax.lax.stop_gradient(found.complete)) and places < MOST_PLACES:
         places *= 2
-        found = polish_jitted(family, integrator, kind, turns, places, state, shares)
+        found = polish_jitted(family, method, kind, guess, places)
     good = jax.lax.stop_gradient(found.found & found.complete)
     blank = jnp.where(good, 1.0, jnp.nan)
     setting = family.at(found.shares)
@@ -314,17 +290,17 @@ def special_point(
     result = RESULTS.where(good, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
     return SpecialPoint(
         kind,
-        periods,
+        method.periods,
         branch,
         family.values(found.shares)[0] * blank,
         jnp.asarray(setting.amplitude) * blank,
         jnp.asarray(setting.frequency) * blank,
         found.state * blank,
-        roots * roots if half else roots,
-        roots if half else jnp.full(roots.shape, jnp.nan + 0j),
+        roots * roots if method.half else roots,
+        roots if method.half else jnp.full(roots.shape, jnp.nan + 0j),
         found.direction * found.scale,
         result,
         family,
-        integrator,
-        half,
+        method.integrator,
+        method.half,
     )

@@ -11,9 +11,9 @@ from jaxtyping import Array, Bool
 from ..._parameters import list_parameters
 from ...excitations import Harmonic
 from ...models import Isolator
-from ..map import Lane, Method, StabilityMap
+from ..map import Lane, MapMethod, StabilityMap
 from ..orbit import Sine, find_periodic_orbit, modulus, multipliers, trajectory
-from ._parameter_values import DRIVE, with_values
+from ._parameter_values import DRIVE, differentiate, drive_values, with_values
 from ._smoothness import has_continuous_slopes
 
 _CHUNK = 8192
@@ -26,9 +26,9 @@ _SINGLE = 256
 def map_slopes(smap: StabilityMap, names: Sequence[str]) -> tuple[dict[str, Array], dict[str, Array]]:
     """Give the derivatives of a map, cell by cell.
 
-    One pass carries the motion with its first and second derivatives; the orbit's own change follows from the
-    closing condition, and with it that of the multipliers. Orbits that the map did not split, and those of
-    laws whose slope jumps at a kink, are differentiated as single orbits, which takes longer.
+    One integration carries the motion with its first and second derivatives; the orbit's own change follows
+    from the closing condition, and with it that of the multipliers. Orbits that the map did not split, and
+    those of laws whose slope jumps at a kink, are differentiated as single orbits, which takes longer.
 
     Args:
         smap: the map.
@@ -58,7 +58,7 @@ def map_slopes(smap: StabilityMap, names: Sequence[str]) -> tuple[dict[str, Arra
         "spectral_radius": np.full((count, cells), np.nan),
     }
     steps = jnp.asarray(smap.integrator.steps_a_period(smap.model))
-    method = Method(smap.integrator, smap.symmetric, smap.sides, steps)
+    method = MapMethod(smap.integrator, smap.symmetric, smap.sides, steps)
     own = tuple(names)
     for block in _blocks(together, _CHUNK):
         some = jax.tree_util.tree_map(lambda values, block=block: values[block], lanes)
@@ -93,7 +93,7 @@ def _store(slopes: dict[str, np.ndarray], block: np.ndarray, given: dict[str, Ar
 
 
 @eqx.filter_jit
-def _cells(model: Isolator, method: Method, names: tuple[str, ...], lanes: Lane) -> dict[str, Array]:
+def _cells(model: Isolator, method: MapMethod, names: tuple[str, ...], lanes: Lane) -> dict[str, Array]:
     """Differentiate orbits that were found; parameter second."""
     entries = {entry.name: entry.value for entry in list_parameters(model)}
     turns = 0.5 if method.half else 1.0
@@ -106,9 +106,7 @@ def _cells(model: Isolator, method: Method, names: tuple[str, ...], lanes: Lane)
         begin = jnp.stack(lane.state)
 
         def there(numbers: Array) -> tuple[Isolator, Sine]:
-            amplitude, frequency = (
-                numbers[names.index(name)] if name in names else own[name] for name in DRIVE
-            )
+            amplitude, frequency = drive_values(names, numbers, (push, drive.frequency))
             share = amplitude / push
             turned = Sine(drive.sine * share, drive.cosine * share, frequency)
             return with_values(model, names, numbers), turned
@@ -136,7 +134,7 @@ def _cells(model: Isolator, method: Method, names: tuple[str, ...], lanes: Lane)
 
         root_slopes, radius_slopes = jax.vmap(along, in_axes=2)(total)
 
-        def swing(state: Array, numbers: Array) -> Array:
+        def half_range(state: Array, numbers: Array) -> Array:
             moved_model, moved_drive = there(numbers)
             path = trajectory(moved_model, method.integrator, moved_drive, tuple(state), turns=turns)[0]
             return 0.5 * (jnp.max(path) - jnp.min(path))
@@ -146,7 +144,7 @@ def _cells(model: Isolator, method: Method, names: tuple[str, ...], lanes: Lane)
             response = change[0]
         else:
             response = jax.vmap(
-                lambda state, number: jax.jvp(swing, (begin, at), (state, number))[1], in_axes=(1, 0)
+                lambda state, number: jax.jvp(half_range, (begin, at), (state, number))[1], in_axes=(1, 0)
             )(change, jnp.eye(at.size))
         return {"response": response, "multipliers": root_slopes, "spectral_radius": radius_slopes}
 
@@ -164,15 +162,15 @@ def _single_orbits(
         own = dict(zip(DRIVE, (f0, f), strict=True))
         at = jnp.stack([jnp.asarray((entries | own)[name], dtype=float) for name in names])
 
-        def of(numbers: Array) -> dict[str, Array]:
-            drive = [numbers[names.index(name)] if name in names else own[name] for name in DRIVE]
-            orbit = find_periodic_orbit(with_values(model, names, numbers), Harmonic(*drive), start=start)
+        def quantities(numbers: Array) -> dict[str, Array]:
+            drive = Harmonic(*drive_values(names, numbers, (f0, f)))
+            orbit = find_periodic_orbit(with_values(model, names, numbers), drive, start=start)
             return {
                 "response": orbit.amplitude,
                 "multipliers": orbit.floquet.multipliers,
                 "spectral_radius": orbit.floquet.spectral_radius,
             }
 
-        return {name: jnp.moveaxis(value, -1, 0) for name, value in jax.jacfwd(of)(at).items()}
+        return differentiate(quantities, at)[1]
 
     return jax.vmap(one)(force, frequency, y0)

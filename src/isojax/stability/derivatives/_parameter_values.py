@@ -1,10 +1,13 @@
 """Numbers of a model and its drive by name."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
+import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters, replace_parameters
+from ..._types import Lanes
 from ...models import Isolator
 
 DRIVE = ("drive.amplitude", "drive.frequency")
@@ -28,3 +31,43 @@ def with_values(model: Isolator, names: Sequence[str], numbers: Float[Array, " p
         model,
         [numbers[places[entry.name]] if entry.name in places else entry.value for entry in entries],
     )
+
+
+def drive_values(
+    names: Sequence[str], numbers: Float[Array, " parameter"], drive: Sequence[Lanes]
+) -> tuple[Lanes, Lanes]:
+    """Give amplitude and frequency of the drive, in place of which parameters may stand.
+
+    Args:
+        names: of parameters; those of the model are passed over.
+        numbers: their values.
+        drive: amplitude and frequency where they are no parameters.
+
+    Returns:
+        Amplitude and frequency.
+    """
+    amplitude, frequency = (
+        numbers[names.index(name)] if name in names else own for name, own in zip(DRIVE, drive, strict=True)
+    )
+    return amplitude, frequency
+
+
+def differentiate(
+    quantities: Callable[[Float[Array, " parameter"]], Mapping[str, Array]], at: Float[Array, " parameter"]
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Give quantities and their derivatives.
+
+    Args:
+        quantities: of the parameters, by name.
+        at: values of the parameters.
+
+    Returns:
+        The quantities; their derivatives, parameter first.
+    """
+
+    def twice(numbers: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        given = dict(quantities(numbers))
+        return given, given
+
+    slopes, values = jax.jacfwd(twice, has_aux=True)(at)
+    return values, {name: jnp.moveaxis(slope, -1, 0) for name, slope in slopes.items()}

@@ -3,20 +3,18 @@
 from collections.abc import Callable, Mapping, Sequence
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
 from ..._types import check_float64
-from ...excitations import Harmonic
 from ...models import Isolator
-from ..branch import Family, SpecialPoint, special_point
+from ..branch import SpecialPoint
 from ..map import StabilityMap
-from ..orbit import Orbit, find_periodic_orbit
-from ._map_derivatives import map_slopes
-from ._parameter_values import DRIVE, with_values
+from ..orbit import Orbit
+from ._parameter_values import DRIVE
+from ._subjects import as_subject
 
 
 class Sensitivity(eqx.Module):
@@ -114,25 +112,11 @@ def sensitivity(
         True
     """
     check_float64()
-    function = not isinstance(subject, Orbit | StabilityMap | SpecialPoint)
-    if function == (model is None):
-        raise ValueError(
-            "Argument `model` must be given where `subject` is a function, and only there, but is "
-            f"{'missing' if model is None else 'given'}."
-        )
-    of = model if isinstance(model, Isolator) else _model_of(subject)
-    entries = {entry.name: (entry.spec.unit, entry.value) for entry in list_parameters(of)}
-    if isinstance(subject, Orbit):
-        entries[DRIVE[0]] = ("N", jnp.asarray(subject.excitation.amplitude))
-        entries[DRIVE[1]] = ("Hz", jnp.asarray(subject.excitation.frequency))
-    elif isinstance(subject, SpecialPoint):
-        entries[DRIVE[0]], entries[DRIVE[1]] = ("N", subject.amplitude), ("Hz", subject.frequency)
-        for own in subject.family.names:
-            entries.pop(f"drive.{own}" if own in ("amplitude", "frequency") else own)
-    elif isinstance(subject, StabilityMap):
-        # Differentiated cell by cell, at each cell's own drive.
-        nothing = jnp.asarray(jnp.nan)
-        entries |= {DRIVE[0]: ("N", nothing), DRIVE[1]: ("Hz", nothing)}
+    of = as_subject(subject, model)
+    entries = {entry.name: (entry.spec.unit, entry.value) for entry in list_parameters(of.model)}
+    if of.drive is not None:
+        entries |= zip(DRIVE, zip(("N", "Hz"), of.drive, strict=True), strict=True)
+    entries = {name: entry for name, entry in entries.items() if name not in of.solved}
     names = tuple(entries) if parameters is None else tuple(parameters)
     for name in (*names, *(covariance_of or ())):
         if name not in entries:
@@ -141,107 +125,11 @@ def sensitivity(
             )
     matrix = _covariance(names, covariance, covariance_of)
     at = jnp.stack([jnp.asarray(entries[name][1], dtype=float) for name in names])
-    if isinstance(subject, StabilityMap):
-        values, slopes = map_slopes(subject, names)
-    elif isinstance(subject, Orbit):
-        values, slopes = _orbit_slopes(subject, names, at)
-    elif isinstance(subject, SpecialPoint):
-        values, slopes = _point_slopes(subject, names, at)
-    else:
-        values, slopes = _slopes(_by_name(subject), of, names, at)
+    values, slopes = of.slopes(names, at)
     errors = None
     if matrix is not None:
         errors = {name: _standard_error(slope, jnp.asarray(matrix)) for name, slope in slopes.items()}
     return Sensitivity(names, tuple(entries[name][0] for name in names), at, values, slopes, errors)
-
-
-def _model_of(subject: object) -> Isolator:
-    return subject.family.model if isinstance(subject, SpecialPoint) else subject.model  # type: ignore[attr-defined]
-
-
-def _by_name(
-    function: Callable[[Isolator], Mapping[str, Array] | Array],
-) -> Callable[[Isolator], dict[str, Array]]:
-    def named(model: Isolator) -> dict[str, Array]:
-        given = function(model)
-        return dict(given) if isinstance(given, Mapping) else {"value": jnp.asarray(given)}
-
-    return named
-
-
-def _slopes(
-    function: Callable[[Isolator], dict[str, Array]], model: Isolator, names: tuple[str, ...], at: Array
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    def of(numbers: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        given = function(with_values(model, names, numbers))
-        return given, given
-
-    slopes, values = jax.jacfwd(of, has_aux=True)(at)
-    return values, {name: jnp.moveaxis(slope, -1, 0) for name, slope in slopes.items()}
-
-
-def _point_slopes(
-    point: SpecialPoint, names: tuple[str, ...], at: Array
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    family = point.family
-    shares = (point.value[None] - family.start) / (family.stop - family.start)
-    fixed = (jnp.asarray(family.amplitude), jnp.asarray(family.frequency))
-
-    def of(numbers: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        drive = [numbers[names.index(n)] if n in names else v for n, v in zip(DRIVE, fixed, strict=True)]
-        model = with_values(family.model, names, numbers)
-        there = Family(model, drive[0], drive[1], family.start, family.stop, family.names)
-        found = special_point(
-            there,
-            point.integrator,
-            point.kind,
-            point.periods,
-            point.symmetric,
-            point.branch,
-            jax.lax.stop_gradient(point.y0),
-            shares,
-        )
-        given = {"value": found.value, "y0": found.y0}
-        return given, given
-
-    slopes, values = jax.jacfwd(of, has_aux=True)(at)
-    return values, {name: jnp.moveaxis(slope, -1, 0) for name, slope in slopes.items()}
-
-
-def _orbit_slopes(
-    orbit: Orbit, names: tuple[str, ...], at: Array
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    symmetric = bool(jnp.all(jnp.isfinite(orbit.floquet.half_period_multipliers)))
-    drive = (jnp.asarray(orbit.excitation.amplitude), jnp.asarray(orbit.excitation.frequency))
-    return _differentiated(orbit.model, drive, orbit.y0, orbit.periods, symmetric, names, at)
-
-
-@eqx.filter_jit
-def _differentiated(
-    model: Isolator,
-    drive: tuple[Array, Array],
-    start: Array,
-    periods: int,
-    symmetric: bool,
-    names: tuple[str, ...],
-    at: Array,
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    def of(numbers: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        pushed = [numbers[names.index(n)] if n in names else v for n, v in zip(DRIVE, drive, strict=True)]
-        there = with_values(model, names, numbers)
-        found = find_periodic_orbit(
-            there, Harmonic(*pushed), start=start, periods=periods, symmetric=symmetric
-        )
-        given = {
-            "y0": found.y0,
-            "amplitude": found.amplitude,
-            "multipliers": found.floquet.multipliers,
-            "spectral_radius": found.floquet.spectral_radius,
-        }
-        return given, given
-
-    slopes, values = jax.jacfwd(of, has_aux=True)(at)
-    return values, {name: jnp.moveaxis(slope, -1, 0) for name, slope in slopes.items()}
 
 
 def _covariance(

@@ -8,8 +8,11 @@ from jaxtyping import Array, Float
 
 from ...models import ContinuedLaw, Instant, Isolator
 
-_TRIALS = 8
+_STATES_TRIED = 8
 """States on each kink at which the slopes of both sides are compared."""
+
+_SAME_SLOPE = 1e-9
+"""Largest difference of the slopes, over the largest of them, that counts as rounding."""
 
 
 @eqx.filter_jit
@@ -56,6 +59,8 @@ def has_continuous_slopes(model: Isolator) -> bool:
     if not model.kinks((jnp.zeros(()),) * size):
         return True
     random = np.random.default_rng(7)
-    sizes = 10.0 ** random.uniform(-5.0, -3.0, (_TRIALS, 1)) * np.array([1.0, 30.0] + [1.0] * (size - 2))
-    states = jnp.asarray(sizes * random.standard_normal((_TRIALS, size)))
-    return bool(jnp.all(_jumps(model, states) < 1e-9))
+    sizes = 10.0 ** random.uniform(-5.0, -3.0, (_STATES_TRIED, 1)) * np.array(
+        [1.0, 30.0] + [1.0] * (size - 2)
+    )
+    states = jnp.asarray(sizes * random.standard_normal((_STATES_TRIED, size)))
+    return bool(jnp.all(_jumps(model, states) < _SAME_SLOPE))

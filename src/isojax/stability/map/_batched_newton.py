@@ -1,4 +1,4 @@
-"""Newton passes over many cells at once: orbits and multipliers of a chunk of a map."""
+"""Batched Newton: orbits and multipliers of many cells of a map at once."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,17 +12,18 @@ from jaxtyping import Array, Complex, Float, Int
 
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Crossings, Sine, advance_in_pieces, modulus, multipliers
-from ._starts import Candidates, candidate_starts
+from ..orbit import Crossings, Sine, advance_across_kinks, modulus, multipliers
+from ._starts import Candidates, PlacedSurface, candidate_starts
 from ._surface import Surface
 
-_PASSES = 12
-"""Newton steps after which a cell counts as failed."""
+_NEWTON_STEPS = 12
+"""Steps of Newton's method after which a cell counts as failed."""
 
 SAMPLED = 1024
-"""Cells of which the integration error is found, and that share a further pass where the first did not do."""
+"""Cells of which the integration error is found, and that share a further step where the first was not
+enough."""
 
-CLOSED = 1e-9
+FULLY_CLOSED = 1e-9
 """Relative step after which an orbit is closed far better than it is integrated."""
 
 _WIDE = {"xla_cpu_prefer_vector_width": 512}
@@ -41,7 +42,7 @@ class Found(NamedTuple):
         phases: where the orbit passes kinks.
         multipliers: over one drive period.
         radius: largest modulus.
-        swing: half the peak-to-peak displacement [m].
+        response: half the peak-to-peak displacement [m].
         code: how the search ended.
     """
 
@@ -50,7 +51,7 @@ class Found(NamedTuple):
     phases: Float[np.ndarray, "candidate crossing"]
     multipliers: Complex[np.ndarray, "candidate multiplier"]
     radius: Float[np.ndarray, " candidate"]
-    swing: Float[np.ndarray, " candidate"]
+    response: Float[np.ndarray, " candidate"]
     code: Int[np.ndarray, " candidate"]
 
 
@@ -61,23 +62,23 @@ class Lane(NamedTuple):
         state: start.
         drive: the drive, tau counted from the start.
         phases: where the orbit passes kinks.
-        swing: its size [m].
+        response: half the peak-to-peak displacement [m].
     """
 
     state: State
     drive: Sine
     phases: State
-    swing: Lanes
+    response: Lanes
 
 
-class Method(eqx.Module):
+class MapMethod(eqx.Module):
     """How a period is integrated over.
 
     Attributes:
         integrator: the solver and the tolerances.
         half: whether the half-period map is used.
         sides: signs of the kinks on each piece; None where orbits are not split.
-        steps: a period; a number on the device, so that one compiled pass serves for all.
+        steps: a period; a number on the device, so that one compiled step serves for all.
     """
 
     integrator: Integrator
@@ -85,7 +86,7 @@ class Method(eqx.Module):
     sides: Float[Array, "piece kink"] | None
     steps: Int[Array, ""]
 
-    def finer(self, times: int) -> "Method":
+    def finer(self, times: int) -> "MapMethod":
         """Give the same way with more steps.
 
         Args:
@@ -94,7 +95,7 @@ class Method(eqx.Module):
         Returns:
             The method.
         """
-        return Method(self.integrator, self.half, self.sides, self.steps * times)
+        return MapMethod(self.integrator, self.half, self.sides, self.steps * times)
 
     def moved(self, model: Isolator, lane: Lane) -> State:
         """Give the state one period later, or minus the state half a period later.
@@ -117,11 +118,11 @@ class Method(eqx.Module):
             jnp.array(True),
         )
         end = math.pi if self.half else 2.0 * math.pi
-        after, _ = advance_in_pieces(model, self.integrator, lane.drive, lane.state, crossings, end, steps)
+        after, _ = advance_across_kinks(model, self.integrator, lane.drive, lane.state, crossings, end, steps)
         return tuple(-value for value in after) if self.half else after
 
 
-def newton_step(model: Isolator, method: Method, lane: Lane) -> tuple[State, Float[Array, "state state"]]:
+def newton_step(model: Isolator, method: MapMethod, lane: Lane) -> tuple[State, Float[Array, "state state"]]:
     """Give the step of Newton's method on the period map of one orbit, and the derivative of that map.
 
     Args:
@@ -149,10 +150,10 @@ def newton_step(model: Isolator, method: Method, lane: Lane) -> tuple[State, Flo
 
 
 @eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
-def _pass(model: Isolator, method: Method, lanes: Lane) -> tuple[State, Lanes, Array, Lanes]:
+def _newton_steps(model: Isolator, method: MapMethod, lanes: Lane) -> tuple[State, Lanes, Array, Lanes]:
     step, matrix = jax.vmap(lambda lane: newton_step(model, method, lane))(lanes)
-    state, swing, omega = lanes.state, lanes.swing, lanes.drive.angular_frequency
-    scales = (swing, swing * omega, *(jnp.maximum(jnp.abs(s), 1e-3 * swing) for s in state[2:]))
+    state, response, omega = lanes.state, lanes.response, lanes.drive.angular_frequency
+    scales = (response, response * omega, *(jnp.maximum(jnp.abs(s), 1e-3 * response) for s in state[2:]))
     size = jnp.max(jnp.stack([jnp.abs(d) / c for d, c in zip(step, scales, strict=True)]), axis=0)
     # Far off, a full step may leave the basin of the orbit that the start is near to.
     damping = jnp.minimum(1.0, 0.3 / size)
@@ -163,14 +164,12 @@ def _pass(model: Isolator, method: Method, lanes: Lane) -> tuple[State, Lanes, A
 
 
 @eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
-def _lanes(model: Isolator, tables: Any, where: Any) -> Lane:
-    stacked, displacements, rest, forces, frequencies = tables
+def _lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
     force, column, interval = where
-    push, rate = forces[force], frequencies[column]
-    states = 2 + model.internal_states
-    starts = candidate_starts(stacked, displacements, rest, states, push, column, interval)
+    push, rate = surface.amplitudes[force], surface.frequencies[column]
+    starts = candidate_starts(surface, 2 + model.internal_states, push, column, interval)
     sine, cosine = starts.direction
-    return Lane(starts.states, Sine(push * sine, push * cosine, rate), starts.phases, starts.swing)
+    return Lane(starts.states, Sine(push * sine, push * cosine, rate), starts.phases, starts.response)
 
 
 class CellSolver(eqx.Module):
@@ -179,13 +178,13 @@ class CellSolver(eqx.Module):
     Attributes:
         model: the isolator.
         method: how to integrate.
-        tables: the surface and the axes of the map, on the device.
+        surface: the orbits over displacement and frequency, with the axes of the map.
         sharding: how a chunk is spread over devices.
     """
 
     model: Isolator
-    method: Method
-    tables: tuple[Any, ...]
+    method: MapMethod
+    surface: PlacedSurface
     sharding: NamedSharding = eqx.field(static=True)
 
     def __call__(self, candidates: Candidates, size: int, limit: float | None = None) -> Found:
@@ -193,17 +192,17 @@ class CellSolver(eqx.Module):
 
         Args:
             candidates: at most `size` of them.
-            size: lanes of the compiled pass.
+            size: lanes of the compiled step.
             limit: see `improve`.
 
         Returns:
             Their orbits.
         """
         where = jax.device_put([padded(values, size) for values in candidates[:3]], self.sharding)
-        lanes = _lanes(self.model, self.tables, where)
+        lanes = _lanes(self.model, self.surface, where)
         return self.improve(self.method, lanes, candidates.force.size, limit)
 
-    def improve(self, method: Method, lanes: Lane, count: int, limit: float | None = None) -> Found:
+    def improve(self, method: MapMethod, lanes: Lane, count: int, limit: float | None = None) -> Found:
         """Improve starts until each has converged or failed.
 
         Args:
@@ -216,10 +215,10 @@ class CellSolver(eqx.Module):
             The orbits.
         """
         limit = method.integrator.map_tolerance if limit is None else limit
-        moved, *rest = _pass(self.model, method, lanes)
+        moved, *rest = _newton_steps(self.model, method, lanes)
         lanes = lanes._replace(state=moved)
         lanes, step, roots, radius = jax.tree_util.tree_map(lambda it: np.asarray(it)[:count], (lanes, *rest))
-        for _ in range(_PASSES - 1):
+        for _ in range(_NEWTON_STEPS - 1):
             late = np.flatnonzero(~(step <= limit) & np.isfinite(radius))
             if not late.size:
                 break
@@ -228,7 +227,7 @@ class CellSolver(eqx.Module):
             for begin in range(0, late.size, SAMPLED):
                 block = late[begin : begin + SAMPLED]
                 some = jax.tree_util.tree_map(lambda it, block=block: padded(it[block], SAMPLED), lanes)
-                again = _pass(self.model, method, jax.device_put(some, self.sharding))
+                again = _newton_steps(self.model, method, jax.device_put(some, self.sharding))
                 targets = [*lanes.state, step, roots, radius]
                 for target, value in zip(targets, [*again[0], *again[1:]], strict=True):
                     target[block] = np.asarray(value)[: block.size]
@@ -238,17 +237,17 @@ class CellSolver(eqx.Module):
         push = np.hypot(lanes.drive.sine, lanes.drive.cosine)
         direction = np.stack([lanes.drive.sine / push, lanes.drive.cosine / push], axis=-1)
         phases = np.stack(lanes.phases, axis=-1) if lanes.phases else np.zeros((count, 0))
-        numbers = (states, roots, radius, np.asarray(lanes.swing))
+        numbers = (states, roots, radius, np.asarray(lanes.response))
         if (code != FOUND).any():
             numbers = tuple(np.array(values) for values in numbers)
             for values in numbers:
                 values[code != FOUND] = np.nan
-        states, roots, radius, swing = numbers
-        return Found(states, direction, phases, roots, radius, swing, code)
+        states, roots, radius, response = numbers
+        return Found(states, direction, phases, roots, radius, response, code)
 
 
 def padded(values: np.ndarray, size: int) -> np.ndarray:
-    """Fill up to a fixed length by repeating the last value, so that one compiled pass serves.
+    """Fill up to a fixed length by repeating the last value, so that one compiled step serves.
 
     Args:
         values: the values.
@@ -285,16 +284,16 @@ def cell_solvers(
     mesh = Mesh(np.asarray(jax.local_devices() if devices is None else devices), ("cell",))
     everywhere = NamedSharding(mesh, PartitionSpec())
     tables = (surface.tables, surface.amplitudes, surface.rest, forces, surface.frequencies)
-    placed = tuple(jax.device_put(jnp.asarray(table), everywhere) for table in tables)
+    placed = PlacedSurface(*(jax.device_put(jnp.asarray(table), everywhere) for table in tables))
     cells = NamedSharding(mesh, PartitionSpec("cell"))
     steps = jnp.asarray(integrator.steps_a_period(model))
-    split = Method(integrator, half, jnp.asarray(surface.sides), steps)
-    whole = Method(integrator, half, None, 4 * steps)
+    split = MapMethod(integrator, half, jnp.asarray(surface.sides), steps)
+    whole = MapMethod(integrator, half, None, 4 * steps)
     return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
 
 
 @eqx.filter_jit
-def states_at_zero(model: Isolator, method: Method, lanes: Lane) -> State:
+def states_at_zero(model: Isolator, method: MapMethod, lanes: Lane) -> State:
     """Give the states of orbits at t = 0 of the recorded drive.
 
     Args:
@@ -315,7 +314,7 @@ def states_at_zero(model: Isolator, method: Method, lanes: Lane) -> State:
         target = jnp.where(turned, target - math.pi, target)
         nothing = Crossings(jnp.zeros(0), jnp.zeros(0, int), None, jnp.array(True))
         steps = 4 * method.steps
-        state, _ = advance_in_pieces(model, method.integrator, drive, lane.state, nothing, target, steps)
+        state, _ = advance_across_kinks(model, method.integrator, drive, lane.state, nothing, target, steps)
         return tuple(jnp.where(turned, -value, value) for value in state)
 
     return jax.vmap(one)(lanes)

@@ -17,7 +17,7 @@ from ._batched_newton import CellSolver, Found
 from ._starts import Candidates
 
 FEWEST = 1024
-"""Lanes of the smallest pass: below it a pass costs no less."""
+"""Lanes of the smallest batch: a smaller one costs no less."""
 
 
 def fingerprint(*parts: object) -> str:
@@ -62,11 +62,11 @@ def run_chunks(
         The orbits, in the order of the candidates.
     """
     total = candidates.force.size
-    # No wider than need be: small maps compile and run a small pass. At least one lane for each device.
+    # No wider than need be: small maps compile and run a small batch. At least one lane for each device.
     lanes = min(chunk, max(1 << max(total - 1, 0).bit_length(), FEWEST))
     begins = list(range(0, total, lanes))
     states = 2 + solver.model.internal_states
-    kinks = solver.tables[0].shape[0] - states - 1
+    kinks = solver.surface.tables.shape[0] - states - 1
     processes, own = jax.process_count(), jax.process_index()
 
     def one(place: int) -> Found:

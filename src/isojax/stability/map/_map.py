@@ -22,20 +22,20 @@ from ._batched_newton import (
     NOT_FINITE,
     Found,
     Lane,
-    Method,
+    MapMethod,
     cell_solvers,
     states_at_zero,
 )
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._map_error import sampled_error, steps_needed
 from ._starts import Candidates, find_candidates
-from ._surface import Surface, find_surface
+from ._surface import MapWindow, Surface, find_surface
 
 _TRIED = 64
 """Steps a period with which a sample of the orbits shows how many it takes."""
 
-_NEAR = 1.25
-"""Times those steps up to which orbits found with them are starts good enough."""
+_STILL_STARTS = 1.25
+"""Times those steps up to which orbits found with them are good enough starts."""
 
 
 class StabilityMap(eqx.Module):
@@ -94,7 +94,7 @@ class StabilityMap(eqx.Module):
         sine, cosine = self.direction.reshape(force.size, 2).T * force[None]
         lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel())
         steps = jnp.asarray(self.integrator.steps_a_period(self.model))
-        method = Method(self.integrator, self.symmetric, None, steps)
+        method = MapMethod(self.integrator, self.symmetric, None, steps)
         return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)
 
 
@@ -157,16 +157,17 @@ def stability_map(
         raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
     half = is_odd(model)
     asked, integrator = integrator, Integrator().with_steps(_TRIED) if integrator is None else integrator
-    sought = _seek(model, integrator, half, forces, band, reach, coexisting)
+    window = MapWindow(forces, band, reach)
+    sought = _seek(model, integrator, half, window, coexisting)
     if asked is None:
         trial = cell_solvers(model, integrator, half, sought.surface, forces, devices)
         own, first = sought.group(0), trial[0]
         if not own.force.size:
             own, first = sought.group(1), trial[1]
-        integrator = integrator.with_steps(steps_needed(first, own, forces, band))
-        if integrator.steps_per_period > _NEAR * _TRIED:
-            # Starts integrated much coarser than the map would cost each cell a second pass.
-            sought = _seek(model, integrator, half, forces, band, reach, coexisting)
+        integrator = integrator.with_steps(steps_needed(first, own, window))
+        if integrator.steps_per_period > _STILL_STARTS * _TRIED:
+            # Starts integrated much coarser than the map would cost each cell a second step.
+            sought = _seek(model, integrator, half, window, coexisting)
     if progress is not None:
         progress("orbits over displacement and frequency found")
     surface, candidates = sought.surface, sought.candidates
@@ -179,7 +180,7 @@ def stability_map(
         own = sought.group(place)
         if own.force.size:
             parts.append(run_chunks(solver, own, chunk, folder, name, progress))
-            errors.append(sampled_error(solver, own, parts[-1], forces, band))
+            errors.append(sampled_error(solver, own, parts[-1], window))
     found = Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     split = np.arange(candidates.force.size) < sought.split
@@ -222,16 +223,10 @@ class _Sought(NamedTuple):
 
 
 def _seek(
-    model: Isolator,
-    integrator: Integrator,
-    half: bool,
-    forces: np.ndarray,
-    band: np.ndarray,
-    reach: float,
-    coexisting: bool,
+    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, coexisting: bool
 ) -> _Sought:
-    surface = find_surface(model, integrator, half, forces, band, reach)
-    candidates = find_candidates(surface, forces)
+    surface = find_surface(model, integrator, half, window)
+    candidates = find_candidates(surface, window.amplitudes)
     if not coexisting and candidates.order.any():
         candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
     if not candidates.force.size:
@@ -259,8 +254,8 @@ def _gridded(
     # The common case, one orbit in every cell and in the order of the cells, takes no copying.
     whole = place.size == orbits * rows * columns and bool((np.diff(place) == 1).all())
     arrays: dict[str, np.ndarray] = {}
-    names = {"states": "start", "radius": "spectral_radius", "swing": "response"}
-    names |= {name: name for name in ("direction", "phases", "multipliers")}
+    names = {"states": "start", "radius": "spectral_radius"}
+    names |= {name: name for name in ("response", "direction", "phases", "multipliers")}
 
     def onto_grid(values: np.ndarray, missing: float | int | bool) -> np.ndarray:
         grid = values

@@ -8,34 +8,35 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..orbit import Sine
-from ._batched_newton import CLOSED, FOUND, SAMPLED, CellSolver, Found, Lane, padded
+from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, Lane, padded
 from ._starts import Candidates
+from ._surface import MapWindow
 
-_MARGIN = 1.03
+_STEPS_MARGIN = 1.03
 """On the steps of a map that a sample of its orbits needs: the worst cell is seldom in the sample."""
+
+_LEAST_SLOPE = 0.1
+"""Smallest slope of the characteristic polynomial that an error of a multiplier is divided by."""
 
 _DOUBLINGS = 3
 """Trials with twice the steps where some orbits were not found."""
 
-_FINER = 4
+_FINER_STEPS = 4
 """Times the steps of a map with which its error is found."""
 
 
-def sampled_error(
-    solver: CellSolver, candidates: Candidates, found: Found, forces: np.ndarray, frequencies: np.ndarray
-) -> float:
+def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, window: MapWindow) -> float:
     """Give the integration error of multipliers, from a sample of cells solved with steps four times finer.
 
     The distance of a multiplier from the finer ones is their characteristic polynomial there over its slope.
-    The slope counts as 0.1 at least: where two multipliers all but coincide they part like the square root of
-    any error, and their distance would say more of the place than of the integration.
+    The slope counts as 0.1 at least: where two multipliers all but coincide they separate like the square
+    root of any error, and their distance would say more of the place than of the integration.
 
     Args:
         solver: that of the map.
         candidates: of the map.
         found: their orbits.
-        forces: drive amplitudes of the map.
-        frequencies: of the map [Hz].
+        window: of the map.
 
     Returns:
         The largest error; NaN where nothing was found.
@@ -44,20 +45,18 @@ def sampled_error(
     if not good.size:
         return float("nan")
     picked = good[np.unique(np.linspace(0, good.size - 1, SAMPLED).astype(int))]
-    lanes = lanes_of(found, candidates, forces, frequencies, picked)
+    lanes = lanes_of(found, candidates, window, picked)
     lanes = jax.tree_util.tree_map(lambda values: jnp.asarray(padded(np.asarray(values), SAMPLED)), lanes)
     # So far that what is left is the error of the integration alone.
-    finer = solver.improve(solver.method.finer(_FINER), lanes, picked.size, limit=CLOSED)
+    finer = solver.improve(solver.method.finer(_FINER_STEPS), lanes, picked.size, limit=FULLY_CLOSED)
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]
-    ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), 0.1)
+    ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), _LEAST_SLOPE)
     return float(np.nanmax(nearest * ratio))
 
 
-def steps_needed(
-    solver: CellSolver, candidates: Candidates, forces: np.ndarray, frequencies: np.ndarray
-) -> int:
+def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) -> int:
     """Give the steps a period at which the multipliers of a map are as good as its integrator promises.
 
     From a sample of orbits and the order of the integrator: the error falls with the fourth power.
@@ -65,8 +64,7 @@ def steps_needed(
     Args:
         solver: with the steps that are tried.
         candidates: of the map.
-        forces: drive amplitudes of the map.
-        frequencies: of the map [Hz].
+        window: of the map.
 
     Returns:
         Steps a period, even.
@@ -75,37 +73,34 @@ def steps_needed(
     picked = np.unique(np.linspace(0, candidates.force.size - 1, SAMPLED).astype(int))
     some = Candidates(*(values[picked] for values in candidates))
     taken = integrator.steps_per_period
-    found = solver(some, SAMPLED, limit=CLOSED)
+    found = solver(some, SAMPLED, limit=FULLY_CLOSED)
     for _ in range(_DOUBLINGS):
         if (found.code == FOUND).all():
             break
         # Where the motion is too fast for the steps there is no orbit, and no error to go by.
         solver, taken = eqx.tree_at(lambda it: it.method, solver, solver.method.finer(2)), 2 * taken
-        found = solver(some, SAMPLED, limit=CLOSED)
-    error = sampled_error(solver, some, found, forces, frequencies)
+        found = solver(some, SAMPLED, limit=FULLY_CLOSED)
+    error = sampled_error(solver, some, found, window)
     if not error > 0.0:
         return integrator.steps_per_period
-    times = _MARGIN * (error / integrator.map_error) ** 0.25
+    times = _STEPS_MARGIN * (error / integrator.map_error) ** 0.25
     return 2 * math.ceil(0.5 * taken * min(max(times, 0.5), 128.0))
 
 
-def lanes_of(
-    found: Found, candidates: Candidates, forces: np.ndarray, frequencies: np.ndarray, picked: np.ndarray
-) -> Lane:
+def lanes_of(found: Found, candidates: Candidates, window: MapWindow, picked: np.ndarray) -> Lane:
     """Give orbits that were found as starts.
 
     Args:
         found: the orbits.
         candidates: what they were found from.
-        forces: drive amplitudes of the map.
-        frequencies: of the map [Hz].
+        window: of the map.
         picked: which of them.
 
     Returns:
         Lanes.
     """
-    push = forces[candidates.force[picked]]
+    push = window.amplitudes[candidates.force[picked]]
     sine, cosine = (jnp.asarray(push * part) for part in found.direction[picked].T)
-    drive = Sine(sine, cosine, jnp.asarray(frequencies[candidates.frequency[picked]]))
+    drive = Sine(sine, cosine, jnp.asarray(window.frequencies[candidates.frequency[picked]]))
     state, phases = (tuple(jnp.asarray(values[picked].T)) for values in (found.states, found.phases))
-    return Lane(state, drive, phases, jnp.asarray(found.swing[picked]))
+    return Lane(state, drive, phases, jnp.asarray(found.response[picked]))

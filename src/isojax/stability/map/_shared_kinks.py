@@ -1,4 +1,4 @@
-"""The order of kinks that most orbits of a surface share, so that one compiled pass can split them all."""
+"""The order of kinks that most orbits of a surface share, so that one compiled step can split them all."""
 
 from typing import NamedTuple
 

@@ -17,13 +17,13 @@ class Starts(NamedTuple):
         states: there.
         direction: the drive over its amplitude: sine and cosine part, tau counted from there.
         phases: where the orbit passes kinks.
-        swing: half the peak-to-peak displacement [m].
+        response: half the peak-to-peak displacement [m].
     """
 
     states: tuple[Lanes, ...]
     direction: tuple[Lanes, Lanes]
     phases: tuple[Lanes, ...]
-    swing: Lanes
+    response: Lanes
 
 
 class Candidates(NamedTuple):
@@ -40,6 +40,24 @@ class Candidates(NamedTuple):
     frequency: Int[np.ndarray, " candidate"]
     interval: Int[np.ndarray, " candidate"]
     order: Int[np.ndarray, " candidate"]
+
+
+class PlacedSurface(NamedTuple):
+    """The surface on the devices, with the axes of the map.
+
+    Attributes:
+        tables: stiffness, internal states, response and phases of the surface.
+        displacements: its displacement amplitudes [m].
+        rest: displacement at rest [m].
+        amplitudes: drive amplitudes of the map.
+        frequencies: of the map [Hz].
+    """
+
+    tables: Float[Array, "table frequency displacement"]
+    displacements: Float[Array, " displacement"]
+    rest: Float[Array, ""]
+    amplitudes: Float[Array, " amplitude"]
+    frequencies: Float[Array, " frequency"]
 
 
 def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"]) -> Candidates:
@@ -84,9 +102,7 @@ def _weights(share: Lanes) -> tuple[Lanes, ...]:
 
 
 def candidate_starts(
-    tables: Float[Array, "table frequency displacement"],
-    displacements: Float[Array, " displacement"],
-    rest: Float[Array, ""],
+    surface: PlacedSurface,
     states: int,
     force: Float[Array, " candidate"],
     column: Int[Array, " candidate"],
@@ -95,9 +111,7 @@ def candidate_starts(
     """Give the starts of candidates, read off the surface.
 
     Args:
-        tables: stiffness, internal states, swing and phases of the surface.
-        displacements: its displacement amplitudes [m].
-        rest: displacement at rest [m].
+        surface: the surface.
         states: count of states.
         force: drive amplitude of each candidate.
         column: place of its frequency on the surface.
@@ -106,6 +120,7 @@ def candidate_starts(
     Returns:
         The starts.
     """
+    tables, displacements, rest = surface[:3]
     base = jnp.clip(interval - 1, 0, displacements.size - 4)
     spacing = jnp.log(displacements[1] / displacements[0])
     logarithm = jnp.log(displacements[base + 1])

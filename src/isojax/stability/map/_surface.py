@@ -30,20 +30,37 @@ from ..orbit import (
 )
 from ._shared_kinks import shared_kinks
 
-_NEWTON = 6
+_NODE_STEPS = 6
 """Steps of Newton's method on the coarse grid."""
 
-_NODES = (96, 33)
+_GRID_NODES = (96, 33)
 """Displacement amplitudes and frequencies of the coarse grid."""
 
 _FINE = 1024
 """Displacement amplitudes between which roots are sought."""
 
-_CROSSINGS = 16
+_NODE_CROSSINGS = 16
 """Kinks an orbit to make room for."""
+
+_NODE_CLOSED_TO = 1e-6
+"""What a node's orbit may leave open, over its size; where it leaves more, the one-harmonic start is kept."""
 
 _SPLINE = 5
 """Degree of the splines between the nodes."""
+
+
+class MapWindow(NamedTuple):
+    """What a map is asked for.
+
+    Attributes:
+        amplitudes: drive amplitudes, ascending [N, or m/s^2 for base excitation].
+        frequencies: ascending [Hz].
+        reach: largest displacement sought, over the largest that grows from rest without a jump.
+    """
+
+    amplitudes: Float[np.ndarray, " amplitude"]
+    frequencies: Float[np.ndarray, " frequency"]
+    reach: float
 
 
 class Surface(NamedTuple):
@@ -55,7 +72,7 @@ class Surface(NamedTuple):
         frequencies: [Hz].
         stiffness: drive in phase (sine) and in quadrature (cosine) over a [N/m].
         internal: internal states at the largest displacement, over a.
-        swing: half the peak-to-peak displacement over a.
+        response: half the peak-to-peak displacement over a.
         phases: phase at which each orbit passes each kink [rad], of the kinks that most pass in this order.
         sides: signs of the kinks between these.
         shared: whether the orbits of an interval of displacements pass the kinks in this order.
@@ -66,15 +83,15 @@ class Surface(NamedTuple):
     frequencies: Float[np.ndarray, " frequency"]
     stiffness: Float[np.ndarray, "2 frequency displacement"]
     internal: Float[np.ndarray, "internal frequency displacement"]
-    swing: Float[np.ndarray, "frequency displacement"]
+    response: Float[np.ndarray, "frequency displacement"]
     phases: Float[np.ndarray, "crossing frequency displacement"]
     sides: Float[np.ndarray, "piece kink"]
     shared: Bool[np.ndarray, "frequency interval"]
 
     @property
     def tables(self) -> Float[np.ndarray, "table frequency displacement"]:
-        """All that is read off for a candidate: stiffness, internal states, swing, phases."""
-        return np.concatenate([self.stiffness, self.internal, self.swing[None], self.phases])
+        """All that is read off for a candidate: stiffness, internal states, response, phases."""
+        return np.concatenate([self.stiffness, self.internal, self.response[None], self.phases])
 
     @property
     def force(self) -> Float[np.ndarray, "frequency displacement"]:
@@ -117,16 +134,16 @@ def _nodes(
             # Far from the balance of one harmonic a full step may leave the basin.
             return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
 
-        found = jax.lax.fori_loop(0, _NEWTON, improve, start)
-        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < 1e-6)
+        found = jax.lax.fori_loop(0, _NODE_STEPS, improve, start)
+        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _NODE_CLOSED_TO)
         unknown = jnp.where(good, found, start)
         drive, state = unpack(unknown)
         path = trajectory(model, integrator, drive, state, turns=turns)
         low, high = jnp.min(path[0]), jnp.max(path[0])
-        swing = (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / a
+        response = (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / a
         stiffness = jnp.stack([drive.sine, jnp.asarray(drive.cosine)]) / a
-        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _CROSSINGS)
-        return stiffness, unknown[2:] * inner / a, swing, crossings
+        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _NODE_CROSSINGS)
+        return stiffness, unknown[2:] * inner / a, response, crossings
 
     return jax.vmap(node)(amplitude, frequency)
 
@@ -137,10 +154,13 @@ def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Arr
     return rest, response_amplitudes(model, frequencies, amplitudes, rest)
 
 
-def _window(
-    model: Isolator, least: float, most: float, frequencies: Float[np.ndarray, " frequency"], reach: float
-) -> tuple[float, float, float]:
-    """Give rest and the displacement amplitudes, least and largest, that a range of forces can hold."""
+def _displacements(model: Isolator, window: MapWindow) -> tuple[float, float, float]:
+    """Give rest and the displacement amplitudes, least and largest, that the forces of a window can hold."""
+    least, most, frequencies = (
+        float(window.amplitudes.min()),
+        float(window.amplitudes.max()),
+        window.frequencies,
+    )
     band = jnp.asarray(np.linspace(frequencies[0], frequencies[-1], 24 if len(frequencies) > 1 else 1))
     tiny = 1e-9
     _, slope = _forces(model, band, jnp.array([tiny]))
@@ -152,32 +172,23 @@ def _window(
     reached = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(grid) - 1)
     below = np.minimum.accumulate(needed < least, axis=0).sum(axis=0)
     low = grid[max(int(below.min()) - 1, 0)]
-    return float(rest), 0.5 * low, reach * float(grid[int(reached.max())])
+    return float(rest), 0.5 * low, window.reach * float(grid[int(reached.max())])
 
 
-def find_surface(
-    model: Isolator,
-    integrator: Integrator,
-    half: bool,
-    forces: Float[np.ndarray, " force"],
-    frequencies: Float[np.ndarray, " frequency"],
-    reach: float,
-) -> Surface:
+def find_surface(model: Isolator, integrator: Integrator, half: bool, window: MapWindow) -> Surface:
     """Find the orbits over displacement and frequency that a window of force and frequency can hold.
 
     Args:
         model: the isolator.
         integrator: steps a period.
         half: whether to seek symmetric orbits by the half-period map.
-        forces: drive amplitudes of the window [N, or m/s^2 for base excitation].
-        frequencies: of the window, ascending [Hz].
-        reach: largest displacement sought, over the largest that grows from rest without a jump.
+        window: of the map.
 
     Returns:
         The surface at the frequencies given.
     """
-    rest, low, high = _window(model, float(forces.min()), float(forces.max()), frequencies, reach)
-    displacements, columns = _NODES
+    (rest, low, high), frequencies = _displacements(model, window), window.frequencies
+    displacements, columns = _GRID_NODES
     single = len(frequencies) == 1
     band = (
         frequencies if len(frequencies) <= columns else _chebyshev(frequencies[0], frequencies[-1], columns)
@@ -193,9 +204,9 @@ def find_surface(
         jnp.asarray(frequency.ravel()),
     )
     shape = (len(band), displacements)
-    stiffness, internal, swing = (np.asarray(table).reshape(*shape, -1) for table in found[:3])
+    stiffness, internal, response = (np.asarray(table).reshape(*shape, -1) for table in found[:3])
     kinks = shared_kinks(found[3], shape, math.pi if half else 2.0 * math.pi)
-    tables = _filled(np.concatenate([stiffness, internal, swing, kinks.phases], axis=-1))
+    tables = _filled(np.concatenate([stiffness, internal, response, kinks.phases], axis=-1))
     if not single and len(frequencies) > columns:
         tables = np.tensordot(_spline_matrix(band, frequencies), tables, axes=(1, 0))
     fine = np.geomspace(low, high, _FINE)

@@ -9,12 +9,12 @@ from jaxtyping import Array, Float
 
 from ..._types import Lanes, Scalar, as_float64
 from ...models import Instant, Isolator
-from ._drive import Sine
+from ._sine import Sine
 
 _SAMPLES = 64
 """Samples a cycle; the first harmonic of |x|x is then good to 1e-5, so good that only the others matter."""
 
-_CYCLES = 3
+_IMPOSED_CYCLES = 3
 """Cycles of imposed motion after which internal states count as settled."""
 
 _GRID = np.logspace(-3.0, 3.0, 600)
@@ -78,7 +78,7 @@ def imposed_internal(
         return moved, internal
 
     start = (zero,) * model.internal_states
-    _, along = jax.lax.scan(body, start, jnp.asarray(np.tile(places, _CYCLES)))
+    _, along = jax.lax.scan(body, start, jnp.asarray(np.tile(places, _IMPOSED_CYCLES)))
     return tuple(values[-count:] for values in along)
 
 

@@ -17,7 +17,7 @@ from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator
 from ._describing_function import imposed_internal, response_start, rest_displacement
-from ._drive import recorded_sine
+from ._sine import recorded_sine
 
 
 class HarmonicBalance(eqx.Module):

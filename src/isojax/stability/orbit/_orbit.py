@@ -17,15 +17,23 @@ from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator
 from ._describing_function import response_start
-from ._drive import recorded_sine
 from ._floquet import Floquet, multipliers
 from ._harmonic_balance import harmonic_balance
 from ._period_map import trajectory
-from ._shooting import Closed, close_motion
+from ._shooting import ShootingSolution, shoot
+from ._shooting_method import ShootingMethod
+from ._sine import recorded_sine
 from ._symmetry import is_odd
 
 _CROSSINGS = 4
 """Crossings of each kink in a period to make room for first."""
+
+_CROSSINGS_AT_MOST = 64
+"""Crossings of each kink in a motion beyond which no more room is made."""
+
+_SYMMETRIC_TO = 1e-4
+"""Distance of the two halves of a motion, over its size, up to which it counts as symmetric: its path is
+sampled with the steps of maps, whose error at a kink is a few times 1e-5."""
 
 
 class Orbit(eqx.Module):
@@ -153,53 +161,53 @@ def find_periodic_orbit(
     if symmetric and not half:
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
     begin = None if start is None else jnp.stack([as_float64(value) for value in start])
-    turns = 0.5 if half else float(periods)
+    method = ShootingMethod(integrator, periods, half)
     kinks = len(model.kinks((jnp.zeros(()),) * size))
-    places = math.ceil(_CROSSINGS * kinks * turns)
-    closed = _solve(model, excitation, begin, integrator, solver, turns, places)
-    while not isinstance(closed[0].split, Tracer) and not closed[0].split and places < 64 * kinks:
+    places = math.ceil(_CROSSINGS * kinks * method.turns)
+    solution, path = _solve(model, excitation, method, solver, begin, places)
+    while (
+        not isinstance(solution.split, Tracer) and not solution.split and places < _CROSSINGS_AT_MOST * kinks
+    ):
         places *= 2
-        closed = _solve(model, excitation, begin, integrator, solver, turns, places)
-    if begin is None and not isinstance(closed[0].found, Tracer) and not closed[0].found:
+        solution, path = _solve(model, excitation, method, solver, begin, places)
+    if begin is None and not isinstance(solution.found, Tracer) and not solution.found:
         balance = harmonic_balance(*jax.lax.stop_gradient((model, excitation)), integrator=integrator)
         if is_successful(balance.result):
-            closed = _solve(model, excitation, balance.y0, integrator, solver, turns, places)
-    return _orbit(model, excitation, periods, half, integrator, *closed)
+            solution, path = _solve(model, excitation, method, solver, balance.y0, places)
+    return _orbit(model, excitation, method, solution, path)
 
 
 @eqx.filter_jit
 def _solve(
     model: Isolator,
     excitation: Harmonic,
-    start: Float[Array, " state"] | None,
-    integrator: Integrator,
+    method: ShootingMethod,
     solver: optx.AbstractRootFinder,
-    turns: float,
+    start: Float[Array, " state"] | None,
     places: int,
-) -> tuple[Closed, Float[Array, "time state"]]:
+) -> tuple[ShootingSolution, Float[Array, "time state"]]:
     if start is None:
         frozen, held = jax.lax.stop_gradient((model, excitation))
         start = response_start(frozen, held.amplitude, held.frequency)
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
-    closed = close_motion(model, integrator, solver, drive, jax.lax.stop_gradient(start), turns, places)
-    path = trajectory(model, integrator, drive, tuple(closed.state), turns=max(turns, 1.0))
-    return closed, jnp.stack(path, axis=-1)
+    solution = shoot(model, method, solver, drive, jax.lax.stop_gradient(start), places)
+    lasting = float(method.periods)
+    path = trajectory(model, method.integrator, drive, tuple(solution.state), turns=lasting)
+    return solution, jnp.stack(path, axis=-1)
 
 
 @eqx.filter_jit
 def _orbit(
     model: Isolator,
     excitation: Harmonic,
-    periods: int,
-    half: bool,
-    integrator: Integrator,
-    closed: Closed,
+    method: ShootingMethod,
+    solution: ShootingSolution,
     path: Float[Array, "time state"],
 ) -> Orbit:
-    found = closed.found & jnp.all(jnp.isfinite(closed.matrix))
+    found = solution.found & jnp.all(jnp.isfinite(solution.matrix))
     blank = jnp.where(found, 1.0, jnp.nan)
-    matrix = closed.matrix * blank
-    if half:
+    matrix = solution.matrix * blank
+    if method.half:
         roots = multipliers(matrix)
         floquet = Floquet(roots * roots, roots, matrix @ matrix)
     else:
@@ -212,18 +220,18 @@ def _orbit(
     )
     middle = (path.shape[0] - 1) // 2
     size = jnp.max(jnp.abs(path), axis=0)
-    # The path is sampled with the steps of maps, whose error at a kink is a few times 1e-5.
-    mirrored = jnp.array(True) if half else jnp.all(jnp.abs(path[middle] + path[0]) <= 1e-4 * size)
-    time = jnp.linspace(0.0, 1.0, path.shape[0]) * periods / excitation.frequency
+    apart = jnp.abs(path[middle] + path[0])
+    mirrored = jnp.array(True) if method.half else jnp.all(apart <= _SYMMETRIC_TO * size)
+    time = jnp.linspace(0.0, 1.0, path.shape[0]) * method.periods / excitation.frequency
     return Orbit(
         model,
         excitation,
-        periods,
-        closed.state * blank,
+        method.periods,
+        solution.state * blank,
         floquet,
-        found & (mirrored if periods == 1 else False),
+        found & (mirrored if method.periods == 1 else False),
         time,
         path * blank,
-        closed.error * blank,
+        solution.error * blank,
         result,
     )

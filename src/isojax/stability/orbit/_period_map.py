@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State, advance
-from ._drive import Sine, stage_table
+from ._sine import Sine, stage_table
 
 
 def period_map(

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import Instant, Integrator, Isolator, State
-from ..map import Lane, Method, states_at_zero
+from ..map import Lane, MapMethod, states_at_zero
 from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory
 from ._free_vibration import natural_frequencies
 from ._frequency_response import drive_amplitude, fundamental
@@ -20,10 +20,10 @@ from ._frequency_response import drive_amplitude, fundamental
 _BALANCE = 30
 """Steps towards the resonance of the one-harmonic balance."""
 
-_NEWTON = 12
+_CORRECTIONS_A_POINT = 12
 """Steps of Newton's method on the orbit with its drive and frequency."""
 
-_STEP = 0.3
+_AMPLITUDE_STEP = 0.3
 """Largest change of an unknown in one step, as a share of its size: beyond, the basin may be left."""
 
 
@@ -109,12 +109,12 @@ def _resonance(
 
         def improve(_: Array, unknown: Array) -> Array:
             step = jnp.linalg.solve(jax.jacfwd(gap)(unknown), gap(unknown))
-            return unknown - step * jnp.minimum(1.0, _STEP / jnp.max(jnp.abs(step)))
+            return unknown - step * jnp.minimum(1.0, _AMPLITUDE_STEP / jnp.max(jnp.abs(step)))
 
         begin = jnp.concatenate(
             [jnp.stack([start.sine, jnp.asarray(start.cosine)]) / push, jnp.ones(1), internal / inner]
         )
-        found = jax.lax.fori_loop(0, _NEWTON, improve, begin)
+        found = jax.lax.fori_loop(0, _CORRECTIONS_A_POINT, improve, begin)
         drive, state = unpack(found)
         good = jnp.max(jnp.abs(gap(found))) < integrator.orbit_tolerance
         return Lane(state, drive, (), amplitude), good & (drive.frequency > 0.0)
@@ -122,7 +122,7 @@ def _resonance(
     lanes, good = jax.vmap(point)(amplitudes)
     blank = jnp.where(good, 1.0, jnp.nan)
     force = jnp.hypot(lanes.drive.sine, jnp.asarray(lanes.drive.cosine))
-    method = Method(integrator, False, None, jnp.asarray(integrator.steps_a_period(model)))
+    method = MapMethod(integrator, False, None, jnp.asarray(integrator.steps_a_period(model)))
     begin = jnp.stack(states_at_zero(model, method, lanes), axis=-1)
 
     def ending(well: Array) -> RESULTS:

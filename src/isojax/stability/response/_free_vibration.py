@@ -15,16 +15,16 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 _PLACES, _SHARES = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 """Gauss's nodes and weights on [0, 1]."""
 
-_BISECTIONS = 60
+_HALVINGS = 60
 """Halvings of the interval in which the other turning point lies: as far as float64 goes."""
 
 _MET = 1e-9
 """Largest difference of the potential between the turning points, as a share of it."""
 
-_MIRRORED = 1e-12
+_ALIKE = 1e-12
 """The same for a spring that pulls alike to both sides, whose other turning point is known."""
 
-_TRIALS = 513
+_PLACES_TRIED = 513
 """Places tried for the other turning point."""
 
 _WIDEST = 8.0
@@ -82,11 +82,11 @@ def natural_frequencies(model: Isolator, amplitudes: Float[Array, " point"]) -> 
             return jnp.where(above, low, middle), jnp.where(above, middle, high)
 
         # The first place that the motion comes to: beyond the crest of a softening spring lie others.
-        trials = amplitude * jnp.asarray(np.linspace(0.0, _WIDEST, _TRIALS))
+        trials = amplitude * jnp.asarray(np.linspace(0.0, _WIDEST, _PLACES_TRIED))
         first = jnp.argmax(jax.vmap(excess)(trials) > 0.0)
         begin = (trials[jnp.maximum(first - 1, 0)], trials[first])
-        low, high = jax.lax.fori_loop(0, _BISECTIONS, halve, begin)
-        mirrored = jnp.abs(excess(amplitude)) <= _MIRRORED * jnp.abs(energy)
+        low, high = jax.lax.fori_loop(0, _HALVINGS, halve, begin)
+        mirrored = jnp.abs(excess(amplitude)) <= _ALIKE * jnp.abs(energy)
         depth = jax.lax.stop_gradient(jnp.where(mirrored, amplitude, 0.5 * (low + high)))
         # One step with the derivative kept: by the implicit function theorem it carries that of the root.
         depth = depth - excess(depth) / jax.lax.stop_gradient(-pull(rest - depth))

@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ..._types import Lanes
 from ...models import ROUNDED, ContinuedLaw, Integrator, Isolator, State
-from ._drive import Sine
+from ._sine import Sine
 
 
 class Crossings(NamedTuple):
@@ -66,7 +66,7 @@ def _turned(angle: tuple[Lanes, Lanes], turn: tuple[Lanes, Lanes]) -> tuple[Lane
     return angle[0] * turn[1] + angle[1] * turn[0], angle[1] * turn[1] - angle[0] * turn[0]
 
 
-def advance_in_pieces(
+def advance_across_kinks(
     model: Isolator,
     integrator: Integrator,
     drive: Sine,

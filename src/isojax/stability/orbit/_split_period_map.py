@@ -1,0 +1,180 @@
+"""The period map with the motion split at its kinks: what orbits and bifurcations are found with exactly."""
+
+import math
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from ...models import Isolator, State
+from ._kink_crossings import Crossings, advance_across_kinks, find_crossings
+from ._period_map import trajectory
+from ._shooting_method import ShootingMethod
+from ._sine import Sine
+
+FEWEST_STEPS = 16
+"""Steps a piece of the coarsest trial."""
+
+_MOST_STEPS_A_PERIOD = 1 << 12
+"""Steps a piece of a drive period at most, for a bifurcation."""
+
+
+class Split(NamedTuple):
+    """How a motion is split.
+
+    Attributes:
+        scale: size of each state.
+        crossings: the kinks that it passes.
+        kink_scale: size of the kink function of each crossing.
+        steps: steps a piece.
+        complete: whether every crossing found a place.
+    """
+
+    scale: Float[Array, " state"]
+    crossings: Crossings
+    kink_scale: Float[Array, " crossing"]
+    steps: Int[Array, ""]
+    complete: Bool[Array, ""]
+
+
+def split_image(
+    model: Isolator, method: ShootingMethod, drive: Sine, split: Split, unknown: Float[Array, " unknown"]
+) -> tuple[Float[Array, " state"], Float[Array, " crossing"]]:
+    """Give the state after the turns of the method, and how far each kink is missed.
+
+    Args:
+        model: the isolator.
+        method: how the orbit is closed.
+        drive: the drive that acts.
+        split: where the motion is split.
+        unknown: scaled state at t = 0, then the phase of each crossing [rad].
+
+    Returns:
+        The state then over its scale, and the scaled kink functions at the crossings.
+    """
+    states = split.scale.shape[0]
+    end = 2.0 * math.pi * method.turns
+    sign = -1.0 if method.half else 1.0
+    phases = unknown[states:]
+    meeting = split.crossings._replace(phases=phases)
+    begin = tuple(unknown[:states] * split.scale)
+    moved, reached = advance_across_kinks(model, method.integrator, drive, begin, meeting, end, split.steps)
+    missed = jnp.where(split.crossings.kinks >= 0, reached / split.kink_scale, phases - end)
+    return sign * jnp.stack(moved) / split.scale, missed
+
+
+def split_jacobian(
+    model: Isolator, method: ShootingMethod, drive: Sine, split: Split, unknown: Float[Array, " unknown"]
+) -> tuple[Float[Array, "state state"], Float[Array, "crossing state"]]:
+    """Give the derivative of the image by the state, the instants of the kinks following along.
+
+    Args:
+        model: the isolator.
+        method: how the orbit is closed.
+        drive: the drive that acts.
+        split: where the motion is split.
+        unknown: scaled state at t = 0, then the phase of each crossing.
+
+    Returns:
+        The matrix in scaled units, and the derivative of the phases by the state.
+    """
+    states = split.scale.shape[0]
+    upper, lower = jax.jacfwd(lambda u: split_image(model, method, drive, split, u))(unknown)
+    phases = -jnp.linalg.solve(lower[:, states:], lower[:, :states])
+    return upper[:, :states] + upper[:, states:] @ phases, phases
+
+
+def find_split(
+    model: Isolator,
+    method: ShootingMethod,
+    drive: Sine,
+    state: Float[Array, " state"],
+    places: int,
+    tolerance: float,
+) -> tuple[Split, Float[Array, " unknown"], Float[Array, "state state"], Float[Array, "crossing state"]]:
+    """Find where a motion is to be split and in how many steps.
+
+    Args:
+        model: the isolator.
+        method: how the orbit is closed.
+        drive: the drive that acts.
+        state: at t = 0, SI units.
+        places: crossings to make room for.
+        tolerance: error of the multipliers that the steps may leave.
+
+    Returns:
+        The split, the scaled state with the phases of the crossings, and roughly what `split_jacobian` gives.
+    """
+    path = trajectory(model, method.integrator, drive, tuple(state), turns=method.turns)
+    crossings = find_crossings(model, path, 2.0 * math.pi * method.turns, places)
+    sizes = kink_scale(model, path, crossings)
+    steps = method.periods * method.integrator.steps_a_period(model)
+    least = jnp.asarray(max(FEWEST_STEPS, steps // (places + 1)))
+    split = Split(state_scale(path), crossings, sizes, least, crossings.complete)
+    unknown = jnp.concatenate([state / split.scale, crossings.phases])
+
+    def jacobian(steps: Array) -> tuple[Array, Array]:
+        return split_jacobian(model, method, drive, split._replace(steps=steps), unknown)
+
+    matrices, phases = jax.lax.map(jacobian, jnp.stack([least, 2 * least]))
+    most = method.periods * _MOST_STEPS_A_PERIOD
+    split = split._replace(steps=steps_wanted(least, matrices, tolerance, doublings=0, most=most))
+    return split, unknown, matrices[1], phases[1]
+
+
+def steps_wanted(
+    least: Array | int,
+    trials: Float[Array, "trial state state"],
+    tolerance: float,
+    *,
+    doublings: int,
+    most: int,
+) -> Int[Array, ""]:
+    """Give the steps a piece that multipliers need, from matrices with `least` steps and with twice as many.
+
+    Args:
+        least: steps of the first trial.
+        trials: the derivative of the map with these steps and with twice as many.
+        tolerance: error of the multipliers that the steps may leave.
+        doublings: further doublings for safety.
+        most: steps at most.
+
+    Returns:
+        Steps a piece.
+    """
+    apart = jnp.max(jnp.abs(trials[0] - trials[1]))
+    # Fourth order: sixteen times less a doubling.
+    needed = jnp.ceil(jnp.log2(apart / tolerance) / 4.0) + doublings
+    wanted = least * 2.0 ** jnp.clip(jnp.where(jnp.isfinite(needed), needed, 0.0), 1.0, 20.0)
+    return jnp.minimum(wanted, most).astype(int)
+
+
+def state_scale(path: State) -> Float[Array, " state"]:
+    """Give the size of each state along a motion, to measure its changes by.
+
+    Args:
+        path: states, time first.
+
+    Returns:
+        Largest magnitudes; one where a motion is not finite or is nothing.
+    """
+    sizes = jnp.stack([jnp.max(jnp.abs(along)) for along in path])
+    return jnp.where(jnp.isfinite(sizes) & (sizes > 0.0), sizes, 1.0)
+
+
+def kink_scale(model: Isolator, path: State, crossings: Crossings) -> Float[Array, " crossing"]:
+    """Give the size of the kink function that belongs to each crossing.
+
+    Args:
+        model: the isolator.
+        path: states, time first.
+        crossings: where the motion passes kinks.
+
+    Returns:
+        Sizes.
+    """
+    kinks = model.kinks(path)
+    if not kinks:
+        return jnp.ones(crossings.phases.shape)
+    return state_scale(kinks)[jnp.maximum(crossings.kinks, 0)]
