@@ -1,10 +1,12 @@
 """The command line, in this process; the demo from end to end."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -201,6 +203,13 @@ def test_demo_finds_the_friction_that_was_put_in(tmp_path, capsys):
     before, after = (result[when]["error"]["holdout"] for when in ("before", "after"))
     assert after["chi2_per_dof"] < 1.05
     assert after["nrmse"] < 0.3 * before["nrmse"]
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    said = re.search(
+        r"Fc = ([\d.]+) ± .*χ²/dof ([\d.]+) → ([\d.]+)\..* ([\d.]+) % to ([\d.]+) %", readme, re.DOTALL
+    )
+    errors = [before["chi2_per_dof"], after["chi2_per_dof"], 100 * before["nrmse"], 100 * after["nrmse"]]
+    assert said is not None
+    assert [float(number) for number in said.groups()] == pytest.approx([level["value"], *errors], rel=0.01)
     assert "report.html" in shown.out
     assert "6 records read" in shown.err
     assert "chi2/dof" in shown.err
