@@ -14,7 +14,7 @@ from ._physical_fit import fit_physically
 _SMOOTH = np.array([0.25, 0.5, 0.25])
 """Weights of a half swing and its neighbours: what differs between the two sides of rest drops out."""
 
-_FEWEST_HALF_CYCLES = 1
+_HALF_CYCLES_A_COEFFICIENT = 1
 """Swings a coefficient that the balance needs at least; each gives a spring and a damper equation."""
 
 
@@ -76,9 +76,9 @@ def start_from_decays(
     """
     responses = tuple(decaying_response(campaign, record) for record in records)
     swings, few = sum(one.frequency.size for one in responses), ()
-    if swings < _FEWEST_HALF_CYCLES * len(names):
+    if swings < _HALF_CYCLES_A_COEFFICIENT * len(names):
         linear = tuple(name for name in names if CATALOGUE[name].proportional_to)
-        if not linear or swings < _FEWEST_HALF_CYCLES * len(linear):
+        if not linear or swings < _HALF_CYCLES_A_COEFFICIENT * len(linear):
             return None
         few = (
             f"The decays have {swings} swings, too few for {len(names)} coefficients: all but the linear "
