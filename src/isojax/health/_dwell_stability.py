@@ -18,11 +18,11 @@ REACH = (0.3, 0.1)
 _ANOTHER = 0.3
 """Difference between measured motion and orbit, over its size, from which on they are not the same motion."""
 
-_ORDER = {"displacement": 0, "velocity": 1, "acceleration": 2}
+_DERIVATIVES_OF_DISPLACEMENT = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
 class DwellStability(NamedTuple):
-    """One measured dwell, held against the periodic orbit that the fitted model has there.
+    """One measured dwell, compared with the periodic orbit that the fitted model has there.
 
     Attributes:
         record: name of its record.
@@ -63,7 +63,7 @@ class _Measured(NamedTuple):
 
 
 def dwell_stability(model: Isolator, campaign: Campaign) -> tuple[DwellStability, ...]:
-    """Hold every dwell of every record against a fitted model's periodic orbit next to its measured motion.
+    """Compare every dwell of every record with a fitted model's periodic orbit next to its measured motion.
 
     All dwells are worked out side by side, starting from the measured displacement and velocity; internal
     states start from zero and settle over some periods. Where the model has no such motion, or another one,
@@ -127,7 +127,7 @@ def _coordinate(
     """Give the harmonics of the model's coordinate: displacement, relative to a base that moves [m]."""
     # The coordinate is relative to the base, an accelerometer is not.
     signal = output - drive if based and channel.quantity == "acceleration" else output
-    order = _ORDER[channel.quantity]
+    order = _DERIVATIVES_OF_DISPLACEMENT[channel.quantity]
     if order == 0:
         return signal
     motion = np.zeros_like(signal)

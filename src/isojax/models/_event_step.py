@@ -130,9 +130,9 @@ def find_regime(model: Isolator, state: State, at: Instant) -> Regime:
 def split_step(model: Isolator, quantity: Quantity, state: State, step: Step) -> tuple[State, Jump]:
     """Advance one step; where a law jumps or bends on the way, two steps that meet there.
 
-    Dense output of the step tells when, and carries the derivative of that instant, so that derivatives of
-    the path jump there as they must. Of several events in one step the first is met; what follows it in the
-    same step is found at the start of the next.
+    Dense output of the step gives the instant, and carries the derivative of that instant, so that
+    derivatives of the path jump there as they must. Of several events in one step the first is met; what
+    follows it in the same step is found at the start of the next.
 
     Args:
         model: the isolator.
@@ -206,7 +206,7 @@ def split_step(model: Isolator, quantity: Quantity, state: State, step: Step) ->
         second = _place(met, _dense(_increments(model, quantity, met, rest, after)), 1.0)
         size = nothing
         if quantity == "acceleration":
-            # Displacement and velocity never jump; breaking loose begins without acceleration.
+            # Displacement and velocity never jump; breaking loose starts without acceleration.
             def read(side: Regime) -> Lanes:
                 seen = model.reading(met, rest.stages[0], quantity, side)
                 # What pushes a mass that moves is seen by the accelerometer.
@@ -232,7 +232,7 @@ def _freed(regime: Regime, model: Isolator, start: State, end: State, step: Step
     """Find where friction that holds the mass gives way.
 
     While it holds, what drives the mass beyond it runs nearly straight over a step; one secant step takes
-    the bend into account. The motion begins without acceleration, so that an error of the instant is one of
+    the bend into account. The motion starts without acceleration, so that an error of the instant is one of
     second order, and its derivative one of first order that is left out.
 
     Returns:

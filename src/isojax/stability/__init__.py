@@ -1,4 +1,10 @@
-"""What the identified isolator does: periodic orbits, their multipliers, maps, branches, bifurcations."""
+"""What the identified isolator does: periodic orbits, their multipliers, maps, branches, bifurcations.
+
+In: an isolator and its drive. Out: one frozen result a question, each with its `result` that says whether
+it was found. Read the rooms upwards: orbit (one orbit), map (a plane of them), branch (along a parameter),
+response (curves over frequency), attractor (motion in time), derivatives (how all of it moves with the
+coefficients).
+"""
 
 from .attractor import BasinsOfAttraction as BasinsOfAttraction
 from .attractor import BifurcationDiagram as BifurcationDiagram

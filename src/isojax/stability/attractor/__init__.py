@@ -1,4 +1,10 @@
-"""isojax.stability.attractor."""
+"""Where motions settle in time, stable or chaotic, and from where.
+
+In: an isolator, a drive, initial states. Out: `BifurcationDiagram`, `BasinsOfAttraction`,
+`PoincareSection`, `PhasePortrait`, `LyapunovExponent`, `ReturnToOrbit`. Read _stroboscope first (the motion
+once a drive period, and the growth of a disturbance); every other file is one of these results and needs no
+other.
+"""
 
 from ._basins import BasinsOfAttraction as BasinsOfAttraction
 from ._basins import basins_of_attraction as basins_of_attraction

@@ -72,7 +72,7 @@ def basins_of_attraction(
         velocities: ascending, at t = 0 [m/s].
         settle: drive periods between two looks at whether all have settled.
         most: drive periods after which the rest count as never repeating.
-        longest: longest period that is told from none.
+        longest: longest period that is distinguished from none.
         tolerance: largest distance between a sample and its repetition, as a share of the motion; attractors
             nearer than a thousand times this count as one.
         integrator: solver and steps.

@@ -88,8 +88,8 @@ def bifurcation_diagram(
 ) -> BifurcationDiagram:
     """Give the settled motion, once a drive period, as the drive's amplitude or frequency varies.
 
-    Turned up or down, the motion at one point begins where that at the point before ended, so that jumps and
-    their return show; set anew, it begins at each point from each start. All runs go side by side.
+    Turned up or down, the motion at one point starts where that at the point before ended, so that jumps and
+    their return show; set anew, it starts at each point from each start. All runs go side by side.
 
     Args:
         model: the isolator.
@@ -97,12 +97,12 @@ def bifurcation_diagram(
         frequency: the one frequency that goes with them [Hz].
         amplitude: the one drive amplitude that goes with `frequencies`.
         frequencies: ascending [Hz].
-        direction: "up", "down", "both" (down begins where up ended), or "anew".
-        starts: state, or list of states, at which a run begins, and begins again after the motion ran away;
+        direction: "up", "down", "both" (down starts where up ended), or "anew".
+        starts: state, or list of states, at which a run starts, and starts again after the motion ran away;
             rest if omitted.
         settle: drive periods at each point before the samples.
         samples: drive periods that are kept.
-        longest: longest period that is told from none; at most half the samples.
+        longest: longest period that is distinguished from none; at most half the samples.
         tolerance: largest distance between a sample and its repetition, as a share of the motion: two
             branches nearer than this count as one.
         integrator: solver and steps.

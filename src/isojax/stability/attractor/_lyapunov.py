@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent: how fast neighbouring motions part."""
+"""The largest Lyapunov exponent: how fast neighbouring motions separate."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,7 +19,7 @@ _BLOCKS = 20
 
 
 class LyapunovExponent(eqx.Module):
-    """Rate at which neighbouring motions part.
+    """Rate at which neighbouring motions separate.
 
     Attributes:
         value: [1/s]; positive where the motion is chaotic. NaN where it left every bound.
@@ -54,7 +54,7 @@ def largest_lyapunov_exponent(
         model: the isolator.
         excitation: the drive.
         start: state at t = 0; rest if omitted.
-        settle: drive periods before the mean begins.
+        settle: drive periods before the mean starts.
         periods: drive periods of the mean, 20 at least.
         integrator: solver and steps.
 

@@ -159,7 +159,7 @@ def _rate(away: Float[Array, "period state"], distance: Float[Array, " period"])
     order = jnp.argsort(usable)[:wanted]
     weight = jnp.where(jnp.isfinite(usable[order]), 1.0 / distance[order], 0.0)[:, None]
     before, after = away[:-1][order] * weight, away[1:][order] * weight
-    # A direction that died out long ago leaves nothing to tell its own multiplier from.
+    # A direction that died out long ago leaves nothing to estimate its own multiplier from.
     left, sizes, right = jnp.linalg.svd(before, full_matrices=False)
     inverse = jnp.where(sizes > 1e-8 * sizes[0], 1.0 / sizes, 0.0)
     carried = right.T @ (inverse[:, None] * (left.T @ after))

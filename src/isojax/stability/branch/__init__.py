@@ -1,4 +1,10 @@
-"""isojax.stability.branch."""
+"""Branches of periodic orbits along one parameter, and curves of their bifurcations over two.
+
+In: an isolator, the parameter and its range. Out: `Branch` with its `SpecialPoint`s, fold and period-
+doubling curves, nearest folds. Read _parameter_family, _arc_length (how a curve is followed), _branch,
+_continuation; then _special_points (what is located along a branch) and _extended_system (its exact
+equations); then _branch_switching, _codimension_two with _bifurcation_curves, and _nearest_folds.
+"""
 
 from ._bifurcation_curves import Cusp as Cusp
 from ._bifurcation_curves import FoldCurve as FoldCurve

@@ -108,7 +108,7 @@ class Branch(eqx.Module):
         closed: whether the branch returns to its first point.
         points: the orbits.
         special_points: bifurcations in the order of the branch; of a batch, branch after branch.
-        result: whether the branch was followed to the end of the range, or back to its beginning.
+        result: whether the branch was followed to the end of the range, or back to its start.
         family: isolators and drives along the parameter.
         integrator: steps and solver.
         scale: size of each state.

@@ -23,7 +23,7 @@ def switch_branch(
 ) -> Branch:
     """Follow the branch that leaves at a period doubling or at a broken symmetry.
 
-    It begins a quarter of a step from the point in its critical direction, closed over twice the period
+    It starts a quarter of a step from the point in its critical direction, closed over twice the period
     (doubling) or over the full period in place of half of one (broken symmetry). The direction's sign is no
     choice: the two sides are one doubled orbit a period later, or mirror images.
 

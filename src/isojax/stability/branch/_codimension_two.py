@@ -38,7 +38,7 @@ _ERROR = 1e-9
 """Error of the multipliers that the integration of a curve's points may leave."""
 
 _CUSP_SECTIONS = 3
-"""Times the step with a cusp is cut into as many parts as there are points polished together."""
+"""Times the step with a cusp is cut into as many pieces as there are points polished together."""
 
 
 def fold_curve(

@@ -77,7 +77,7 @@ def continue_branch(
         model: the isolator.
         parameter: "amplitude", "frequency", or a coefficient by its name in reports, such as
             `cubic_stiffness.coefficient` or `mass`.
-        start: value of the parameter where the branch begins.
+        start: value of the parameter where the branch starts.
         stop: value where it ends; it also ends where it comes back to `start`.
         amplitude: F0 [N, or m/s^2 for base excitation], where it is not the parameter.
         frequency: f [Hz], where it is not the parameter. An array here or there gives a batch of branches,

@@ -140,7 +140,7 @@ def _cells(model: Isolator, method: MapMethod, names: tuple[str, ...], lanes: La
             return 0.5 * (jnp.max(path) - jnp.min(path))
 
         if method.half:
-            # It begins at its largest displacement, where moving in time changes nothing to first order.
+            # It starts at its largest displacement, where moving in time changes nothing to first order.
             response = change[0]
         else:
             response = jax.vmap(

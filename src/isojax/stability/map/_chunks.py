@@ -21,7 +21,7 @@ FEWEST = 1024
 
 
 def fingerprint(*parts: object) -> str:
-    """Give a short word that tells one map from another.
+    """Give a short word that distinguishes one map from another.
 
     Args:
         *parts: models, integrators, arrays, numbers.
@@ -86,7 +86,7 @@ def run_chunks(
             progress(f"{min(begin + lanes, total)} of {total} orbits")
         return part
 
-    # A pass keeps one core busy; each core runs its own. Chunks over several devices go one by one.
+    # A batch keeps one core busy; each core runs its own. Chunks over several devices go one by one.
     cores = 1 if solver.sharding.num_devices > 1 else usable_cores()
     with ThreadPoolExecutor(cores) as pool:
         parts = list(pool.map(one, range(len(begins))))

@@ -32,7 +32,7 @@ class SharedKinks(NamedTuple):
 def shared_kinks(crossings: Crossings, shape: tuple[int, int], end: float) -> SharedKinks:
     """Find the order of kinks that most orbits share.
 
-    Kinks at the ends of a motion are left out: it begins and, if symmetric, ends at an extreme, where the
+    Kinks at the ends of a motion are left out: it starts and, if symmetric, ends at an extreme, where the
     velocity passes zero.
 
     Args:

@@ -1,4 +1,11 @@
-"""isojax.stability.orbit."""
+"""One periodic orbit of the forced isolator.
+
+In: an isolator, a harmonic drive. Out: `Orbit` with its state at t = 0 and its Floquet multipliers, or a
+harmonic balance. Read _describing_function (the start), _period_map (fixed steps), _kink_crossings and
+_split_period_map (the motion split where laws are not smooth), _shooting (the closed motion), _floquet,
+_orbit; _harmonic_balance stands beside them. The rooms branch, map, response, attractor and derivatives
+build on this one.
+"""
 
 from ._axis import ascending as ascending
 from ._describing_function import imposed_balance as imposed_balance

@@ -45,7 +45,7 @@ def trajectory(
         turns: periods.
 
     Returns:
-        Each state at the beginning of each step and at the end of the last, time first.
+        Each state at the start of each step and at the end of the last, time first.
     """
     end, path = _advance(model, integrator, drive, state, turns, keep=True)
     return tuple(jnp.concatenate([along, last[None]]) for along, last in zip(path, end, strict=True))

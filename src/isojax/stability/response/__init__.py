@@ -1,4 +1,10 @@
-"""isojax.stability.response."""
+"""Curves over frequency or amplitude that a designer reads.
+
+In: an isolator, a drive amplitude or displacements. Out: `FrequencyResponse` past its folds,
+`BackboneCurve` (free vibration and phase resonance), `Transmissibility`. Read _frequency_response (a branch
+over frequency), _free_vibration and _backbone, _transmissibility. Orbits come from the rooms branch and
+map.
+"""
 
 from ._backbone import BackboneCurve as BackboneCurve
 from ._backbone import backbone_curve as backbone_curve

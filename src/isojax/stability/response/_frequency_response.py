@@ -1,4 +1,4 @@
-"""Response over frequency at one drive amplitude, past its folds, with its unstable parts."""
+"""Response over frequency at one drive amplitude, past its folds, with its unstable stretches."""
 
 from typing import Any
 
@@ -71,7 +71,7 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Follow the periodic response over frequency.
 
-    The curve that begins with the smallest motion at the first frequency; one that closes on itself apart
+    The curve that starts with the smallest motion at the first frequency; one that closes on itself apart
     from it is not met.
 
     Args:
