@@ -30,22 +30,17 @@ class AbsQuadraticDamping(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "AbsQuadraticDamping":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.velocity**2
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.coefficient * jnp.abs(v) * v
 
     def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
-        """See `AbstractElement.kinks`."""
         return (v,)
 
     def force_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Lanes:
-        """See `AbstractElement.force_beside`."""
         return self.coefficient * sides[0] * v * v

@@ -43,18 +43,14 @@ class AcCoupling(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "AcCoupling":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.002 * scales.angular_frequency / (2.0 * math.pi))
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.angular_frequency / (2.0 * math.pi)
 
     def reading(self, y: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.reading`."""
         return y - 2.0 * math.pi * self.corner * s[0]
 
     def reading_rate(self, y: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.reading_rate`."""
         return (y - 2.0 * math.pi * (self.corner + self.leak) * s[0],)

@@ -35,14 +35,11 @@ class AddedMass(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "AddedMass":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.mass
 
     def inertia(self) -> Lanes | float:
-        """See `AbstractElement.inertia`."""
         return self.mass

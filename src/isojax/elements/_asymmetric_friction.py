@@ -53,15 +53,12 @@ class AsymmetricFriction(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.difference * jnp.tanh(v / self.width) ** 2
 
     def sharp_force(
         self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
     ) -> Lanes:
-        """See `AbstractElement.sharp_force`."""
         return self.difference * direction**2

@@ -40,7 +40,6 @@ class BoucWen(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "BoucWen":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 1.0 / scales.displacement, -0.5 / scales.displacement, 1.0)
 
     @classmethod
@@ -54,7 +53,6 @@ class BoucWen(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
 
     def unphysical_shape(self, displacement: float) -> str | None:
@@ -72,22 +70,18 @@ class BoucWen(AbstractElement):
         return None
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.stiffness * s[0]
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         (z,) = s
         # |z|^n has a NaN derivative in n at rest; the floor is far below any measured displacement.
         power = jnp.maximum(jnp.abs(z), 1e-30) ** self.exponent
         return (v - self.beta * jnp.abs(v) * power * jnp.sign(z) - self.gamma * v * power,)
 
     def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
-        """See `AbstractElement.kinks`."""
         return (v, s[0])
 
     def state_rate_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Internal:
-        """See `AbstractElement.state_rate_beside`."""
         forth, out = sides
         reach = out * s[0]
         # With n = 1 this is linear in z on either side of the kink; the floor acts on the other factor alone.

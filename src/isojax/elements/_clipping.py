@@ -40,7 +40,6 @@ class Clipping(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "Clipping":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.8 * max(scales.largest_reading, scales.reading))
 
     @classmethod
@@ -51,9 +50,7 @@ class Clipping(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return 1.0
 
     def reading(self, y: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.reading`."""
         return y - self.share * (y - jnp.clip(y, -self.level, self.level))

@@ -57,15 +57,12 @@ class CoulombFriction(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.force_level * jnp.tanh(v / self.width)
 
     def sharp_force(
         self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
     ) -> Lanes:
-        """See `AbstractElement.sharp_force`."""
         return self.force_level * direction

@@ -28,14 +28,11 @@ class CubicDamping(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "CubicDamping":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.velocity**3
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.coefficient * v * v * v

@@ -34,7 +34,6 @@ class DahlFriction(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "DahlFriction":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.3 * scales.displacement)
 
     @classmethod
@@ -48,21 +47,16 @@ class DahlFriction(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.force_level * s[0]
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         return ((v - jnp.abs(v) * s[0]) / self.presliding,)
 
     def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
-        """See `AbstractElement.kinks`."""
         return (v,)
 
     def state_rate_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Internal:
-        """See `AbstractElement.state_rate_beside`."""
         return ((v - sides[0] * v * s[0]) / self.presliding,)

@@ -38,7 +38,6 @@ class DriveHarmonics(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "DriveHarmonics":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.0, 3.0)
 
     @classmethod
@@ -49,11 +48,9 @@ class DriveHarmonics(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return 1.0
 
     def channel_drive(self, channels: Channels) -> Lanes | float:
-        """See `AbstractElement.channel_drive`."""
         second, third = (
             jnp.cos(self.phase) * channels[f"drive_cosine_{order}"]
             - jnp.sin(self.phase) * channels[f"drive_sine_{order}"]

@@ -49,7 +49,6 @@ class DualChamber(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "DualChamber":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.5 / scales.angular_frequency, scales.displacement / scales.velocity**2)
 
     @classmethod
@@ -61,7 +60,6 @@ class DualChamber(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
 
     def volume_ratio(self, low_stiffness: float) -> Scalar:
@@ -93,19 +91,15 @@ class DualChamber(AbstractElement):
         return self.time_constant * polytropic_exponent * pressure * (1.0 + ratio) / (ratio * loaded_volume)
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.stiffness * s[0]
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         return (v - self._flow(s[0], jnp.abs(s[0])),)
 
     def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
-        """See `AbstractElement.kinks`."""
         return (s[0],)
 
     def state_rate_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Internal:
-        """See `AbstractElement.state_rate_beside`."""
         return (v - self._flow(s[0], sides[0] * s[0]),)
 
     def _flow(self, p: Lanes, size: Lanes) -> Lanes:

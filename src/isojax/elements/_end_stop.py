@@ -71,23 +71,19 @@ class EndStop(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         above = self.width * jax.nn.softplus((x - self.gap) / self.width)
         below = self.width * jax.nn.softplus((-x - self.gap) / self.width)
         return self.stiffness * ((1.0 + self.side) * above - (1.0 - self.side) * below)
 
     def corners(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
-        """See `AbstractElement.corners`."""
         return x - self.gap, -x - self.gap
 
     def sharp_force(
         self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
     ) -> Lanes:
-        """See `AbstractElement.sharp_force`."""
         above = jnp.where(sides[0] > 0.0, x - self.gap, 0.0)
         below = jnp.where(sides[1] > 0.0, -x - self.gap, 0.0)
         return self.stiffness * ((1.0 + self.side) * above - (1.0 - self.side) * below)

@@ -31,7 +31,6 @@ class FloorMotion(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "FloorMotion":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
@@ -40,5 +39,4 @@ class FloorMotion(AbstractElement):
         return 1.0
 
     def channel_base(self, channels: Channels) -> Lanes | None:
-        """See `AbstractElement.channel_base`."""
         return self.transmission * channels["floor"]

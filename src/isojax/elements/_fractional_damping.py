@@ -57,7 +57,6 @@ class FractionalDamping(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "FractionalDamping":
-        """See `AbstractElement.guess`."""
         return cls._of_order(scales, 0.4)
 
     @classmethod
@@ -76,7 +75,6 @@ class FractionalDamping(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / (scales.displacement * math.sqrt(scales.angular_frequency))
 
     def _step(self) -> Lanes:
@@ -86,7 +84,6 @@ class FractionalDamping(AbstractElement):
         return self.lowest * jnp.exp(branch * self._step())
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         step, alpha = self._step(), self.order
         total = self.lowest**alpha / jnp.expm1(alpha * step) * x
         total = total + self.highest ** (alpha - 1.0) / jnp.expm1((1.0 - alpha) * step) * v
@@ -95,5 +92,4 @@ class FractionalDamping(AbstractElement):
         return self.coefficient * jnp.sin(jnp.pi * alpha) / jnp.pi * step * total
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         return tuple(v - self._rate_of(branch) * extension for branch, extension in enumerate(s))

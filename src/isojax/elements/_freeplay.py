@@ -74,7 +74,6 @@ class Freeplay(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
 
     def twins(self) -> tuple[AbstractElement, ...]:
@@ -82,17 +81,14 @@ class Freeplay(AbstractElement):
         return (_end_stop.EndStop(self.lost_stiffness, self.gap, 0.0, self.width),)
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         beyond = jax.nn.softplus((x + self.gap) / self.width) - jax.nn.softplus((x - self.gap) / self.width)
         return -self.lost_stiffness * (self.width * beyond - self.gap)
 
     def corners(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
-        """See `AbstractElement.corners`."""
         return x - self.gap, x + self.gap
 
     def sharp_force(
         self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
     ) -> Lanes:
-        """See `AbstractElement.sharp_force`."""
         clipped = jnp.where(sides[0] > 0.0, self.gap, jnp.where(sides[1] > 0.0, x, -self.gap))
         return -self.lost_stiffness * clipped

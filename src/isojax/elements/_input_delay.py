@@ -36,14 +36,11 @@ class InputDelay(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "InputDelay":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return 1.0 / scales.angular_frequency
 
     def shift(self) -> Lanes | float:
-        """See `AbstractElement.shift`."""
         return self.delay

@@ -36,14 +36,11 @@ class InputGain(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "InputGain":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return 1.0
 
     def drive(self, u: Lanes, u_rate: Lanes) -> tuple[Lanes, Lanes]:
-        """See `AbstractElement.drive`."""
         return (1.0 + self.deviation) * u, (1.0 + self.deviation) * u_rate

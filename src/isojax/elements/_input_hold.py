@@ -36,7 +36,6 @@ class InputHold(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "InputHold":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 2.0)
 
     @classmethod
@@ -46,11 +45,9 @@ class InputHold(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return 1.0
 
     def channel_drive(self, channels: Channels) -> Lanes | float:
-        """See `AbstractElement.channel_drive`."""
         kinds = [channels[name] for name in _ORDERS]
         other = jnp.where(self.order == 0.0, kinds[0], jnp.where(self.order == 1.0, kinds[1], kinds[2]))
         return self.share * other

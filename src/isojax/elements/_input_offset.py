@@ -29,14 +29,11 @@ class InputOffset(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "InputOffset":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def drive(self, u: Lanes, u_rate: Lanes) -> tuple[Lanes, Lanes]:
-        """See `AbstractElement.drive`."""
         return u + self.offset, u_rate

@@ -29,14 +29,11 @@ class LinearStiffness(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "LinearStiffness":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.coefficient * x

@@ -45,7 +45,6 @@ class LugreFriction(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "LugreFriction":
-        """See `AbstractElement.guess`."""
         return cls._shaped(scales, 0.1, 0.3)
 
     @classmethod
@@ -61,27 +60,21 @@ class LugreFriction(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self._force(v, s[0], jnp.abs(v))
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         return (self._rate(v, s[0], jnp.abs(v)),)
 
     def kinks(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
-        """See `AbstractElement.kinks`."""
         return (v,)
 
     def force_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Lanes:
-        """See `AbstractElement.force_beside`."""
         return self._force(v, s[0], sides[0] * v)
 
     def state_rate_beside(self, x: Lanes, v: Lanes, s: Internal, sides: tuple[Lanes, ...]) -> Internal:
-        """See `AbstractElement.state_rate_beside`."""
         return (self._rate(v, s[0], sides[0] * v),)
 
     def _rate(self, v: Lanes, z: Lanes, speed: Lanes) -> Lanes:

@@ -33,7 +33,6 @@ class MainsHum(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "MainsHum":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 50.0)
 
     @classmethod
@@ -43,10 +42,8 @@ class MainsHum(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.reading
 
     def channel_reading(self, channels: Channels) -> Lanes | float:
-        """See `AbstractElement.channel_reading`."""
         line = jnp.where(self.frequency == 60.0, channels["hum_60"], channels["hum_50"])
         return self.amplitude * line

@@ -31,7 +31,6 @@ class MaxwellBranch(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "MaxwellBranch":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 1.0 / scales.angular_frequency)
 
     @classmethod
@@ -41,13 +40,10 @@ class MaxwellBranch(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.stiffness * s[0]
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         return (v - s[0] / self.time_constant,)

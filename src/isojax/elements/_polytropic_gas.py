@@ -50,7 +50,6 @@ class PolytropicGas(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "PolytropicGas":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 10.0 * scales.displacement, 1.4, 1.0)
 
     @classmethod
@@ -69,7 +68,6 @@ class PolytropicGas(AbstractElement):
         return scales.force * 10.0 / 1.4
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         left = 1.0 - self.side * x / self.gas_length
         gas = jnp.maximum(left, SOLID)
         # Taylor's parabola about `gas`, which is the law itself wherever gas is left.

@@ -28,14 +28,11 @@ class PositionDamping(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "PositionDamping":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / (scales.displacement**2 * scales.velocity)
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.coefficient * x * x * v

@@ -36,14 +36,11 @@ class QuadraticStiffness(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "QuadraticStiffness":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement**2
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.coefficient * x * x

@@ -43,7 +43,6 @@ class SecondMode(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "SecondMode":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 1.3 * scales.angular_frequency, 0.05)
 
     @classmethod
@@ -58,7 +57,6 @@ class SecondMode(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.mass
 
     def frequency(self) -> float:
@@ -66,15 +64,12 @@ class SecondMode(AbstractElement):
         return float(self.angular_frequency) / (2.0 * math.pi)
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.mass * self._acceleration(x, v, s)
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         return s[1], self._acceleration(x, v, s)
 
     def base_rate(self, a: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.base_rate`."""
         return 0.0 * s[0], 0.0 * s[1] - a
 
     def _acceleration(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:

@@ -28,14 +28,11 @@ class SensorGain(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "SensorGain":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return 1.0
 
     def reading(self, y: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.reading`."""
         return (1.0 + self.deviation) * y

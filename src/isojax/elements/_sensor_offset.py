@@ -30,14 +30,11 @@ class SensorOffset(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "SensorOffset":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.reading
 
     def reading(self, y: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.reading`."""
         return y + self.offset

@@ -31,14 +31,11 @@ class StiffnessDrift(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "StiffnessDrift":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force / scales.displacement
 
     def channel_force(self, x: Lanes, v: Lanes, channels: Channels) -> Lanes | float:
-        """See `AbstractElement.channel_force`."""
         return self.change * channels["clock"] * x

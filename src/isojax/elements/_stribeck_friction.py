@@ -42,7 +42,6 @@ class StribeckFriction(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "StribeckFriction":
-        """See `AbstractElement.guess`."""
         return cls._shaped(scales, 1.0, 0.3)
 
     @classmethod
@@ -58,17 +57,14 @@ class StribeckFriction(AbstractElement):
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self._size(v) * jnp.tanh(v / self.width)
 
     def sharp_force(
         self, x: Lanes, v: Lanes, s: Internal, direction: Lanes, sides: tuple[Lanes, ...]
     ) -> Lanes:
-        """See `AbstractElement.sharp_force`."""
         return self._size(v) * direction
 
     def _size(self, v: Lanes) -> Lanes:

@@ -23,5 +23,4 @@ class Harmonic(AbstractExcitation):
     frequency: Scalar = parameter(symbol="f", unit="Hz", lower=0.0)
 
     def __call__(self, t: Lanes) -> Lanes:
-        """See `AbstractExcitation.__call__`."""
         return self.amplitude * jnp.sin(2.0 * jnp.pi * self.frequency * t)

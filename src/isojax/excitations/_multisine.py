@@ -25,7 +25,6 @@ class Multisine(AbstractExcitation):
     phases: Float[Array, " frequency"] = eqx.field(converter=lambda p: jnp.asarray(p, dtype=float))
 
     def __call__(self, t: Lanes) -> Lanes:
-        """See `AbstractExcitation.__call__`."""
         t = jnp.asarray(t, dtype=float)
         lines = (1,) * t.ndim + (-1,)
         angles = 2.0 * jnp.pi * t[..., None] * jnp.reshape(self.frequencies, lines)

@@ -35,7 +35,6 @@ class SteppedSine(AbstractExcitation):
         return jnp.sum(self.cycles / self.frequencies)
 
     def __call__(self, t: Lanes) -> Lanes:
-        """See `AbstractExcitation.__call__`."""
         dwell = jnp.clip(jnp.searchsorted(self.starts, t, side="right") - 1, 0, self.frequencies.size - 1)
         phase = 2.0 * jnp.pi * (self.cycles * dwell + self.frequencies[dwell] * (t - self.starts[dwell]))
         return self.amplitude * jnp.sin(phase)

@@ -37,7 +37,6 @@ class SweptSine(AbstractExcitation):
             raise ValueError(f'Argument `law` must be "linear" or "logarithmic", but is {self.law!r}.')
 
     def __call__(self, t: Lanes) -> Lanes:
-        """See `AbstractExcitation.__call__`."""
         if self.law == "linear":
             cycles = self.start * t + 0.5 * (self.stop - self.start) / self.duration * t**2
         else:

@@ -71,7 +71,6 @@ class RoundedLaw(AbstractLaw):
     """The laws with their jumps rounded, each state on its own side of the kinks."""
 
     def forces(self, elements: Elements, state: State) -> list[Lanes]:
-        """See `AbstractLaw.forces`."""
         shares = zip(elements, share_internal(elements, state), strict=True)
         return [element.force(state[0], state[1], own) for element, own in shares]
 
@@ -89,12 +88,10 @@ class ContinuedLaw(AbstractLaw):
     sides: State
 
     def forces(self, elements: Elements, state: State) -> list[Lanes]:
-        """See `AbstractLaw.forces`."""
         shares = _share_sides(elements, state, "kinks", self.sides)
         return [element.force_beside(state[0], state[1], own, sides) for element, own, sides in shares]
 
     def state_rates(self, elements: Elements, state: State) -> list[Internal]:
-        """See `AbstractLaw.state_rates`."""
         shares = _share_sides(elements, state, "kinks", self.sides)
         return [element.state_rate_beside(state[0], state[1], own, sides) for element, own, sides in shares]
 
@@ -116,7 +113,6 @@ class Regime(AbstractLaw):
         return self.direction == 0.0
 
     def forces(self, elements: Elements, state: State) -> list[Lanes]:
-        """See `AbstractLaw.forces`."""
         shares = _share_sides(elements, state, "corners", self.corners)
         return [
             element.sharp_force(state[0], state[1], own, self.direction, sides)
@@ -124,7 +120,6 @@ class Regime(AbstractLaw):
         ]
 
     def acceleration(self, unheld: Lanes) -> Lanes:
-        """See `AbstractLaw.acceleration`."""
         return jnp.where(self.is_held, 0.0, unheld)
 
 

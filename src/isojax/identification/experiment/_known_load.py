@@ -27,14 +27,11 @@ class KnownLoad(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "KnownLoad":
-        """See `AbstractElement.guess`."""
         return cls(0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return -self.weight + 0.0 * x

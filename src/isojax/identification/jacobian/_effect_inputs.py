@@ -57,32 +57,25 @@ class Perturbation(AbstractElement):
 
     @classmethod
     def guess(cls, scales: Scales) -> "Perturbation":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.0, 0.0, 0.0, 0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return 1.0
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.opposing + 0.0 * x
 
     def inertia(self) -> Lanes | float:
-        """See `AbstractElement.inertia`."""
         return self.mass
 
     def drive(self, u: Lanes, u_rate: Lanes) -> tuple[Lanes, Lanes]:
-        """See `AbstractElement.drive`."""
         return u + self.acted, u_rate
 
     def channel_base(self, channels: Channels) -> Lanes | None:
-        """See `AbstractElement.channel_base`."""
         return jnp.asarray(self.base)
 
     def reading(self, y: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.reading`."""
         return y + self.read
 
 

@@ -128,16 +128,13 @@ class PowerForce(AbstractFreeForce):
 
     @classmethod
     def guess(cls, scales: Scales) -> "PowerForce":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.0, 0.0, 0.0, 0.0, scales.displacement, scales.velocity, scales.slowest_velocity)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         far, fast = x / self.displacement, v / self.velocity
         width = _SLOW * self.slowest / self.velocity
         size, speed = _rounded(far, _NEAR_REST), _rounded(fast, width)
@@ -146,7 +143,6 @@ class PowerForce(AbstractFreeForce):
         return self.size * side * way * size**self.power * speed**self.speed_power
 
     def wording(self) -> Wording:
-        """See `AbstractFreeForce.wording`."""
         p, q = float(self.power), float(self.speed_power)
         odd, speed_odd = bool(self.odd > 0.5), bool(self.speed_odd > 0.5)
         factors = [one for one in (_factor("x", p, odd), _factor("v", q, speed_odd)) if one]
@@ -179,20 +175,16 @@ class WaveForce(AbstractFreeForce):
 
     @classmethod
     def guess(cls, scales: Scales) -> "WaveForce":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.3 * scales.displacement, 0.0)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.size * jnp.sin(x / self.length + self.phase)
 
     def wording(self) -> Wording:
-        """See `AbstractFreeForce.wording`."""
         law = "sin" if float(self.phase) == 0.0 else "cos"
         formula = f"{law}(x / {1e3 * float(self.length):.3g} mm)"
         return Wording(formula, "a force that is periodic along the path", 1.0, "N", 20.0)
@@ -222,25 +214,20 @@ class SlipForce(AbstractFreeForce):
 
     @classmethod
     def guess(cls, scales: Scales) -> "SlipForce":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 0.2 * scales.displacement)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.size * s[0] / self.reach
 
     def wording(self) -> Wording:
-        """See `AbstractFreeForce.wording`."""
         formula = f"slip(x; {1e3 * float(self.reach):.3g} mm)"
         return Wording(formula, "a spring that slips (internal state, rate-independent)", 1.0, "N", 30.0)
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         full = jnp.minimum(jnp.abs(s[0] / self.reach), 1.0) ** _ROUND
         return (v * jnp.where(v * s[0] > 0.0, 1.0 - full, 1.0),)
 
@@ -272,27 +259,22 @@ class FadingForce(AbstractFreeForce):
 
     @classmethod
     def guess(cls, scales: Scales) -> "FadingForce":
-        """See `AbstractElement.guess`."""
         return cls(0.0, 1.0 / scales.angular_frequency, 1.0, scales.displacement)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
-        """See `AbstractElement.typical_strength`."""
         return scales.force
 
     def force(self, x: Lanes, v: Lanes, s: Internal) -> Lanes:
-        """See `AbstractElement.force`."""
         return self.size * s[0]
 
     def wording(self) -> Wording:
-        """See `AbstractFreeForce.wording`."""
         power = float(self.power)
         formula = f"fade({_factor('x', power, True)}; {1e3 * float(self.time_constant):.3g} ms)"
         factor = float(self.displacement) ** -power
         return Wording(formula, "a force that relaxes", factor, _power_unit(power, 0.0), 30.0 + power)
 
     def state_rate(self, x: Lanes, v: Lanes, s: Internal) -> Internal:
-        """See `AbstractElement.state_rate`."""
         size = _rounded(x / self.displacement, _NEAR_REST)
         rate = self.power * size ** (self.power - 1.0) * v / self.displacement
         return (rate - s[0] / self.time_constant,)
