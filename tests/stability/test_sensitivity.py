@@ -161,6 +161,9 @@ def test_fold_force_moves_as_the_fold_that_differences_find(paper: ij.Isolator):
         changed = [paper.replace(**{name.replace(".", "__"): value * (1 + s * step)}) for s in (1, -1)]
         above, below = (float(fold(model).amplitude) for model in changed)
         assert float(sens.by("value", name)) == pytest.approx((above - below) / (2 * step * value), rel=1e-6)
+    # The amplitude is what the fold solves for.
+    with pytest.raises(ValueError, match="names 'drive.amplitude'"):
+        ij.sensitivity(point, parameters=("drive.amplitude",))
 
 
 def test_function_of_a_model_is_differentiated_by_name():

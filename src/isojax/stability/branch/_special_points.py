@@ -21,7 +21,7 @@ _BISECTIONS, _CORRECTIONS = 14, 4
 _LOCATED_AT_ONCE = 4
 """Bifurcations located together; their count is rounded up to this, so that few shapes are compiled."""
 
-_REPEATED = 1e-3
+_SAME_MOTION = 1e-3
 """Distance of a motion from its mirror image half a period on, or from itself a period on, over its size,
 below which it counts as symmetric or repeated: bisection leaves a ten-thousandth of a step."""
 
@@ -202,7 +202,7 @@ def find_special_points(
     crossed, points = _crossed(family, method), []
     for branch, test, found, matrix, repeats in zip(lanes, kinds, *located, strict=False):
         judged = _judge(int(test), method, np.asarray(matrix))
-        if test == 0 and crossed is not None and _distance(crossed[0], repeats) < _REPEATED:
+        if test == 0 and crossed is not None and _distance(crossed[0], repeats) < _SAME_MOTION:
             judged = crossed
         if judged is not None:
             own = live.driven(live.amplitude[branch], live.frequency[branch])
@@ -242,7 +242,7 @@ def _is_fold(family: ParameterFamily, scale: Array, point: SpecialPoint, crossin
     family, point = jax.lax.stop_gradient((family, point))
     shares = family.shares(point.value[None])
     repeats = _repeats_jitted(family, point.method, scale, point.y0 / scale, shares)
-    return _distance(crossing, repeats) >= _REPEATED
+    return _distance(crossing, repeats) >= _SAME_MOTION
 
 
 def _judge(
