@@ -118,7 +118,7 @@ def test_health_counts_dwells_and_gives_the_noise(found):
     text = " ".join(health_words(data_health(found.campaign), found.after))
     dwells = sum(len(record.dwells) for record in found.campaign.records)
     assert f"of {dwells} dwells never settled" in text
-    assert f"{found.after.noise.sigma:.3g} m/s² rms" in text
+    assert f"{found.after.noise.sigma:#.3g} m/s² rms" in text
 
 
 def test_scatter_within_records_is_told_where_repeats_show_it(found):

@@ -113,7 +113,7 @@ def simulate(
         >>> response = ij.simulate(model, ij.Harmonic(amplitude=100.0, frequency=5.0), duration=10.0)
         >>> settled = response.displacement[-1000:]
         >>> print(f"{1e3 * float(abs(settled).max()):.3f} mm")
-        0.411 mm
+        0.408 mm
     """
     check_float64()
     integrator = Integrator() if integrator is None else integrator

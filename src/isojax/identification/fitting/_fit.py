@@ -64,7 +64,7 @@ def fit(
 
         >>> fitted = ij.fit(guess.model, campaign)
         >>> print(f"{float(fitted.model['linear_stiffness.coefficient']):.2g} N/m, nrmse {fitted.nrmse:.2f}")
-        1.1e+06 N/m, nrmse 0.21
+        1.1e+06 N/m, nrmse 0.22
     """
     check_float64()
     places = free_places(model, fixed, free, campaign.mass_free)

@@ -144,10 +144,10 @@ def stability_map(
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
 
     Example:
-        >>> amplitudes, frequencies = np.linspace(20.0, 300.0, 8), np.linspace(3.5, 6.0, 11)
+        >>> amplitudes, frequencies = np.array([100.0, 175.0, 300.0]), np.array([4.2, 5.0])
         >>> smap = ij.stability_map(ij.paper.y_direction(), amplitudes, frequencies, coexisting=True)
         >>> smap.count.shape, int(smap.count.max())
-        ((8, 11), 3)
+        ((3, 2), 3)
     """
     check_float64()
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)

@@ -97,7 +97,7 @@ def frequency_response(
         >>> response = ij.frequency_response(ij.paper.y_direction(), 50.0, (4.0, 7.0))
         >>> place = int(abs(response.receptance).argmax())
         >>> print(f"resonance near {float(response.branch.points.frequency[place]):.1f} Hz")
-        resonance near 5.7 Hz
+        resonance near 5.5 Hz
     """
     check_float64()
     forces, ends = np.asarray(amplitude, dtype=float), np.asarray(frequencies, dtype=float)

@@ -85,7 +85,7 @@ def transmissibility(
         >>> model = ij.Isolator(800.0, (ij.elements.LinearStiffness(1e6), ij.elements.LinearDamping(4e3)))
         >>> ratio = ij.transmissibility(model, 100.0, np.array([5.0, 20.0])).ratio
         >>> [f"{size:.2f}" for size in abs(ratio).ravel().tolist()]
-        ['3.81', '0.09']
+        ['4.11', '0.10']
     """
     check_float64()
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
