@@ -78,7 +78,7 @@ def explain_remainder(
 
         >>> remainder = ij.explain_remainder(fitted, refit=False)
         >>> len(remainder.dwells)
-        36
+        54
     """
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
