@@ -162,7 +162,7 @@ def test_fold_force_moves_as_the_fold_that_differences_find(paper: ij.Isolator):
         above, below = (float(fold(model).amplitude) for model in changed)
         assert float(sens.by("value", name)) == pytest.approx((above - below) / (2 * step * value), rel=1e-6)
     # The amplitude is what the fold solves for.
-    with pytest.raises(ValueError, match="names 'drive.amplitude'"):
+    with pytest.raises(ValueError, match=r"names 'drive\.amplitude'"):
         ij.sensitivity(point, parameters=("drive.amplitude",))
 
 

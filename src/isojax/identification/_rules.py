@@ -3,7 +3,7 @@
 import dataclasses
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Rules:
     """The numbers by which a fit is judged and an effect is named.
 
@@ -214,3 +214,12 @@ class Rules:
 
     pursuit_tie: float = 0.03
     """Share of the best law's gain by which a plainer one may fall short and still be taken."""
+
+    def __repr__(self) -> str:
+        """Give the numbers that differ from the defaults, as they would be passed."""
+        changed = (
+            f"{field.name}={getattr(self, field.name)!r}"
+            for field in dataclasses.fields(self)
+            if getattr(self, field.name) != field.default
+        )
+        return f"Rules({', '.join(changed)})"
