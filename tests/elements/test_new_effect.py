@@ -20,7 +20,7 @@ CHECKS = (
     "tests/test_effect_pages.py",
     "tests/test_no_catalogue_names.py",
     "tests/test_campaign_page.py",
-    "tests/identification/test_separate.py",
+    "tests/identification/test_separating_words.py",
     "tests/identification/test_passivity.py",
     "tests/identification/test_fit_recovery.py",
 )
