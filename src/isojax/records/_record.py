@@ -1,11 +1,14 @@
 """One measured record: the two channels in SI, how they were excited, and the dwells of a stepped sine."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from jaxtyping import Float
+
+_Answer = TypeVar("_Answer")
 
 Direction = Literal["forward", "backward", "none"]
 Role = Literal["fit", "holdout"]
@@ -74,6 +77,13 @@ class Record:
     kind: ExcitationKind = "broadband"
     clock: tuple[float, float] = (0.0, 1.0)
     floor: Float[np.ndarray, " time"] | None = None
+    _kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def once(self, question: Hashable, work: Callable[[], _Answer]) -> _Answer:
+        """Gives what `work` returns, computed when the question is first asked and then kept."""
+        if question not in self._kept:
+            self._kept[question] = work()
+        return self._kept[question]
 
     @property
     def rings_down(self) -> bool:

@@ -51,7 +51,7 @@ def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
     fitted, score = test.fitted, test.scores[index]
     best: tuple[float, Isolator, Nuisances] | None = None
     places = _free_places(fitted, fitted.model.with_elements(score.element))
-    for share in (1.0, 0.3, 0.03):
+    for share in search.rules.step_shares:
         model = _extended(fitted, score.element, share * score.strength, share * test.steps[index])
         old, new = fitted.point.nuisances, test.nuisances[index]
         motion = old.states[:, :2] + share * (new.states[:, :2] - old.states[:, :2])
@@ -76,7 +76,8 @@ def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
     # Beside a fold the initial states that followed the steps may lie on the other branch: the measured ones
     # again.
     search.progress("the search stalled: again, from the measured states")
-    again = refit_from(found, found.model, search._replace(max_steps=search.max_steps // 2, rival=None))
+    steps = int(search.rules.second_try * search.max_steps)
+    again = refit_from(found, found.model, search._replace(max_steps=steps, rival=None))
     return again if again.chi2 <= found.chi2 else found
 
 

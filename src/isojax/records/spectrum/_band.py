@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from typing import cast
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.signal
@@ -47,10 +46,6 @@ class Band:
 
     lowest: float
     highest: float
-
-
-_EXCITED_BANDS: WeakKeyDictionary[Record, Band] = WeakKeyDictionary()
-"""Kept, because a fit asks for each several times."""
 
 
 def power_spectrum(
@@ -127,9 +122,7 @@ def excited_band(record: Record) -> Band:
     Returns:
         The band.
     """
-    if record not in _EXCITED_BANDS:
-        _EXCITED_BANDS[record] = _find_band(record)
-    return _EXCITED_BANDS[record]
+    return record.once("excited band", lambda: _find_band(record))
 
 
 def _find_band(record: Record) -> Band:

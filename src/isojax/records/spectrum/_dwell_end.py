@@ -1,7 +1,6 @@
 """The settled end of a dwell, and its residual without the harmonics."""
 
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float
@@ -37,10 +36,6 @@ def dwell_window(record: Record, dwell: Dwell) -> int | None:
     return None if window > _LONGEST_END * (dwell.stop - dwell.start) else window
 
 
-_RESIDUALS: WeakKeyDictionary[Record, dict[tuple, Rest]] = WeakKeyDictionary()
-"""Kept, because the bases of all dwells are too large for the processor's cache to compute them twice."""
-
-
 def dwell_rest(record: Record, dwell: Dwell, window: int, lines: tuple[float, ...] = ()) -> Rest:
     """Gives the end of a dwell without its harmonics up to 0.45 of the rate, at most 120.
 
@@ -56,10 +51,11 @@ def dwell_rest(record: Record, dwell: Dwell, window: int, lines: tuple[float, ..
         The residual. Not to be written to.
     """
     orders = min(usable_orders(record.rate, dwell.frequency, MOST_HARMONICS), max(1, window // 8))
-    known = _RESIDUALS.setdefault(record, {})
-    key = dwell.start, dwell.stop, dwell.frequency, window, orders, lines
-    if key not in known:
+
+    def rest() -> Rest:
         design, inverse, taken = drifting_harmonics(window, record.rate, dwell.frequency, orders, lines)
         signal = record.output[dwell.stop - window : dwell.stop]
-        known[key] = Rest(signal - design @ (inverse @ (design.T @ signal)), taken)
-    return known[key]
+        return Rest(signal - design @ (inverse @ (design.T @ signal)), taken)
+
+    # The bases of all dwells are too large for the processor's cache to compute them twice.
+    return record.once(("dwell rest", dwell, window, orders, lines), rest)

@@ -2,8 +2,6 @@
 ends.
 """
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 import scipy.fft
 from jaxtyping import Float
@@ -12,10 +10,6 @@ from scipy.signal import windows
 from .._campaign import TIME_DERIVATIVES, OutputQuantity
 from .._record import Record
 from ._band import excited_band
-
-_State = tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"], Float[np.ndarray, " time"]]
-_MEASURED_STATES: WeakKeyDictionary[Record, dict[OutputQuantity, _State]] = WeakKeyDictionary()
-"""States in the default band, kept because a fit asks for each several times."""
 
 
 def integrate_acceleration(
@@ -72,11 +66,11 @@ def measured_state(
         ValueError: If a frequency is not between 0 and half the rate.
     """
     if lowest_frequency is None and highest_frequency is None:
-        known = _MEASURED_STATES.setdefault(record, {})
-        if output_quantity not in known:
-            band = excited_band(record)
-            known[output_quantity] = measured_state(record, output_quantity, band.lowest, band.highest)
-        return known[output_quantity]
+        band = excited_band(record)
+        return record.once(
+            ("measured state", output_quantity),
+            lambda: measured_state(record, output_quantity, band.lowest, band.highest),
+        )
     lowest = excited_band(record).lowest if lowest_frequency is None else lowest_frequency
     highest = excited_band(record).highest if highest_frequency is None else highest_frequency
     _check_lowest(record.output, record.rate, lowest)

@@ -2,7 +2,6 @@
 
 import functools
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.stats
@@ -57,10 +56,6 @@ class MainsCollision:
     mains: float
 
 
-_HUM_LINES: WeakKeyDictionary[Record, tuple[HumLine, ...]] = WeakKeyDictionary()
-"""Kept, because noise, harmonics and health all ask for them."""
-
-
 def hum_lines(record: Record) -> tuple[HumLine, ...]:
     """Gives the significant lines of the mains in a record's settled dwells, without their harmonics.
 
@@ -73,10 +68,13 @@ def hum_lines(record: Record) -> tuple[HumLine, ...]:
     Returns:
         The lines; none without dwells, and none where every dwell has a harmonic there.
     """
-    if record not in _HUM_LINES:
-        found = [_significant_line(record, line) for line in MAINS if line < USABLE_SHARE * record.rate]
-        _HUM_LINES[record] = tuple(one for one in found if one is not None)
-    return _HUM_LINES[record]
+
+    def significant() -> tuple[HumLine, ...]:
+        lines = [_significant_line(record, line) for line in MAINS if line < USABLE_SHARE * record.rate]
+        return tuple(one for one in lines if one is not None)
+
+    # Noise, harmonics and health all ask for them.
+    return record.once("hum lines", significant)
 
 
 def _significant_line(record: Record, line: float) -> HumLine | None:
