@@ -127,7 +127,7 @@ def changed(name: str, factor: float) -> Any:
     if name in FROM_ONE:
         return 1.0 + factor * (value - 1.0) if value > 1.0 else 1.0 - (1.0 - value) / factor
     if isinstance(value, tuple):
-        return tuple(max(1, int(factor * one)) for one in value)
+        return tuple(factor * one if isinstance(one, float) else max(1, int(factor * one)) for one in value)
     return max(1, int(factor * value)) if isinstance(value, int) else factor * value
 
 

@@ -108,7 +108,7 @@ class Rules:
     """The same of a fit to windows of whole records, before longer windows are taken."""
 
     second_try: float = 0.5
-    """Share of these evaluations for a refit that stalled and starts again, from the measured states."""
+    """Share of its evaluations that a stalled refit gets for a second try, from the measured states."""
 
     step_shares: tuple[float, ...] = (1.0, 0.3, 0.03)
     """Shares of the score's linear step, from the largest on, at the first of which a refit starts that
