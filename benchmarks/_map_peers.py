@@ -53,7 +53,7 @@ class Answer(NamedTuple):
 
 
 Peer = Callable[[Task, bool, int], Answer]
-"""Solves a task; told whether by the half-period map, and the steps a period."""
+"""Solves a task, given whether by the half-period map, and the steps a period."""
 
 
 def sine_table(steps: int, half: bool) -> np.ndarray:

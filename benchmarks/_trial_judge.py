@@ -61,10 +61,10 @@ def _share(
 ) -> Mark:
     """Judge a share of campaigns; those where `holds` is `failing_when` are listed."""
     rows = list(rows)
-    told = [(row, "error" not in row and holds(row)) for row in rows]
-    hits = sum(held for _, held in told)
+    judged = [(row, "error" not in row and holds(row)) for row in rows]
+    hits = sum(held for _, held in judged)
     figure = hits / len(rows) if rows else float("nan")
-    failing = tuple(line(row) for row, held in told if held == failing_when or "error" in row)
+    failing = tuple(line(row) for row, held in judged if held == failing_when or "error" in row)
     return Mark(words, figure, len(rows), wilson(hits, len(rows)), passes(figure) if rows else None, failing)
 
 

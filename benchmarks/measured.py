@@ -3,11 +3,11 @@
 Run: python benchmarks/measured.py [emps] [silverbox] [boucwen]
 
 The data are looked for in ISOJAX_DATA, else in ../shared/data beside the repository. Printed for each:
-the declared model, what the loop added, the error before and after, what could not be told apart, and
+the declared model, what the loop added, the error before and after, what could not be distinguished, and
 PASS or FAIL against the mark.
 
 EMPS is judged by its open-loop free run: the first two seconds of the record may set its initial state
-and count in no error (`settle`), since the axis already moves when the record begins. The same without
+and count in no error (`settle`), since the axis already moves when the record starts. The same without
 `settle` is printed beside it.
 """
 
@@ -135,7 +135,7 @@ def run_loop(declaration: str, **fields: object) -> Loop:
     return close_loop(campaign)
 
 
-def tell_ranking(ranking: tuple[Candidate, ...]) -> None:
+def print_ranking(ranking: tuple[Candidate, ...]) -> None:
     """Print the candidates that were refitted, best first."""
     for one in ranking:
         if np.isfinite(one.chi2_per_dof):
@@ -143,15 +143,16 @@ def tell_ranking(ranking: tuple[Candidate, ...]) -> None:
             print(f"    refitted: {one.effect:24s} chi2/dof {one.chi2_per_dof:.6g}{refused}")
 
 
-def tell(loop: Loop) -> None:
-    """Print the story of a loop, step by step."""
+def print_loop(loop: Loop) -> None:
+    """Print a loop, step by step."""
     print(f"declared: {', '.join(element.name for element in loop.before.model.elements)}")
     for step in loop.extensions:
         finding = step.verdict.finding
         others = ", ".join(name for name in finding.indistinguishable if name != finding.effect) or "nothing"
         print(
             f"  added {finding.effect}: explains {100 * finding.excess_explained:.2f} % of the excess, "
-            f"{100 * finding.transfer:.1f} % on data left out of its refit; not to be told from it: {others}"
+            f"{100 * finding.transfer:.1f} % on data left out of its refit; "
+            f"not distinguishable from it: {others}"
         )
         goodness = (fit.estimate.chi2 / fit.estimate.dof for fit in (step.before, step.after))
         print("    chi2/dof before and after: {:.6g} -> {:.6g}".format(*goodness))
@@ -159,9 +160,9 @@ def tell(loop: Loop) -> None:
             pair = [fit.errors[role] for fit in (step.before, step.after)]
             if None not in pair:
                 print(f"    free run of {words} records, RMSE: {pair[0].rmse:.4g} -> {pair[1].rmse:.4g} (SI)")
-        tell_ranking(finding.ranking)
+        print_ranking(finding.ranking)
     print(f"  verdict {loop.verdict}; {loop.last.reason}")
-    tell_ranking(loop.last.ranking)
+    print_ranking(loop.last.ranking)
     errors = loop.after.standard_errors
     for parameter in loop.after.model.parameters:
         if parameter.name in errors:
@@ -179,7 +180,7 @@ def judge(words: str, value: float, mark: float, unit: str) -> bool:
 def emps() -> bool:
     """EMPS: from mass, viscous damping and offset to dry friction."""
     loop = run_loop(EMPS, settle=2000)
-    tell(loop)
+    print_loop(loop)
     names = [finding.effect for finding in loop.findings]
     before, after = 1e3 * loop.before.errors["fit"].rmse, 1e3 * loop.after.errors["fit"].rmse
     print(f"  open-loop free-run RMSE before: {before:.3f} mm")
@@ -202,7 +203,7 @@ def emps() -> bool:
 def silverbox() -> bool:
     """Silverbox: from a linear oscillator, both offsets and a linear hold to what they lack."""
     loop = run_loop(SILVERBOX)
-    tell(loop)
+    print_loop(loop)
     names = [finding.effect for finding in loop.findings]
     print(f"  multisine test RMSE before: {1e3 * loop.before.errors['holdout'].rmse:.3f} mV")
     for number, step in enumerate(loop.extensions, 1):
@@ -220,7 +221,7 @@ def silverbox() -> bool:
 def boucwen() -> bool:
     """Bouc-Wen: from a linear and a cubic spring to hysteresis."""
     loop = run_loop(BOUC_WEN)
-    tell(loop)
+    print_loop(loop)
     names = [finding.effect for finding in loop.findings]
     print(f"  held-back period RMSE before: {loop.before.errors['holdout'].rmse:.3g} m")
     hysteresis = bool(names) and names[0] in ("bouc_wen", "dahl_friction")

@@ -188,7 +188,7 @@ def run(options: argparse.Namespace) -> None:
 
 def report(rows: list[dict]) -> None:
     """Print the table."""
-    print(f"{'rule':<24}{'half':>10}{'value':>10}{'twice':>10}{'consulted':>11}{'verdicts':>10}{'names':>8}")
+    print(f"{'rule':<24}{'half':>16}{'value':>16}{'twice':>16}{'consulted':>11}{'verdicts':>10}{'names':>8}")
     for name, value in DEFAULTS.items():
         mine = [row for row in rows if row["rule"] == name]
         consulted = [row for row in mine if "half" in row]
@@ -196,7 +196,7 @@ def report(rows: list[dict]) -> None:
             [sum(row[word][part] != row["default"][part] for row in consulted) for word in ("half", "twice")]
             for part in (0, 1)
         )
-        values = "".join(f"{_brief(one):>10}" for one in (changed(name, 0.5), value, changed(name, 2.0)))
+        values = "".join(f"{_brief(one):>16}" for one in (changed(name, 0.5), value, changed(name, 2.0)))
         counts = f"{len(consulted)} of {len(mine)}"
         if consulted and not any(verdicts + names):
             outcome = f"  no change seen on {len(consulted)} campaigns"

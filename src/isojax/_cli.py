@@ -166,7 +166,7 @@ def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Ca
 
 
 def _results() -> Console:
-    """Give what shows results; where no terminal tells its width, wide enough for every table."""
+    """Give what shows results; where no terminal reports its width, wide enough for every table."""
     return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 

@@ -23,7 +23,7 @@ class ParameterSpec(NamedTuple):
         unit: SI unit.
         lower: smallest admissible value.
         upper: largest admissible value.
-        fitted: whether a fit frees it unless told otherwise.
+        fitted: whether a fit frees it by default.
     """
 
     symbol: str

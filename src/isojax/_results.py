@@ -20,7 +20,7 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
     )
     not_identifiable = (
         "The data do not determine every free coefficient. Fix one of the coefficients that the report "
-        "names, or add records that part them."
+        "names, or add records that separate them."
     )
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 else:
     Scalar = Float[Array, ""]
 """A number on the device: zero-dimensional, floating point. Constructors also take a plain number and convert
-it, which is what the other branch tells a type checker."""
+it, which is what the other branch declares to a type checker."""
 
 Lanes: TypeAlias = Float[Array, "..."]
 """A state or signal value; any leading shape, so that one law serves one orbit or a batch of records."""

@@ -1,4 +1,4 @@
-"""The experiment that parts look-alikes: found by simulation, and held against the plant itself."""
+"""The experiment that separates look-alikes: found by simulation, and compared with the plant itself."""
 
 import dataclasses
 
@@ -190,7 +190,7 @@ def test_a_test_in_which_the_motion_runs_away_is_left_out_with_the_reason(heavie
     found = find_separating_experiment(heavier._replace(before=before))
     away = _named(found, "higher_level")
     assert away.gains == ()
-    assert "runs away" in away.reason
+    assert "diverges" in away.reason
     assert [bool(one.gains) for one in found.prospects] == sorted(
         (bool(one.gains) for one in found.prospects), reverse=True
     )

@@ -112,7 +112,7 @@ MISTAKES = {
     "a filter taken out that never was": (
         r"\[model\]",
         "[filter]\norder = 4\ncutoff_hz = 20.0\napplied = false\ncompensate = true\n[model]",
-        r"compensate = true takes out what the bench did, but applied = false",
+        r"compensate = true removes the filter of the test rig, but applied = false",
     ),
     "a filter without order": (
         r"\[model\]",

@@ -1,4 +1,10 @@
-"""What force acts: one physical effect a file. This file is the catalogue: one import line an effect."""
+"""What force acts: one physical effect a file. This file is the catalogue: one import line an effect.
+
+In: coefficients in SI units. Out: forces, rates of internal states, and changes of drive, mass or reading.
+Read `_effect.py` (what every effect declares) and the three contracts `_force.py`, `_instrument.py` and
+`_follower.py`, which `_base.py` joins in `AbstractElement`. Then read an example: `_cubic_stiffness.py` is
+the shortest, `_maxwell_branch.py` has an internal state, `_sensor_gain.py` is an instrument.
+"""
 
 from ._abs_quadratic_damping import AbsQuadraticDamping as AbsQuadraticDamping
 from ._abs_quadratic_stiffness import AbsQuadraticStiffness as AbsQuadraticStiffness

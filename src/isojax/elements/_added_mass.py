@@ -15,7 +15,8 @@ class AddedMass(AbstractElement):
     Attributes:
         mass: dm [kg].
 
-    Source: Newton's second law; not to be told from a force or accelerometer gain error in the linear range.
+    Source: Newton's second law; in the linear range it cannot be distinguished from a gain error of
+    the force or of the accelerometer.
     """
 
     name: ClassVar[str] = "added_mass"

@@ -10,7 +10,7 @@ from ._base import AbstractElement, Group, Scales
 
 
 class DahlFriction(AbstractElement):
-    """Dahl's friction: a spring at small motion that slips at large motion; memory without a time scale.
+    """Dahl's friction: a spring at small motion that slips at large motion; hysteresis without a time scale.
 
     `f = Fd w`, `w' = (v - |v| w) / xd`: Dahl's `z' = sigma (v - |v| z / Fd)`, `f = z`, with `w = z / Fd` and
     the presliding displacement `xd = Fd / sigma`, so that the law stays defined at Fd = 0.

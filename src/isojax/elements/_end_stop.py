@@ -22,7 +22,7 @@ class EndStop(AbstractElement):
 
     With a free linear spring a stop with side = 0 is exactly the class of a free gap: `K x - K clip(x, -g,
     g)` is this law, so that "K more beyond g" and "K less within g" differ by what is called the linear
-    spring. What parts them is a look at the rig, or the linear spring known beforehand.
+    spring. A look at the rig separates them, or a linear spring that is known beforehand.
 
     Attributes:
         stiffness: K, mean of the two stops [N/m].

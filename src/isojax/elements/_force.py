@@ -71,8 +71,8 @@ class AbstractForce(AbstractEffect):
     def unphysical_shape(self, displacement: float) -> str | None:
         """Say what makes the shape parameters no law of matter at an amplitude, if anything.
 
-        Energy over a loop is asked of every element with memory from outside; this is for degenerate shapes
-        that take energy and yet are none.
+        The diagnosis checks the energy over a loop of every element with internal states; this is for
+        degenerate shapes that take energy and yet describe no material.
 
         Args:
             displacement: largest displacement visited [m].

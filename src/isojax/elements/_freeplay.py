@@ -20,8 +20,8 @@ class Freeplay(AbstractElement):
     there instead.
 
     With a free linear spring it is exactly the class of the two-sided end stop, of equal K, g and w: `K x - K
-    clip(x, -g, g)` is that stop, and the two linear springs differ by K. No record parts them; a look at the
-    rig does, or the stiffness at motion smaller than the gap known beforehand.
+    clip(x, -g, g)` is that stop, and the two linear springs differ by K. No record separates them; a look at
+    the rig does, or the stiffness at motion smaller than the gap known beforehand.
 
     Attributes:
         lost_stiffness: K, missing within the gap [N/m].

@@ -44,7 +44,7 @@ class AbstractInstrument(AbstractEffect):
         return y
 
     def reading_rate(self, y: Lanes, s: Internal) -> Internal:
-        """Give what the motion at the sensor adds to the rates of the internal states (a sensor with memory).
+        """Give what the motion at the sensor adds to the rates of the internal states (a dynamic sensor).
 
         Args:
             y: motion at the sensor [its SI unit].

@@ -25,7 +25,7 @@ class PolytropicGas(AbstractElement):
         preload: P0 A, absolute pressure times area at rest [N].
         gas_length: L, gas volume over area at rest [m].
         exponent: n [1], 1 where heat flows freely, 1.4 for air where none does; fitted only on request, for
-            what tells it from L is of the fourth order in x / L.
+            it differs from a change of L only in the fourth order of x / L.
         side: +1 compressed by positive displacement, -1 by negative [1]; declared, not fitted.
 
     Source: Quaglia & Sorli 2001, Vehicle System Dynamics 35:443; Nieto et al. 2008, J. Sound Vib. 313:290.

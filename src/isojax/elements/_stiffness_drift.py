@@ -8,13 +8,13 @@ from ._base import AbstractElement, Channels, Group, Scales
 
 
 class StiffnessDrift(AbstractElement):
-    """The linear stiffness changes steadily from the beginning of the test to its end (warming, leakage).
+    """The linear stiffness changes steadily from the start of the test to its end (warming, leakage).
 
-    `f = dk tau x` with tau the time of the test, 0 at its beginning and 1 at its end; the linear stiffness of
-    the model is that of the beginning.
+    `f = dk tau x` with tau the time of the test, 0 at its start and 1 at its end; the linear stiffness of
+    the model is that at the start.
 
     Attributes:
-        change: dk, stiffness at the end less that at the beginning [N/m].
+        change: dk, stiffness at the end less that at the start [N/m].
 
     Source: frequency drift of resonance tests, Ewins 2000, sec. 3.
     """

@@ -1,4 +1,11 @@
-"""From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop."""
+"""From records to a model that explains them: guess, fit, residual, diagnosis, extension, and the loop.
+
+In: a `Campaign`. Out: a `Loop`, with the fitted models, the findings, the verdict and the next test.
+Read the rooms in the order of an analysis: `guess` (start values), `fitting` (coefficients and errors),
+`diagnosis` (which effect is missing), `experiment` (the test that separates look-alikes) and `remainder`
+(what stays unexplained). `_close_loop.py` joins them. `jacobian` lies below all of them: simulated records
+and their exact derivatives. `_rules.py` holds the numbers by which fit and diagnosis decide.
+"""
 
 from ._close_loop import Loop as Loop
 from ._close_loop import close_loop as close_loop

@@ -1,4 +1,4 @@
-"""The closed loop: fit, find what is missing, add it, and again until nothing is left."""
+"""The closed loop: fit, find what is missing, add it, and again until nothing significant is missing."""
 
 import dataclasses
 import time
@@ -110,7 +110,7 @@ def close_loop(
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
 ) -> Loop:
-    """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
+    """Fit the declared model, add the effect that it lacks, and repeat until nothing significant is missing.
 
     Held-out records are never used to fit a coefficient, to choose an effect or to stop.
 
@@ -178,7 +178,7 @@ def _without_evidence(failed: Fit) -> Verdict:
 def search_effects(
     before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...] = ()
 ) -> tuple[tuple[Extension, ...], Verdict]:
-    """Add effects until nothing is left to add; search again without one that later ones made superfluous.
+    """Add effects while they are significant; search again without one that later ones made superfluous.
 
     Args:
         before: the declared model, fitted.
@@ -212,9 +212,9 @@ def search_effects(
 def _grow(
     before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...]
 ) -> tuple[tuple[Extension, ...], Verdict]:
-    """Add effects until nothing is left to add; give the steps and the last diagnosis.
+    """Add effects until no further one is significant; give the steps and the last diagnosis.
 
-    A good fit is diagnosed like any other: a second effect may still stand out of what is left.
+    A good fit is diagnosed like any other: a second effect may still stand out of the residual.
     """
     extensions: tuple[Extension, ...] = ()
     current, significance = before, search.rules.significance

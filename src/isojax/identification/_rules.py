@@ -1,4 +1,4 @@
-"""Every number that can change a verdict, in one place."""
+"""The numbers by which a fit and a diagnosis decide, in one place."""
 
 import dataclasses
 
@@ -12,7 +12,8 @@ class Rules:
     is given. A value without a source was set by hand; `benchmarks/rules.py` shows what half and twice of it
     change.
 
-    Numbers that only guard the arithmetic, or that steer one algorithm, stand where they are used.
+    Readers, noise estimates, start values and the descent keep their own numbers, as named constants beside
+    the code that uses them.
     """
 
     # When a fit is good, and what counts as an explanation.

@@ -1,4 +1,10 @@
-"""The isolator: mass and elements, its integrator, its forced response, its file."""
+"""The isolator: mass and elements, its integrator, its forced response, its file.
+
+In: a mass, elements and a drive. Out: an `Isolator`, its simulated motion and readings, its JSON file.
+Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at one time), then `_rk4.py` and
+`_integrator.py` (the step), `_scan.py` (many records) and `_simulate.py` (one drive). `_laws.py` and
+`_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file.
+"""
 
 from ._event_step import Ringing as Ringing
 from ._event_step import Step as Step

@@ -17,7 +17,7 @@ ExcitationKind = Literal["stepped_sine", "periodic", "swept", "free_decay", "imp
 
 @dataclass(frozen=True)
 class Dwell:
-    """A stretch of a stepped sine at one frequency.
+    """A segment of a stepped sine at one frequency.
 
     Attributes:
         start: First sample, counted from the start of the record.

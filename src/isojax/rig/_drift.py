@@ -11,7 +11,7 @@ class StiffnessDrift(Law):
     """f = change tau x, with tau the share of the test that is over; the records follow without a pause.
 
     Args:
-        change: of the linear stiffness from the beginning of the test to its end, N/m.
+        change: of the linear stiffness from the start of the test to its end, N/m.
     """
 
     name: ClassVar[str] = "stiffness_drift"

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 
 class Piece(ABC):
-    """A stretch of time over which the force is smooth."""
+    """An interval of time over which the force is smooth."""
 
     start: float
     """s"""
@@ -22,7 +22,7 @@ class Piece(ABC):
     @property
     @abstractmethod
     def longest_step(self) -> float:
-        """Longest step, s, that still sees every swing of the force."""
+        """Longest step, s, that still resolves every oscillation of the force."""
 
     @no_type_check
     @abstractmethod
@@ -147,7 +147,7 @@ class Line(Piece):
 
     @property
     def longest_step(self) -> float:
-        """The length of the piece, s: a line hides no swing."""
+        """The length of the piece, s: a line hides no oscillation."""
         return self.stop - self.start
 
     @no_type_check

@@ -27,7 +27,7 @@ class AddedMass(Law):
 
 @dataclass(frozen=True)
 class SecondMode(Law):
-    """Mass on a spring and a dashpot of its own, carried by the plant; states are its stretch and its speed.
+    """Mass on a spring and a dashpot of its own, carried by the plant; states: spring extension, speed.
 
     Args:
         mass: kg.
@@ -56,5 +56,5 @@ class SecondMode(Law):
 
     @no_type_check
     def rate(self, t, x, v, z, s):
-        """Rate of the stretch, m/s, and acceleration of the mass, m/s^2."""
+        """Rate of the extension, m/s, and acceleration of the mass, m/s^2."""
         return v - z[1], self.force(t, x, v, z, s) / self.mass

@@ -61,4 +61,4 @@ EXAMPLE_SHAKER = Shaker()
 """The shaker of the project's example campaigns."""
 
 IDEAL_SHAKER = Shaker(second=0.0, third=0.0, dropout=0.0)
-"""A shaker that delivers what it is told."""
+"""A shaker that delivers the commanded force."""

@@ -160,7 +160,7 @@ def _too_little(best: Refit, gain: float, case: Case) -> str:
     gained = (
         f"takes {gain / fitted.dof:.2g} off chi2/dof"
         if case.chi2_per_dof <= case.rules.good
-        else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of what is left beyond the noise"
+        else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of the residual beyond the noise"
     )
     extra = len(best.estimate.places) - len(fitted.places)
     more = "1 more coefficient" if extra == 1 else f"{extra} more coefficients"
@@ -170,8 +170,8 @@ def _too_little(best: Refit, gain: float, case: Case) -> str:
 def _needed_share(case: Case) -> float:
     """Give the share of the remaining excess that an effect must explain to be named.
 
-    Where more than noise is left every small error of the model is significant: only what explains a good
-    part of the rest counts there.
+    Where the residual exceeds the noise every small error of the model is significant: there an effect must
+    explain a good part of the excess.
     """
     return 0.0 if case.chi2_per_dof <= case.rules.good else case.rules.smallest_share
 

@@ -1,4 +1,4 @@
-"""Whether a force with memory takes energy: its work over the loop that the motion drives it around."""
+"""Whether a force with internal states takes energy: its work over the loop of a sinusoidal motion."""
 
 import equinox as eqx
 import jax
@@ -10,7 +10,7 @@ from ...elements import AbstractElement
 from .._rules import Rules
 
 CYCLES = 6
-"""Cycles of the motion; the work is that of the last, so that a memory has forgotten its start."""
+"""Cycles of the motion; the work is that of the last, so that no internal state depends on its start."""
 
 STEPS = 1024
 """Steps a cycle."""
@@ -54,9 +54,9 @@ def work_per_cycle(
 ) -> tuple[Float[np.ndarray, " lane"], Float[np.ndarray, " lane"]]:
     """Give the energy that an element takes from a sinusoidal motion in one cycle.
 
-    `W = closed integral of f dx` over the last of several cycles, the memory driven along `x = X sin(w t)`.
-    A memory that still rings then, as a lightly damped mass does, gives and takes by turns: of it, the mean
-    over all cycles since rest, which no passive law makes negative.
+    `W = closed integral of f dx` over the last of several cycles of `x = X sin(w t)`. Where the internal
+    states still ring then, as a lightly damped mass does, W is the mean over all cycles since rest, which no
+    passive law makes negative.
 
     Args:
         element: the element, with its own force and internal states.
@@ -65,7 +65,7 @@ def work_per_cycle(
 
     Returns:
         W [J], and the elastic energy that the loop moves, the range of the force times X over two [J]. Both
-        NaN where the memory ran away.
+        NaN where an internal state diverged.
 
     Source: Erlicher & Point 2004, Comptes Rendus Mecanique 332:51, on what makes Bouc-Wen models passive.
     """
@@ -73,7 +73,7 @@ def work_per_cycle(
     before, force = forces[-2 * STEPS : -STEPS], forces[-STEPS:]
     phase = 2.0 * np.pi * np.arange(STEPS) / STEPS
     power = (forces * np.cos(np.tile(phase, CYCLES))[:, None]).reshape(CYCLES, STEPS, -1)
-    # A memory that ran away is too large to add up, and is told by that.
+    # An internal state that diverged overflows the sums, and the result is not finite.
     with np.errstate(over="ignore", invalid="ignore"):
         works = 2.0 * np.pi * amplitude * np.mean(power, axis=1)
     reach = np.ptp(force, axis=0)
@@ -82,7 +82,7 @@ def work_per_cycle(
 
 
 def find_activity(element: AbstractElement, largest_x: float, largest_v: float, rules: Rules) -> str | None:
-    """Find how an element with memory feeds energy into the visited motion, if it does.
+    """Find how an element with internal states feeds energy into the visited motion, if it does.
 
     Args:
         element: the element.
@@ -103,7 +103,7 @@ def find_activity(element: AbstractElement, largest_x: float, largest_v: float, 
     amplitude = largest_x * shares
     work, elastic = work_per_cycle(element, amplitude, np.full(2, largest_v / largest_x))
     if not np.all(np.isfinite(work)):
-        return f"its {element.words} runs away over the visited loop"
+        return f"its {element.words} diverges over the visited loop"
     if not element.active and np.any(work < -rules.energy_tolerance * elastic):
         where = 1e3 * float(amplitude[int(np.argmin(work / np.maximum(elastic, 1e-300)))])
         return f"its {element.words} feeds energy into a loop of {where:.3g} mm, within the visited motion"

@@ -69,11 +69,11 @@ def project(
     directions = one_hot(model, places, [*own, *units])
     point = fitted.simulator.evaluate(model, directions, fitted.point.nuisances, carried)
     by_record = point.reduced.by_record
-    # An internal state that ran away along the motion leaves no trace: its effect is as good as hidden.
+    # An internal state that diverged along the motion leaves no trace: its effect counts as hidden.
     lost = np.flatnonzero(~np.isfinite(np.diagonal(by_record, axis1=1, axis2=2).sum(axis=0)))
     residual = by_record.shape[-1] - 1
     if np.any(lost < count) or residual in lost:
-        # What ran away has spoilt the residual or the fitted columns as well: no trace says anything then.
+        # The residual or the fitted columns diverged as well: no trace means anything then.
         lost = np.arange(residual + 1)
     point = point._replace(reduced=point.reduced.without(lost))
     matrix = point.reduced.matrix

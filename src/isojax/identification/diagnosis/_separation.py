@@ -21,7 +21,7 @@ class Experiment(NamedTuple):
         drive: recorded drive of each record, one period of what may be repeated [N, or m/s^2 of the base].
         rate: samples a second [Hz].
         quantity: what the sensor measures.
-        stepped: whether each stretch of a record is a sine.
+        stepped: whether each segment of a record is a sine.
         extra_mass: known mass that is bolted on [kg].
         load: known static force on the mass [N].
         lacking: why the campaign's test rig cannot make it; empty if it can.

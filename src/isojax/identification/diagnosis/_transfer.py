@@ -75,7 +75,7 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
 
     Returns:
         1 - (excess with the effect)/(excess without it) on the unseen part; not positive where it does not
-        carry over or a refit runs away on the part that it sees, 1 where only the motion without it runs away
+        carry over or a refit diverges on the part that it sees, 1 where only the motion without it diverges
         on the unseen part.
     """
     seen, unseen = _split(fitted, extended, search.rules)
@@ -91,6 +91,6 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
     without, with_effect = excess
     if not np.isfinite(with_effect):
         return 0.0
-    # without the effect its coefficients, bent to make up for it, may let the motion run away elsewhere
+    # without the effect its coefficients, bent to make up for it, may let the motion diverge elsewhere
     without = without if np.isfinite(without) else np.inf
     return float(1.0 - with_effect / max(without, 1.0)) if with_effect < without else 0.0

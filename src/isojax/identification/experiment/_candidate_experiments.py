@@ -13,18 +13,18 @@ from ...records import Campaign, Record, power_spectrum
 from ..diagnosis import AGAIN, Experiment
 
 DWELLS = 6
-"""Stretches of a record, each simulated from a state of its own."""
+"""Segments of a record, each simulated from a state of its own."""
 
 LEVELS = 3
 
 MIDDLE_CYCLES = 10.0
-"""Cycles of the middle frequency in a stretch."""
+"""Cycles of the middle frequency in a segment."""
 
 SLOW_CYCLES = 4.0
-"""Cycles of the lowest frequency in a stretch."""
+"""Cycles of the lowest frequency in a segment."""
 
 MOST_STEPS = 8000
-"""Integration steps of a stretch at most, unless that leaves fewer than `FEWEST_CYCLES`."""
+"""Integration steps of a segment at most, unless that leaves fewer than `FEWEST_CYCLES`."""
 
 FEWEST_CYCLES = 3.0
 
@@ -47,7 +47,7 @@ class TestOutline(NamedTuple):
         highest: highest frequency driven [Hz].
         stepped: whether it was driven with sines.
         rate: samples a second of a simulation [Hz].
-        samples: samples a stretch.
+        samples: samples per segment.
     """
 
     levels: tuple[float, ...]
@@ -106,15 +106,15 @@ def _driven_band(record: Record) -> tuple[float, float]:
 def drive_of(
     outline: TestOutline, levels: tuple[float, ...], lowest: float, highest: float, stepped: bool
 ) -> Float[np.ndarray, "record time"]:
-    """Give the drive of a test: one record a level, of `DWELLS` stretches.
+    """Give the drive of a test: one record a level, of `DWELLS` segments.
 
     Args:
-        outline: sampling rate and length of a stretch.
+        outline: sampling rate and length of a segment.
         levels: rms of each record [SI unit of the drive].
         lowest: lowest frequency [Hz].
         highest: highest frequency [Hz].
-        stepped: sines of whole cycles a stretch, up in one record and down in the next; else random-phase
-            multisines whose period is the record.
+        stepped: sines, a whole number of cycles in each segment, up in one record and down in the next; else
+            random-phase multisines whose period is the record.
 
     Returns:
         The drive; its end meets its start.

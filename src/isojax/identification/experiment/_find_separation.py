@@ -20,7 +20,7 @@ from ._known_load import KnownLoad
 from ._simulated_records import TrialRun, blank_records, missing_channels, trial_run
 
 LOOSE = 100.0
-"""Factor on the spread of the initial states of the stretches of a planned test."""
+"""Factor on the spread of the initial states of the segments of a planned test."""
 
 
 class _Question(NamedTuple):
@@ -119,7 +119,7 @@ def find_separating_experiment(
         prospects.append(
             Prospect(experiment, _gains(question, total, inflation))
             if np.all(np.isfinite(new))
-            else Prospect(experiment, (), "the motion runs away")
+            else Prospect(experiment, (), "the motion diverges")
         )
     return nothing._replace(prospects=rank_prospects(tuple(prospects), needed))
 
@@ -216,7 +216,7 @@ def _made(model: Isolator, experiment: Experiment, question: _Question, rest: fl
     if lost:
         return f"its records would have no {' or '.join(lost)} to follow"
     made = trial_run(model, experiment, blank, problem, rest if experiment.load else 0.0)
-    return made if made.is_finite else "the motion runs away"
+    return made if made.is_finite else "the motion diverges"
 
 
 def _as_tested(model: Isolator, experiment: Experiment) -> Isolator:
@@ -260,9 +260,9 @@ def _of_trial(
         return np.full((len(question.names),) * 2, np.nan)
     length = experiment.drive.shape[1] // DWELLS
     segments = tuple(
-        Segment(row, stretch * length, (stretch + 1) * length, stretch * length)
+        Segment(row, piece * length, (piece + 1) * length, piece * length)
         for row in range(len(made.records))
-        for stretch in range(DWELLS)
+        for piece in range(DWELLS)
     )
     integrator = Integrator(old.integrator.solver, old.integrator.substeps)
     simulator = Simulator(

@@ -23,12 +23,12 @@ class TrialRun(NamedTuple):
 
     Attributes:
         records: what the test rig would record, free of noise.
-        starts: initial state of each stretch, records in turn.
+        starts: initial state of each segment, records in turn.
         displacement: of each record [m].
     """
 
     records: tuple[Record, ...]
-    starts: Float[np.ndarray, "state stretch"]
+    starts: Float[np.ndarray, "state segment"]
     displacement: Float[np.ndarray, "record time"]
 
     @property
@@ -116,8 +116,8 @@ def trial_run(
 ) -> TrialRun:
     """Carry out an experiment on a model.
 
-    Each stretch sets out from rest a stretch earlier, so that it starts as the one before it ends; the
-    first of a record follows its last.
+    The simulation of each segment starts from rest one segment earlier, so that it starts as the one before
+    it ends; the first of a record follows its last.
 
     Args:
         model: the isolator, as the experiment has it.
@@ -128,7 +128,7 @@ def trial_run(
         rest: rest position [m].
 
     Returns:
-        The records; not finite where the motion runs away.
+        The records; not finite where the motion diverges.
     """
     rows, total = experiment.drive.shape
     length, shift, hold = total // DWELLS, float(model.shift()), problem.hold

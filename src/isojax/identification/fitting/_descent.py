@@ -31,13 +31,13 @@ IDLE = 3
 
 
 SHRINKS = 3
-"""Refusals that a trial which ran away counts for: it lies far outside, not just a little too far."""
+"""Refusals that a trial which diverged counts for: it lies far outside, not just a little too far."""
 
 STALLED = 1e-2
 """Predicted share of chi2 still to gain below which a search that gains no more counts as converged."""
 
 RUNAWAY = 1e75
-"""Residual that stands for a simulation that ran away: finite, so that the solver steps back and not out."""
+"""Residual that stands for a simulation that diverged: finite, so that the solver steps back and not out."""
 
 
 class Descent(NamedTuple):
@@ -70,10 +70,10 @@ def _residual(free: Float[Array, " column"], local: _Local) -> tuple[Float[Array
 def _compress(matrix: Float[np.ndarray, "column column"]) -> tuple[np.ndarray, np.ndarray]:
     """Give the residual and Jacobian of least size with the same normal equations (Cholesky factor)."""
     count = matrix.shape[0] - 1
-    # A negative sum of squares is what is left of huge numbers that cancel, see `Point.is_finite`.
+    # A negative sum of squares is the rounding of huge numbers that cancel, see `Point.is_finite`.
     if not np.all(np.isfinite(matrix)) or matrix[-1, -1] < 0.0:
         return np.full(count + 1, RUNAWAY), np.zeros((count + 1, count))
-    # Beside a simulation that almost ran away a column may cancel to nothing: its scale must stay a number.
+    # Beside a simulation that almost diverged a column may cancel to nothing: its scale must stay a number.
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300 + 1e-60 * np.max(np.diag(matrix))))
     scaled = matrix / size[:, None] / size[None, :]
     ridge = 1e-14

@@ -1,6 +1,6 @@
 """Nuisances taken out of the normal equations, segment by segment and record by record.
 
-Every coefficient of interest sees only what is left of the data once the initial states of the segments and
+Every coefficient of interest sees only the residual of the data once the initial states of the segments and
 the stiffness scales of the records have explained what they can: variable projection, done on the small
 matrices of `information`.
 """
@@ -182,7 +182,7 @@ def _without_states(
     shared: int,
     offset: Float[np.ndarray, "segment state"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Give what is left without the initial states, the map of their steps, and the freedom they took."""
+    """Give the matrices without the initial states, the map of their steps, and the freedom they took."""
     segments, states = offset.shape
     keep = np.r_[0:shared, shared + states]
     drop = np.arange(shared, shared + states)
@@ -195,7 +195,7 @@ def _without_states(
         states_map = np.linalg.solve(inner, cross)
         taken = states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
     except np.linalg.LinAlgError:
-        # Only a simulation that ran away makes a state's column as large as to drown its own prior.
+        # Only a simulation that diverged makes a state's column as large as to drown its own prior.
         states_map, taken = np.full_like(cross, np.nan), np.full(segments, np.nan)
     left = matrices[:, keep[:, None], keep].copy()
     if heads is None:
@@ -214,7 +214,7 @@ def _without_scale(
     deviation: Float[np.ndarray, " lane"],
     spread: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Give what is left without a stiffness scale, its step, its variance, and the freedom it took."""
+    """Give the matrices without a stiffness scale, its step, its variance, and the freedom it took."""
     spread = spread / STIFFNESS_SCALE_UNIT
     pivot = matrices[:, column, column] + 1.0 / spread**2
     row = matrices[:, column, :].copy()
@@ -222,7 +222,7 @@ def _without_scale(
     step = row / pivot[:, None]
     left = matrices.copy()
     left[:, -1, -1] += (deviation / spread) ** 2
-    # Of a simulation that ran away, finite or not, nothing is asked but that it did.
+    # Where a simulation diverged the values do not matter, only that they are detected.
     with np.errstate(over="ignore", invalid="ignore"):
         left -= step[:, :, None] * row[:, None, :]
     return left, step, STIFFNESS_SCALE_UNIT**2 / pivot, 1.0 - 1.0 / (pivot * spread**2)

@@ -83,7 +83,7 @@ def fit(
 
     found = fit_from(model)
     if found.result == RESULTS.not_finite:
-        progress("the start runs away: again from its linear part")
+        progress("the simulation from the start values diverges: again from their linear part")
         again = fit_from(_linear_part(model, places))
         found = found if again.result == RESULTS.not_finite else again
     return complete(found, model, campaign, noise)

@@ -19,7 +19,7 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
         substeps: integration steps a sample before halving.
 
     Returns:
-        Error over noise; infinite where a simulation ran away.
+        Error over noise; infinite where a simulation diverged.
     """
     loudest = max(range(len(problem.records)), key=lambda place: float(np.std(problem.records[place].output)))
     own = [segment for segment in problem.segments if segment.record == loudest]

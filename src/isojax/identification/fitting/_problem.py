@@ -71,7 +71,7 @@ class Point(NamedTuple):
     def is_finite(self) -> bool:
         """Whether every segment's simulation stayed finite.
 
-        A sum of squares below zero is what is left of huge numbers that cancel: a simulation that ran away.
+        A sum of squares below zero is the rounding of huge numbers that cancel: a simulation that diverged.
         """
         return bool(np.all(np.isfinite(self.reduced.matrix)) and self.chi2 >= 0.0)
 

@@ -1,4 +1,4 @@
-"""What is left: the residual, its floor, and whether it is white."""
+"""The residual of a fit, its floor, and whether it is white."""
 
 from typing import NamedTuple
 

@@ -17,7 +17,7 @@ from ._elimination import Nuisances, Spread, eliminate
 from ._problem import Point, Problem
 
 HUGE = 1e150
-"""A product of residuals or derivatives above this comes of a simulation that ran away, finite or not."""
+"""A product of residuals or derivatives above this comes of a simulation that diverged, finite or not."""
 
 
 class Simulator:

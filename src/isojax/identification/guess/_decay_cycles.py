@@ -1,4 +1,4 @@
-"""Start from motions that ring down: the harmonic balance of every swing, as if it were a dwell."""
+"""Start from motions that ring down: the harmonic balance of every half cycle, as if it were a dwell."""
 
 import numpy as np
 
@@ -12,16 +12,16 @@ from ._measured_receptance import MeasuredResponse
 from ._physical_fit import fit_physically
 
 _SMOOTH = np.array([0.25, 0.5, 0.25])
-"""Weights of a half swing and its neighbours: what differs between the two sides of rest drops out."""
+"""Weights of a half cycle and its neighbours: what differs between the two sides of rest drops out."""
 
 _HALF_CYCLES_A_COEFFICIENT = 1
-"""Swings a coefficient that the balance needs at least; each gives a spring and a damper equation."""
+"""Half cycles per coefficient that the balance needs at least; each gives a spring and a damper equation."""
 
 
 def decaying_response(campaign: Campaign, record: Record) -> MeasuredResponse:
-    """Give the swings of a free decay as the dwells of a drive that makes up for the decay.
+    """Give the half cycles of a free decay as the dwells of a drive that makes up for the decay.
 
-    `x = X exp(-alpha t) sin(omega t)` obeys the balance of a steady swing under the force
+    `x = X exp(-alpha t) sin(omega t)` obeys the balance of a steady motion under the force
     `m X (alpha^2 + 2 i alpha omega)`, in phase and ahead by a quarter.
 
     Args:
@@ -29,20 +29,20 @@ def decaying_response(campaign: Campaign, record: Record) -> MeasuredResponse:
         record: a free decay, or a blow and what follows it.
 
     Returns:
-        A line a half swing, the first and the last left out; none where the decay has fewer than three.
+        A line per half cycle, the first and the last left out; none where the decay has fewer than three.
     """
     order = {"displacement": 0, "velocity": 1, "acceleration": 2}[campaign.output.quantity]
     driven = np.flatnonzero(driven_samples(record.input))
     begin = int(driven[-1]) + 1 if driven.size else 0
-    swings = logarithmic_decrement(about_rest(record.output)[begin:], record.rate)
+    cycles = logarithmic_decrement(about_rest(record.output)[begin:], record.rate)
     nothing = np.zeros(0)
-    if swings.amplitude.size < 3:
+    if cycles.amplitude.size < 3:
         empty = np.zeros((0, 1), complex)
         return MeasuredResponse(record.name, record.level, record.direction, nothing, empty, empty, nothing)
-    half = np.convolve(0.5 / swings.frequency, _SMOOTH, mode="valid")
-    size = np.convolve(np.log(swings.amplitude), _SMOOTH, mode="valid")
+    half = np.convolve(0.5 / cycles.frequency, _SMOOTH, mode="valid")
+    size = np.convolve(np.log(cycles.amplitude), _SMOOTH, mode="valid")
     omega = np.pi / half
-    alpha = 0.5 * np.log(swings.amplitude[:-2] / swings.amplitude[2:]) / half
+    alpha = 0.5 * np.log(cycles.amplitude[:-2] / cycles.amplitude[2:]) / half
     displacement = np.exp(size) / np.hypot(omega, alpha) ** order
     force = campaign.mass * displacement * (alpha**2 + 2j * alpha * omega)
     return MeasuredResponse(
@@ -59,9 +59,9 @@ def decaying_response(campaign: Campaign, record: Record) -> MeasuredResponse:
 def start_from_decays(
     campaign: Campaign, base: Isolator, names: tuple[str, ...], records: tuple[Record, ...]
 ) -> tuple[BalanceFit, tuple[str, ...]] | None:
-    """Start from the swings of motions that ring down; the mass stays as declared.
+    """Start from the half cycles of motions that ring down; the mass stays as declared.
 
-    The force balance in time would need the displacement at the beginning of the record, where the motion is
+    The force balance in time would need the displacement at the start of the record, where the motion is
     largest and its integral least known.
 
     Args:
@@ -71,18 +71,18 @@ def start_from_decays(
         records: free decays and blows.
 
     Returns:
-        The fit and its notes, of the linear coefficients alone where the decays are too short to tell them
-        all; None where they are too short for those too.
+        The fit and its notes, of the linear coefficients alone where the decays are too short to
+        determine all of them; None where they are too short for those too.
     """
     responses = tuple(decaying_response(campaign, record) for record in records)
-    swings, few = sum(one.frequency.size for one in responses), ()
-    if swings < _HALF_CYCLES_A_COEFFICIENT * len(names):
+    half_cycles, few = sum(one.frequency.size for one in responses), ()
+    if half_cycles < _HALF_CYCLES_A_COEFFICIENT * len(names):
         linear = tuple(name for name in names if CATALOGUE[name].proportional_to)
-        if not linear or swings < _HALF_CYCLES_A_COEFFICIENT * len(linear):
+        if not linear or half_cycles < _HALF_CYCLES_A_COEFFICIENT * len(linear):
             return None
         few = (
-            f"The decays have {swings} swings, too few for {len(names)} coefficients: all but the linear "
-            "ones start at zero.",
+            f"The decays have {half_cycles} half cycles, too few for {len(names)} coefficients: all but "
+            "the linear ones start at zero.",
         )
         names = linear
     motion = dwell_motion(base, responses)

@@ -24,11 +24,10 @@ def output_mean(campaign: Campaign) -> float:
 def with_sensor_zero(campaign: Campaign, model: Isolator) -> Isolator:
     """Give the model with a start for the sensor's offset, where that is declared free.
 
-    An acceleration or a velocity has no mean of its own, so that of the reading is the offset. A displacement
-    may have
-    one: what the mean force does to the spring is taken off, unless the offset of the force is free as well
-        and has
-    taken it up. Without a spring any place is as good as another and the offset starts at zero.
+    An acceleration or a velocity has zero mean, so that the mean reading is the offset. A displacement may
+    have a mean: the static deflection under the mean force is subtracted, unless the offset of the force is
+    free as well and accounts for it. Without a spring the rest position is arbitrary, and the offset starts
+    at zero.
 
     Args:
         campaign: the campaign.

@@ -166,7 +166,7 @@ def prepare(
         owner[lane] = segment.record
         for state in range(2):
             starts[state, lane] = motion[state][segment.start]
-            # A motion that rings down is largest at its beginning, far above the rms of its record.
+            # A motion that rings down is largest at its start, far above the rms of its record.
             size = np.ptp(motion[state][window]) if record.rings_down else np.std(motion[state][window])
             spread[state, lane] = max(size, 1e-300)
     share = lanes // threads

@@ -53,7 +53,7 @@ def channel_table(
     """Give a signal of a record at the stages of the integration steps.
 
     Args:
-        name: "clock": time of the test, 0 at its beginning and 1 at its end. "hold_zero_order",
+        name: "clock": time of the test, 0 at its start and 1 at its end. "hold_zero_order",
             "hold_linear", "hold_band_limited": the drive as another hold would give it, less the declared
             one's.
             "drive_cosine_2", "drive_sine_2" and so on: the drive's amplitude times the cosine and sine of so

@@ -1,4 +1,4 @@
-"""Where an absent effect acts on a motion that is known: its memory follows, and six ports say what it adds.
+"""Where an absent effect acts on a known motion: its internal states follow, and six inputs say what it adds.
 
 Nothing here knows the model that made the motion. A kind of effect is therefore compiled once, whatever it
 rides along with.
@@ -26,7 +26,7 @@ _HOOKS: dict[str, tuple[str, ...]] = {
     "base": ("channel_base",),
     "read": ("reading", "channel_reading"),
 }
-"""The methods by which an element may act at each port."""
+"""The methods by which an element may act at each input."""
 
 EFFECT_INPUTS = tuple(_HOOKS)
 """Drive before the model's own instruments change it, and after; restoring force; moving mass; acceleration
@@ -90,7 +90,7 @@ class PathMotion(NamedTuple):
         acted_rate: its rate.
         sensed: reading after the sensor chain, before what signals of the record add to it.
         stages: displacement, velocity, reading and, where it moves, acceleration of the base at start, middle
-            and end of each step, which memories follow.
+            and end of each step, which internal states follow.
         channels: signals of the record.
     """
 
@@ -105,13 +105,13 @@ class PathMotion(NamedTuple):
 
 
 def inputs_of(kind: type[AbstractElement]) -> tuple[str, ...]:
-    """Name the ports at which a kind of effect acts.
+    """Name the effect inputs at which a kind of effect acts.
 
     Args:
         kind: the class of the element.
 
     Returns:
-        Some of `PORTS`.
+        Some of `EFFECT_INPUTS`.
     """
     return tuple(
         inlet
@@ -123,7 +123,7 @@ def inputs_of(kind: type[AbstractElement]) -> tuple[str, ...]:
 def input_columns(
     family: ElementFamily, motion: PathMotion, start: State, step: float
 ) -> dict[str, Float[Array, "member node lanes"]]:
-    """Give what a unit of strength adds at each port, along a motion.
+    """Give what a unit of strength adds at each effect input, along a motion.
 
     Args:
         family: the effects, of one kind and at zero strength.
@@ -132,7 +132,7 @@ def input_columns(
         step: duration of a step [s].
 
     Returns:
-        The changes, by port.
+        The changes, by effect input.
     """
     internal = follow(family.elements, motion.stages, start, step)[1] if start else ()
     return _input_columns(family.elements, motion._replace(stages=()), internal)
@@ -183,7 +183,7 @@ def _or_nothing(value: Lanes | None) -> Lanes | float:
 def _input_columns(
     members: AbstractElement, motion: PathMotion, internal: State
 ) -> dict[str, Float[Array, "member node lanes"]]:
-    """Differentiate what each member does at each port with respect to its strength."""
+    """Differentiate what each member does at each effect input with respect to its strength."""
     strengths = getattr(members, members.strength)
     still = jnp.zeros_like(motion.x)
 

@@ -1,4 +1,4 @@
-"""Elements of one kind side by side: their memories and their forces are traced once a kind."""
+"""Elements of one kind side by side: their internal states and their forces are traced once a kind."""
 
 from typing import Any, NamedTuple
 
@@ -44,7 +44,7 @@ def find_families(probes: tuple[AbstractElement, ...]) -> tuple[ElementFamily, .
 
 
 def in_turn(families: tuple[ElementFamily, ...], part: int) -> tuple[ElementFamily, ...]:
-    """Give families in the order in which a worker takes them: two workers begin at either end.
+    """Give families in the order in which a worker takes them: two workers start at either end.
 
     Each kind is compiled by itself; workers that took them in one order would wait for each other.
 

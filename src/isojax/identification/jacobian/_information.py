@@ -189,7 +189,7 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
         prepared: the segments.
 
     Returns:
-        A^T A of each lane, lanes first; not finite where a simulation ran away.
+        A^T A of each lane, lanes first; not finite where a simulation diverged.
     """
     parts = len(prepared.batches)
     model = unknowns.model

@@ -1,4 +1,4 @@
-"""Internal states along measured motions: what a memory holds where a segment begins."""
+"""Internal states along measured motions: their values at the start of each segment."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -25,11 +25,11 @@ def internal_starts(
 ) -> tuple[Float[np.ndarray, "internal lanes"], Float[np.ndarray, "internal lanes"]]:
     """Run the internal states of a model along the measured motion.
 
-    Each lane sets out from rest, as long before its segment as the longest segment lasts, or at the start of
-    its record; memories of sensors follow the measured output. Between samples the motion is straight.
+    Each lane starts from rest, as long before its segment as the longest segment lasts, or at the start of
+    its record; internal states of sensors follow the measured output. Between samples the motion is straight.
 
     Args:
-        model: the isolator; its memories are taken along, its force balance is not.
+        model: the isolator; its internal states are integrated, its force balance is not.
         records: the records of the segments.
         prepared: the segments.
         carried: count of elements that move the state, whose sizes are wanted; all if omitted.
@@ -40,8 +40,8 @@ def internal_starts(
     lanes = prepared.record.size
     starts = np.zeros((model.internal_states, lanes))
     spread = np.ones((model.internal_states, lanes))
-    with_memory = tuple(element for element in model.elements if element.internal_states)
-    if not with_memory:
+    dynamic = tuple(element for element in model.elements if element.internal_states)
+    if not dynamic:
         return starts, spread
     acting = sum(bool(element.internal_states) for element in model.elements[:carried])
     based = model.excitation == "base_acceleration"
@@ -54,7 +54,7 @@ def internal_starts(
         )
         for place in {segment.record for segment in prepared.segments}
     }
-    # Before its record begins a lane is at rest, where memories stay as they are.
+    # Before its record starts a lane is at rest, where internal states stay as they are.
     before, over = np.zeros((4, length + 1, lanes)), np.zeros((4, length + 1, lanes))
     for lane, segment in enumerate(prepared.segments):
         lead = min(length, segment.start)
@@ -67,8 +67,8 @@ def internal_starts(
     inside = np.ones((length, lanes), dtype=bool)
     for lane, segment in enumerate(prepared.segments):
         inside[segment.stop - segment.start :, lane] = False
-    families = find_families(with_memory)
-    ends = np.cumsum([0, *(element.internal_states for element in with_memory)])
+    families = find_families(dynamic)
+    ends = np.cumsum([0, *(element.internal_states for element in dynamic)])
 
     def along(task: tuple[ElementFamily, int]) -> None:
         family, part = task
@@ -85,12 +85,12 @@ def internal_starts(
             return
         _, path = follow(family.elements, next(tables), first, step)
         for state, values in zip(places, path, strict=True):
-            # Not the square: a memory that ran away may be too large for it.
+            # Not the square: an internal state that diverged may be too large for it.
             size = np.where(inside[:, None, own], np.abs(np.asarray(values)[::steps]), 0.0)
             mean = size.sum(axis=0) / inside[:, own].sum(axis=0)
             spread[state, own] = np.maximum(mean, 1e-300)
 
-    # Each kind is compiled by itself, once whatever it rides along with: every core begins with another.
+    # Each kind is compiled by itself, once whatever it rides along with: every core starts with another.
     orders = [in_turn(families, part) for part in range(parts)]
     tasks = [(order[turn], part) for turn in range(len(families)) for part, order in enumerate(orders)]
     with ThreadPoolExecutor(workers()) as pool:

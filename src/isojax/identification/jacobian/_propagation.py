@@ -19,12 +19,12 @@ class Propagation(NamedTuple):
 
     Attributes:
         forward: F.
-        by_start: G0, what the rates b at its beginning add; its first column, of the velocity, is unused.
+        by_start: G0, what the rates b at its start add; its first column, of the velocity, is unused.
         by_middle: Gm, of those in the middle.
         by_end: G1, of those at the end.
 
-    Of a model whose laws jump each has two rows more: what d and b do to the readings at the beginning and
-    the end of the sample.
+    Of a model whose laws jump each has two rows more: what d and b do to the readings at the start and the
+    end of the sample.
     """
 
     forward: Matrix

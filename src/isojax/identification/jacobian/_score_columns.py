@@ -79,8 +79,8 @@ def score_information(
     """Give the information matrix of each segment, absent effects among the columns.
 
     The columns are those of `information`; each direction must move one parameter alone. Elements beyond the
-    carried ones are at zero strength: their memories follow the motion and do not act back, so that only
-    their strengths have columns and only the carried states have initial values to eliminate.
+    carried ones are at zero strength: their internal states follow the motion and do not act back, so that
+    only their strengths have columns and only the carried states have initial values to eliminate.
 
     Args:
         unknowns: where the simulation stands and its directions.
@@ -152,7 +152,7 @@ def _block(
         if group.is_full:
             group.solve(table)
     group.solve(table)
-    # A probe whose memory ran away is told by its infinite products.
+    # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
         return table @ np.swapaxes(table, 1, 2)
 
@@ -163,7 +163,7 @@ def _sources(
     batch: Batch,
     slopes: Slopes,
     exact: Transitions | None,
-    memories: State,
+    internal: State,
     columns: int,
     part: int,
 ) -> Iterator[tuple[int, np.ndarray | float, np.ndarray, np.ndarray | float]]:
@@ -194,7 +194,7 @@ def _sources(
         unit = 0.0 if slopes.scale is None else STIFFNESS_SCALE_UNIT
         yield scaled - 1, *own(unit, change, -1)
     step = prepared.sample_time
-    starts = stack_states(layout.families, layout.probes, memories)
+    starts = stack_states(layout.families, layout.probes, internal)
     inputs = {name: ready(1.0, change) for name, change in slopes.inputs.items()}
     ends = np.cumsum([0, *(family.elements.internal_states for family in layout.families)])
     shares = dict(zip((family.places for family in layout.families), itertools.pairwise(ends), strict=True))
@@ -205,7 +205,7 @@ def _sources(
         added = input_columns(family, slopes.motion._replace(channels=pushing), starts[begin:end], step)
         read = added
         if own_channels:
-            # A reading is that of the sample itself, at whose beginning every hold agrees with the record.
+            # A reading is that of the sample itself, at whose start every hold agrees with the record.
             reading = {name: values[:, 0] for name, values in own_channels.items()}
             seen = slopes.motion._replace(channels=reading)
             read = input_columns(family, seen, starts[begin:end], step)
@@ -214,7 +214,7 @@ def _sources(
             column = layout.places[1][probe]
             if column >= 0:
                 unit = layout.units[column]
-                # A memory that ran away is told by its products, which are not finite.
+                # Where an internal state diverged its products are not finite.
                 with np.errstate(over="ignore", invalid="ignore"):
                     forcing = sum(unit * values[member] * rates for values, _, (rates, _) in does)
                     direct = sum(unit * values[member] * reading for _, values, (_, reading) in does)

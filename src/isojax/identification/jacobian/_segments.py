@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from ...models import Instant, Isolator
 from ...records import Record
 
-MEMORIES_A_WINDOW = 25.0
+DECAY_TIMES_A_WINDOW = 25.0
 """A window of so many decay times loses less than a tenth of its information to its free start."""
 
 
@@ -58,14 +58,14 @@ def _rates_about_rest(model: Isolator) -> Float[Array, "state state"]:
 
 
 def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment, ...]:
-    """Cut records into segments: dwells of a stepped sine, else windows much longer than the system's memory.
+    """Cut records into segments: dwells of a stepped sine, else windows of many decay times.
 
     A record is left whole where the model's motion does not decay, or where fewer than four windows would
     fit: a free initial state would then cost more than it gives.
 
     Args:
         records: the records.
-        model: the isolator, for its memory.
+        model: the isolator, for its slowest decay.
 
     Returns:
         Segments, in the order of the records.
@@ -77,7 +77,7 @@ def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment,
         if record.dwells:
             bounds = [(dwell.start, dwell.stop) for dwell in record.dwells]
         else:
-            window = count if decay == 0.0 else max(400, int(MEMORIES_A_WINDOW / decay * record.rate))
+            window = count if decay == 0.0 else max(400, int(DECAY_TIMES_A_WINDOW / decay * record.rate))
             pieces = max(1, count // window)
             bounds = cut_evenly(count, pieces if pieces >= 4 else 1)
         segments += segments_between(place, record, bounds)

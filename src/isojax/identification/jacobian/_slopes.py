@@ -132,7 +132,7 @@ class Slopes(NamedTuple):
     Attributes:
         reading: the reading itself.
         parameters: with each parameter that moves.
-        ports: with a unit at each port, by name.
+        inputs: with a unit at each effect input, by name.
         scale: with the stiffness scale, or None without one.
         states: with each state.
         motion: what absent effects see of the path.
@@ -158,8 +158,8 @@ def slopes_along(
 ) -> Slopes:
     """Differentiate rates and reading along the path.
 
-    A law that jumps has no slope: its rates are those of the rounded law, of use to ports alone; what it does
-    to changes of states and parameters is in `transitions_along`.
+    A law that jumps has no slope: its rates are those of the rounded law, used by effect inputs alone; what
+    it does to changes of states and parameters is in `transitions_along`.
     """
     values = tuple(entry.value for entry in list_parameters(model))
     at = jax.tree_util.tree_map(steps_of, batch.acting).pick(np.s_[:, 0])

@@ -20,10 +20,10 @@ from ._slopes import steps_of
 
 
 class Transitions(NamedTuple):
-    """What each sample adds to the state at its end, then to the readings at its beginning and its end.
+    """What each sample adds to the state at its end, then to the readings at its start and its end.
 
     Attributes:
-        propagation: for a unit of each state at its beginning, and for rates that push.
+        propagation: for a unit of each state at its start, and for rates that push.
         parameters: for a unit of each parameter that moves.
         scale: for a unit of the stiffness scale.
     """
@@ -107,7 +107,7 @@ def transitions_along(
 
 
 def _over_samples(each: list[Array], size: int) -> Transitions:
-    """Join the steps of a sample; what pushes follows a parabola through its beginning, middle and end.
+    """Join the steps of a sample; what pushes follows a parabola through its start, middle and end.
 
     Rows of states go on from step to step, those of readings add up.
     """

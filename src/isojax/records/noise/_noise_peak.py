@@ -24,7 +24,7 @@ _QUIET = 0.35
 _OBSERVABLE = 0.3
 """Share of a line's power that the harmonics of the drive must leave, else the dwell does not count."""
 
-_FEWEST_STRETCHES = 4
+_FEWEST_WINDOWS = 4
 """Dwells or periods without which no median is taken."""
 
 _FEWEST_SHARE = 0.25
@@ -46,8 +46,8 @@ _MEDIAN = float(np.log(2.0))
 """Median of a periodogram's line over its mean."""
 
 _Lines = Float[np.ndarray, " line"]
-_Stretch = tuple[Float[np.ndarray, " _"], float]
-"""What was measured in a stretch, and the frequency whose harmonics do not count in it, or 0 [Hz]."""
+_Window = tuple[Float[np.ndarray, " _"], float]
+"""What was measured in a window, and the frequency whose harmonics do not count in it, or 0 [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def noise_peak(campaign: Campaign) -> NoisePeak | None:
         periodograms, Percival & Walden 1993, sec. 6.
     """
     band = NoiseBand(campaign.rate, campaign.filter)
-    late, early = ([*_stretches(campaign, last)] for last in (True, False))
-    if len(late) < _FEWEST_STRETCHES:
+    late, early = ([*_windows(campaign, last)] for last in (True, False))
+    if len(late) < _FEWEST_WINDOWS:
         return None
     longest = max(signal.size for signal, _ in late)
     lines = np.geomspace(campaign.rate / longest, _HIGHEST * band.highest, _LINE_COUNT)
@@ -93,7 +93,7 @@ def noise_peak(campaign: Campaign) -> NoisePeak | None:
     if not np.any(np.isfinite(density[quiet])):
         return None
     level = float(np.nanmedian(density[quiet]))
-    known = np.where(quiet | (count < max(_FEWEST_STRETCHES, _FEWEST_SHARE * len(late))), np.nan, density)
+    known = np.where(quiet | (count < max(_FEWEST_WINDOWS, _FEWEST_SHARE * len(late))), np.nan, density)
     if level <= 0.0 or not np.any(np.isfinite(known)):
         return None
     top = int(np.nanargmax(known))
@@ -113,7 +113,7 @@ def noise_peak(campaign: Campaign) -> NoisePeak | None:
     return NoisePeak(frequency, height, float(np.sqrt(power)))
 
 
-def _stretches(campaign: Campaign, last: bool) -> Iterator[_Stretch]:
+def _windows(campaign: Campaign, last: bool) -> Iterator[_Window]:
     """Gives the last or third quarter of each dwell with its frequency, and how each period differs."""
     for record in campaign.records:
         for dwell in record.dwells:
@@ -135,12 +135,12 @@ def _between_periods(record: Record, last: bool) -> list[Float[np.ndarray, " _"]
     return list(rest[half:] if last else rest[:half])
 
 
-def _spectrum(stretches: list[_Stretch], lines: _Lines, band: NoiseBand) -> tuple[_Lines, _Lines]:
+def _spectrum(windows: list[_Window], lines: _Lines, band: NoiseBand) -> tuple[_Lines, _Lines]:
     """Gives the median power density at each line, as the mean square of equally strong white noise, and the
-    number of stretches that it comes from.
+    number of windows that it comes from.
     """
-    powers = np.full((len(stretches), lines.size), np.nan)
-    for row, (signal, frequency) in zip(powers, stretches, strict=True):
+    powers = np.full((len(windows), lines.size), np.nan)
+    for row, (signal, frequency) in zip(powers, windows, strict=True):
         bases = _line_bases(signal.size, band.rate, frequency, band.highest, tuple(lines.tolist()))
         projected = np.einsum("lts,t->ls", bases, signal)
         row[:] = 0.5 * np.sum(projected**2, axis=1)

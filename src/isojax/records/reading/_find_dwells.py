@@ -14,7 +14,7 @@ from .._record import Dwell
 from ..spectrum import harmonic_basis
 
 _FEWEST_CYCLES = 4
-"""Cycles of one frequency without which a stretch is no dwell."""
+"""Cycles of one frequency without which a segment is no dwell."""
 
 _MOST_CROSSINGS = 6000
 """Crossings, since the search grows with their square, beyond which a signal counts as no stepped sine."""
@@ -38,7 +38,7 @@ _NEAR_END = 1.5
 """Periods within which a dwell reaches to the start or the end of the signal."""
 
 _RESOLUTION = 0.5
-"""Cycles over the window by which a refined frequency may move: beyond, the stretch is no single sine."""
+"""Cycles over the window by which a refined frequency may move: beyond, the segment is no single sine."""
 
 _EXPLAINED = 0.5
 """Share of the input that the sines of its own schedule explain in most dwells."""
@@ -113,7 +113,7 @@ def segment_dwells(signal: Float[np.ndarray, " time"], rate: float) -> tuple[Dwe
         rate: Samples per second [Hz].
 
     Returns:
-        Dwells in order of time; empty where the signal is no stepped sine (no stretch of four equal cycles).
+        Dwells in order of time; empty where the signal is no stepped sine (no segment of four equal cycles).
     """
     crossings = rising_crossings(signal, rate)
     if not _FEWEST_CYCLES <= crossings.size <= _MOST_CROSSINGS:

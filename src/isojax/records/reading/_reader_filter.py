@@ -42,8 +42,8 @@ def filter_channels(
         )
     if declared.compensate and not declared.applied:
         raise ValueError(
-            f"{file}: [filter] compensate = true takes out what the bench did, but applied = false says that "
-            "it did nothing"
+            f"{file}: [filter] compensate = true removes the filter of the test rig, but applied = false "
+            "says that there was none"
         )
     if declared.applied and not declared.compensate:
         return channels

@@ -1,4 +1,4 @@
-"""Signals over time: the stretch that is shown, and curves that stay readable where they are long."""
+"""Signals over time: the interval that is shown, and curves that stay readable where they are long."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -14,7 +14,7 @@ _DENSE = 4000
 def shown_samples(
     record: Record, window: tuple[float, float] | None
 ) -> tuple[float, float, Bool[np.ndarray, " time"]]:
-    """Give the stretch of a record that is drawn.
+    """Give the interval of a record that is drawn.
 
     Args:
         record: the record.

@@ -99,7 +99,7 @@ def draw_curve(
 
     Args:
         ax: the axes.
-        x: along the curve; NaN parts it.
+        x: along the curve; NaN interrupts it.
         y: along the curve.
         stable: whether each orbit is stable.
         colour: of the line.

@@ -186,7 +186,7 @@ def finding_words(finding: Finding) -> tuple[str, ...]:
         f"noise (family-wise p {chance})."
     ]
     if math.isfinite(finding.transfer):
-        # Above one chi2 is below its degrees of freedom there; of next to no excess no share tells.
+        # Above one chi2 is below its degrees of freedom there; next to no excess, a share means nothing.
         removed = (
             "leaves no excess"
             if finding.transfer > 1.0

@@ -15,7 +15,7 @@ from ..orbit import recorded_sine
 from ._stroboscope import Watch, any_disturbance, bounded_or_not, check_counts, start_states, watch_settled
 
 _BLOCKS = 20
-"""Stretches of the motion whose scatter gives the standard error."""
+"""Segments of the motion whose scatter gives the standard error."""
 
 
 class LyapunovExponent(eqx.Module):
@@ -23,7 +23,7 @@ class LyapunovExponent(eqx.Module):
 
     Attributes:
         value: [1/s]; positive where the motion is chaotic. NaN where it left every bound.
-        standard_error: from the scatter between stretches of the motion [1/s].
+        standard_error: from the scatter between segments of the motion [1/s].
         growth: logarithm by which a small disturbance grew over each drive period.
         state: displacement, velocity, internal states at the end.
         result: whether the motion stayed bounded.

@@ -39,7 +39,7 @@ class Polished(NamedTuple):
         scale: size of each state.
         bend: quadratic coefficient of the motion in the critical direction, `w D^2 P [W, W]` with `w W = 1`,
             on a curve of folds; zero at a cusp, NaN where it was not asked for.
-        mismatch: what is left of the equations.
+        mismatch: residual of the equations.
         found: whether the search converged.
         complete: whether every kink was split at.
     """

@@ -61,7 +61,7 @@ def critical_values(
 def _slopes(
     family: ParameterFamily, method: ShootingMethod, scale: Array, here: Array
 ) -> tuple[Array, Array]:
-    """Give what is left open at a point and its derivative by state and share."""
+    """Give the residual at a point and its derivative by state and share."""
 
     def open_end(u: Array) -> Array:
         return family.open_end(method, scale, u)

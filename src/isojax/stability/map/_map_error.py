@@ -47,7 +47,7 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
     picked = good[np.unique(np.linspace(0, good.size - 1, SAMPLED).astype(int))]
     lanes = lanes_of(found, candidates, window, picked)
     lanes = jax.tree_util.tree_map(lambda values: jnp.asarray(padded(np.asarray(values), SAMPLED)), lanes)
-    # So far that what is left is the error of the integration alone.
+    # So far that only the error of the integration remains.
     finer = solver.improve(solver.method.finer(_FINER_STEPS), lanes, picked.size, limit=FULLY_CLOSED)
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)

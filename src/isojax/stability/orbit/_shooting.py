@@ -33,7 +33,7 @@ class ShootingSolution(NamedTuple):
         state: at t = 0, SI units.
         matrix: derivative of the state after the turns (of minus it after half a turn) by the one before.
         error: largest change of `matrix`, in scaled units, where the steps are halved.
-        mismatch: what is left open, over the size of the motion.
+        mismatch: residual of the closure condition, over the size of the motion.
         found: whether the search converged.
         split: whether every kink was split at.
     """
@@ -58,7 +58,7 @@ class _Equations(NamedTuple):
     split: Split
 
     def gap(self, unknown: Array, args: tuple[Isolator, Sine, Int[Array, ""]]) -> Array:
-        """Give what is left open by a scaled state and the phases of its crossings."""
+        """Give the residual of the closure condition for a scaled state and the phases of its crossings."""
         model, drive, steps = args
         split = self.split._replace(steps=steps)
         moved, missed = split_image(model, self.method, drive, split, unknown)
@@ -73,7 +73,7 @@ class _Equations(NamedTuple):
         polish: Bool[Array, " trial"],
     ) -> tuple[Array, tuple[Float[Array, "trial state state"], Float[Array, " trial"]]]:
         """Give the unknown, polished by a step of Newton where wanted, and before it the map's derivative
-        and what is left open, for one count of steps after the other.
+        and the residual, for one count of steps after the other.
         """
         states = self.split.scale.size
 

@@ -1,4 +1,4 @@
-"""Response over frequency at one drive amplitude, past its folds, with its unstable stretches."""
+"""Response over frequency at one drive amplitude, past its folds, with its unstable segments."""
 
 from typing import Any
 
