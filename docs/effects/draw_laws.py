@@ -1,4 +1,4 @@
-"""Draw the signatures of the effects without memory beside their pages in this folder.
+"""Draw the signatures of the effects without internal states beside their pages in this folder.
 
 python docs/effects/draw_laws.py
 """

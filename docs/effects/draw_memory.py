@@ -1,4 +1,4 @@
-"""Draw the signatures of the effects with memory and of the instruments beside the pages of this folder.
+"""Draw the signatures of effects with internal states and of instruments beside the pages of this folder.
 
 python docs/effects/draw_memory.py
 """
