@@ -16,7 +16,7 @@ ROUNDS = 3
 RELEASED_ROUNDS = 12
 """The same where a record starts with a release: its first states are poorly known, its motion is large."""
 
-WORSE = 1.1
+MOST_WORSENING = 1.1
 """Factor on the error of a record up to which a step stands: chi2 is that at the end of the next one."""
 
 HALVINGS = 5
@@ -124,7 +124,7 @@ def _shortened(
     known, share = before.reduced.by_record[:, -1, -1], np.ones(before.samples.size)
     old, new, found = before.nuisances, after.nuisances, after
     for halving in range(HALVINGS + 1):
-        worse = ~(found.reduced.by_record[:, -1, -1] <= WORSE * known + 1.0)
+        worse = ~(found.reduced.by_record[:, -1, -1] <= MOST_WORSENING * known + 1.0)
         if not np.any(worse):
             break
         share = np.where(worse, 0.5 * share if halving < HALVINGS else 0.0, share)

@@ -63,11 +63,11 @@ def _fit(fit: Fit) -> dict[str, Any]:
     }
 
 
-_ERRORS = ("rmse", "nrmse", "nrmse_segments", "chi2_per_dof")
+_ERROR_FIELDS = ("rmse", "nrmse", "nrmse_segments", "chi2_per_dof")
 
 
 def _errors(errors: Errors | None) -> dict[str, float | None] | None:
-    return None if errors is None else {name: _number(getattr(errors, name)) for name in _ERRORS}
+    return None if errors is None else {name: _number(getattr(errors, name)) for name in _ERROR_FIELDS}
 
 
 def _finding(finding: Finding) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from ._style import AFTER, BEFORE, LEVELS
 
 MILLIMETRES = 1e3
 
-_UNSTABLE = (0, (4, 2))
+_DASHES = (0, (4, 2))
 
 
 class Mark(NamedTuple):
@@ -112,7 +112,7 @@ def draw_curve(
     touched[:-1] |= unstable[1:]
     ax.plot(x, np.where(stable, y, np.nan), color=colour, linewidth=1.6, label=label or None)
     if unstable.any():
-        ax.plot(x, np.where(touched, y, np.nan), color=colour, linewidth=1.3, linestyle=_UNSTABLE)
+        ax.plot(x, np.where(touched, y, np.nan), color=colour, linewidth=1.3, linestyle=_DASHES)
 
 
 def draw_special_points(
@@ -178,7 +178,7 @@ def stability_legend(
     grey = "#555555"
     handles.append(Line2D([], [], color=grey, linewidth=1.6, label="stable"))
     if unstable:
-        handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_UNSTABLE, label="unstable"))
+        handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_DASHES, label="unstable"))
     handles += [mark_handle(kind) for kind in MARKS if kind in set(kinds)]
     handles += list(extra)
     ax.legend(handles=handles, fontsize=7.5, frameon=False)

@@ -8,7 +8,7 @@ from ...identification import Loop, Pursuit, Remainder
 from ._quantities import typeset_goodness, typeset_number, typeset_share, typeset_unit
 from ._quantities import typeset_with_error as with_error
 
-_RAISED = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
+_RAISED_FACTORS = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
 
 
 def remainder_summary(loop: Loop) -> tuple[str, ...]:
@@ -52,7 +52,7 @@ def pursuit_words(pursuit: Pursuit) -> str:
 
 def _typeset_formula(formula: str) -> str:
     """Give a force law with raised exponents: "|x|¹·⁵ v" for "|x|^1.5 v"."""
-    return re.sub(r"\^([0-9.]+)", lambda match: match[1].translate(_RAISED), formula)
+    return re.sub(r"\^([0-9.]+)", lambda match: match[1].translate(_RAISED_FACTORS), formula)
 
 
 def law_rows(pursuit: Pursuit) -> list[dict[str, str]]:

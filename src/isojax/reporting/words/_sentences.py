@@ -81,7 +81,7 @@ def error_words(before: Fit, after: Fit) -> str:
     return f"{place} {typeset_goodness(first.chi2_per_dof, 2)} → {typeset_goodness(last.chi2_per_dof, 2)}"
 
 
-WORSE = 0.01
+LEAST_RISE = 0.01
 """Rise of the held-out chi2/dof that matters, where chance does not explain it."""
 
 _CHANCE = 0.01
@@ -120,7 +120,7 @@ def doubt_words(loop: Loop) -> str:
     if last <= loop.rules.good or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
         return ""
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
-    if rise > WORSE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
+    if rise > LEAST_RISE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
         return "The held-out records contradict it: they are predicted worse than without it."
     if loop.verdict == "found":
         return (
