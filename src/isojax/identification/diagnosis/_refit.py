@@ -168,7 +168,7 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
     return replace_parameters(model, numbers)
 
 
-def polish(found: Estimate, search: Search) -> Estimate:
+def refit_to_convergence(found: Estimate, search: Search) -> Estimate:
     """Take a rough refit to the end of its search, with the scatter that repeats show beside its law.
 
     Args:

@@ -126,7 +126,7 @@ def fit_report(fit: Fit) -> str:
     sections = [
         ("Model", _model(fit)),
         ("Fit statistics", _statistics(fit)),
-        ("Errors", _errors(fit)),
+        ("Errors", _error_table(fit)),
         ("Coefficients", _coefficients(fit)),
         (f"Correlations of {_STRONG:g} and more", _correlations(fit)),
         ("Warnings", warnings_of(fit)),
@@ -179,7 +179,7 @@ def _statistics(fit: Fit) -> list[str]:
     return [f"{label:<20} = {value}" for label, value in rows]
 
 
-def _errors(fit: Fit) -> list[str]:
+def _error_table(fit: Fit) -> list[str]:
     unit = OUTPUT_UNITS[fit.campaign.output.quantity]
     lines = [f"{'records':<10}{'free run RMSE':>20}{'NRMSE':>10}{'restarted NRMSE':>18}{'chi2/dof':>11}"]
     return lines + [

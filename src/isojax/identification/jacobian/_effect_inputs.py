@@ -134,12 +134,12 @@ def input_columns(
     Returns:
         The changes, by port.
     """
-    internal = follow(family.elements, motion.stages, start, step)[1] if start else ()
+    internal = internal_state_path(family.elements, motion.stages, start, step)[1] if start else ()
     return _input_columns(family.elements, motion._replace(stages=()), internal)
 
 
 @eqx.filter_jit
-def follow(
+def internal_state_path(
     members: AbstractElement,
     stages: tuple[Float[Array, "time 3 lanes"], ...],
     start: State,

@@ -68,7 +68,7 @@ def drive_unit(excitation: str) -> str:
     return "N" if excitation == "force" else typeset_unit("m/s^2")
 
 
-def parameter_words(model: Isolator, parameter: str) -> str:
+def parameter_label(model: Isolator, parameter: str) -> str:
     """Give what an axis of a branch's parameter is called.
 
     Args:

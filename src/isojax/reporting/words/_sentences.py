@@ -132,7 +132,7 @@ def doubt_words(loop: Loop) -> str:
 def _verdict_words(loop: Loop) -> str:
     if not is_successful(loop.after.result):
         return f"The fit failed, so there is no statement about the model. {RESULTS[loop.after.result]}"
-    found = [_found(loop.after, one) for one in loop.findings]
+    found = [_finding_sentence(loop.after, one) for one in loop.findings]
     effects, error = " and ".join(found), error_words(loop.before, loop.after)
     verb = "were" if len(found) > 1 else "was"
     if loop.verdict == "none":
@@ -156,7 +156,7 @@ def _verdict_words(loop: Loop) -> str:
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
 
 
-def _found(fit: Fit, finding: Finding) -> str:
+def _finding_sentence(fit: Fit, finding: Finding) -> str:
     others = [effect_words(name) for name in finding.indistinguishable if name != finding.effect]
     words = f"{effect_words(finding.effect)}, {strength_words(fit, finding.effect)}"
     return (
