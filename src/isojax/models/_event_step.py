@@ -79,8 +79,7 @@ def find_ringing(jump: Jump, step: Int[Array, "..."] | int, steps: int) -> Ringi
     """
     place = (step + jump.share) / steps
     return Ringing(
-        (1.0 - place) * (0.5 - 0.8 * place) * jump.size,
-        -place * (0.5 - 0.8 * (1.0 - place)) * jump.size,
+        (1.0 - place) * (0.5 - 0.8 * place) * jump.size, -place * (0.5 - 0.8 * (1.0 - place)) * jump.size
     )
 
 

@@ -242,10 +242,7 @@ def follows_freely(fitted: Estimate, found: Estimate) -> bool:
 
 
 def rivals(
-    scores: tuple[Score, ...],
-    refits: list[Refit],
-    twins: tuple[AbstractElement, ...],
-    names: tuple[str, ...],
+    scores: tuple[Score, ...], refits: list[Refit], twins: tuple[AbstractElement, ...], names: tuple[str, ...]
 ) -> tuple[AbstractElement, ...]:
     """Give effects as they imitate another: refitted where they were, else with the shape of their score.
 

@@ -39,11 +39,7 @@ class TrialRun(NamedTuple):
 
 @eqx.filter_jit
 def _run(
-    model: Isolator,
-    record: Instant,
-    start: State,
-    quantity: Quantity,
-    sample_time: float,
+    model: Isolator, record: Instant, start: State, quantity: Quantity, sample_time: float
 ) -> tuple[State, Array]:
     """Give states and readings at the samples; the record is over time, stage and lanes."""
     _, path, ringing = scan_records(
@@ -108,11 +104,7 @@ def missing_channels(model: Isolator, records: tuple[Record, ...]) -> tuple[str,
 
 
 def trial_run(
-    model: Isolator,
-    experiment: Experiment,
-    blank: tuple[Record, ...],
-    problem: Problem,
-    rest: float,
+    model: Isolator, experiment: Experiment, blank: tuple[Record, ...], problem: Problem, rest: float
 ) -> TrialRun:
     """Carry out an experiment on a model.
 

@@ -168,10 +168,7 @@ def _statistics(fit: Fit) -> list[str]:
         ("BIC", f"{stats.bic:.8g}"),
         ("noise", f"{fit.noise.sigma:.4g} {unit} rms, from {fit.noise.method.replace('_', ' ')}"),
         ("stiffness scatter", scatter),
-        (
-            "integration",
-            f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample",
-        ),
+        ("integration", f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample"),
     ]
     if math.isfinite(stats.integration_error):
         rows.append(("integration error", f"{stats.integration_error:.2g} of the noise when halved"))

@@ -140,10 +140,7 @@ def input_columns(
 
 @eqx.filter_jit
 def internal_state_path(
-    members: AbstractElement,
-    stages: tuple[Float[Array, "time 3 lanes"], ...],
-    start: State,
-    step: float,
+    members: AbstractElement, stages: tuple[Float[Array, "time 3 lanes"], ...], start: State, step: float
 ) -> tuple[State, State]:
     """Integrate the internal states of effects of one kind along a motion.
 

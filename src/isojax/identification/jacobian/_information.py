@@ -82,10 +82,7 @@ def _sampler(
     solver = RK4()
 
     def sample(
-        values: tuple[Array, ...],
-        scale: Array,
-        state: State,
-        stages: tuple[Instant, ...],
+        values: tuple[Array, ...], scale: Array, state: State, stages: tuple[Instant, ...]
     ) -> tuple[Array, State, Array | None]:
         current = scaled_model(model, values, scale)
         # The table already holds the delayed drive; only the derivative with respect to the delay is still to

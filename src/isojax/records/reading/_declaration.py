@@ -123,11 +123,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "applied": _flag(default=True),
         "compensate": _flag(),
     },
-    "model": {
-        "stiffness": _names(("linear",)),
-        "damping": _names(("linear",)),
-        "elements": _names(()),
-    },
+    "model": {"stiffness": _names(("linear",)), "damping": _names(("linear",)), "elements": _names(())},
 }
 RECORD: Mapping[str, Field] = {
     "file": _file(required=True),

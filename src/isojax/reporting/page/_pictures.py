@@ -99,12 +99,7 @@ def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture
 
 
 def _draw(
-    name: str,
-    caption: str,
-    plot: Callable[..., Figure],
-    *args: Any,
-    wide: bool = False,
-    **options: Any,
+    name: str, caption: str, plot: Callable[..., Figure], *args: Any, wide: bool = False, **options: Any
 ) -> tuple[Picture, ...]:
     """Draw one picture, as a row of its own to join to others."""
     size = (_WHOLE if wide else _HALF, _HEIGHT)

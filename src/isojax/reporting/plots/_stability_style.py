@@ -160,11 +160,7 @@ def mark_handle(kind: str) -> Line2D:
 
 
 def stability_legend(
-    ax: Axes,
-    kinds: Iterable[str] = (),
-    *,
-    unstable: bool = True,
-    extra: Iterable[Any] = (),
+    ax: Axes, kinds: Iterable[str] = (), *, unstable: bool = True, extra: Iterable[Any] = ()
 ) -> None:
     """Write what solid, dashed and the markers mean, below what is labelled already.
 

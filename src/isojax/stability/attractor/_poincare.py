@@ -88,11 +88,7 @@ def poincare_section(
 
 @eqx.filter_jit
 def _section(
-    model: Isolator,
-    excitation: Harmonic,
-    phases: Float[Array, " phase"],
-    state: State,
-    how: Watch,
+    model: Isolator, excitation: Harmonic, phases: Float[Array, " phase"], state: State, how: Watch
 ) -> PoincareSection:
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
     integrator, steps = how.integrator, how.integrator.steps_a_period(model)

@@ -140,12 +140,7 @@ def _pair_equations(motion: _Motion, shares: Array) -> tuple[Equations, Array]:
         a, b = one[:states], other[:states]
         norm = jnp.stack([functional @ a - 1.0, functional @ b])
         closed = [moved - place[:states], missed]
-        pair = [
-            first - cosine * a + sine * b,
-            first_missed,
-            second - sine * a - cosine * b,
-            second_missed,
-        ]
+        pair = [first - cosine * a + sine * b, first_missed, second - sine * a - cosine * b, second_missed]
         return jnp.concatenate([*closed, *pair, norm])
 
     parts = [motion.unknown, motion.lift(real), motion.lift(imaginary), angle[None], shares]

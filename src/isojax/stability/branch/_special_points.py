@@ -260,11 +260,7 @@ def _kind_of_sign_change(
 
 
 def special_point(
-    family: ParameterFamily,
-    method: ShootingMethod,
-    kind: BifurcationKind,
-    branch: int,
-    guess: PointGuess,
+    family: ParameterFamily, method: ShootingMethod, kind: BifurcationKind, branch: int, guess: PointGuess
 ) -> SpecialPoint:
     """Give a bifurcation found from a start, the motion split at its kinks.
 
