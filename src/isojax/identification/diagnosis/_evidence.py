@@ -14,13 +14,6 @@ def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
 
     Of those that these data do not distinguish the simplest goes first: fewest coefficients, then internal
     states.
-
-    Args:
-        refits: all of them.
-        rules: the evidence that distinguishes two effects.
-
-    Returns:
-        Those without a violation.
     """
     usable = [refit for refit in refits if refit.violation is None]
     if not usable:

@@ -38,16 +38,7 @@ class Refit(NamedTuple):
 
 
 def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
-    """Fit the model with one absent effect, everything free, from the linear step that the score gives.
-
-    Args:
-        test: the score test.
-        index: the candidate.
-        search: how to search.
-
-    Returns:
-        The refit.
-    """
+    """Fit the model with one absent effect, everything free, from the linear step that the score gives."""
     fitted, score = test.fitted, test.scores[index]
     best: tuple[float, Isolator, Nuisances] | None = None
     places = _free_places(fitted, fitted.model.with_elements(score.element))
@@ -205,15 +196,7 @@ def is_determined(found: Estimate, score: Score, errors: float) -> bool:
 
 
 def strength_place(found: Estimate, score: Score) -> int:
-    """Give the place of a candidate's strength among the free coefficients of its refit.
-
-    Args:
-        found: the refit.
-        score: the score of its effect.
-
-    Returns:
-        Its column.
-    """
+    """Give the place of a candidate's strength among the free coefficients of its refit."""
     listed = [entry.name for entry in list_parameters(found.model)]
     fields = [name for name, _ in own_parameters(score.element)]
     return found.places.index(len(listed) - len(fields) + fields.index(score.element.strength))

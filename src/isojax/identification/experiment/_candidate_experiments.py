@@ -143,15 +143,7 @@ def drive_of(
 
 
 def repeated_campaign(campaign: Campaign, outline: TestOutline) -> Experiment:
-    """Give the test that the campaign was.
-
-    Args:
-        campaign: the measurements.
-        outline: what it did.
-
-    Returns:
-        The experiment.
-    """
+    """Give the test that the campaign was."""
     drive = drive_of(outline, outline.levels, outline.lowest, outline.highest, outline.stepped)
     return Experiment(
         AGAIN, "repeat the same test", drive, outline.rate, campaign.output.quantity, outline.stepped

@@ -50,14 +50,7 @@ def _run(
 
 
 def blank_records(experiment: Experiment) -> tuple[Record, ...]:
-    """Give the records of an experiment before it was made: no output yet.
-
-    Args:
-        experiment: the test.
-
-    Returns:
-        One record a row of its drive.
-    """
+    """Give the records of an experiment before it was made: no output yet."""
     rows, total = experiment.drive.shape
     length = total // DWELLS
     records = []
@@ -91,15 +84,7 @@ def blank_records(experiment: Experiment) -> tuple[Record, ...]:
 
 
 def missing_channels(model: Isolator, records: tuple[Record, ...]) -> tuple[str, ...]:
-    """Name the signals that a model follows and that a planned record does not have.
-
-    Args:
-        model: the isolator.
-        records: the records.
-
-    Returns:
-        Their names.
-    """
+    """Name the signals that a model follows and that a planned record does not have."""
     return tuple(name for name in model.channels if not all(carries(record, name) for record in records))
 
 

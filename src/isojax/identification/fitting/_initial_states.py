@@ -144,14 +144,7 @@ def _between(old: np.ndarray, new: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
-    """Give the first samples of each record: those that the campaign gives for it, else the first second.
-
-    Args:
-        records: the records.
-
-    Returns:
-        One segment a record.
-    """
+    """Give the first samples of each record: those that the campaign gives for it, else the first second."""
 
     def head(place: int, record: Record) -> Segment:
         length = record.settle if record.settle >= 8 else round(record.rate)

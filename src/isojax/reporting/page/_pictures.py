@@ -59,14 +59,7 @@ class Picture(NamedTuple):
 
 
 def encode(figure: Figure) -> str:
-    """Give a figure as PNG in base64.
-
-    Args:
-        figure: the figure.
-
-    Returns:
-        The text.
-    """
+    """Give a figure as PNG in base64."""
     page = BytesIO()
     figure.savefig(page, format="png", dpi=_DPI)
     return base64.b64encode(page.getvalue()).decode("ascii")

@@ -118,15 +118,7 @@ def draw_curve(
 def draw_special_points(
     ax: Axes, points: Iterable[tuple[SpecialPoint | Any, float, float]]
 ) -> tuple[str, ...]:
-    """Mark bifurcations.
-
-    Args:
-        ax: the axes.
-        points: each with its place.
-
-    Returns:
-        The kinds that were drawn.
-    """
+    """Mark bifurcations."""
     found: dict[str, list[tuple[float, float]]] = {}
     for point, x, y in points:
         if np.isfinite(x) and np.isfinite(y):
@@ -148,14 +140,7 @@ def _form(mark: Mark) -> dict[str, Any]:
 
 
 def mark_handle(kind: str) -> Line2D:
-    """Give the entry of a bifurcation in a legend.
-
-    Args:
-        kind: of the bifurcation.
-
-    Returns:
-        The handle.
-    """
+    """Give the entry of a bifurcation in a legend."""
     return Line2D([], [], label=MARKS[kind].words, **_form(MARKS[kind]))
 
 
@@ -181,14 +166,7 @@ def stability_legend(
 
 
 def level_colours(count: int) -> tuple[str, ...]:
-    """Give a colour for each of some curves, lowest level first.
-
-    Args:
-        count: of the curves.
-
-    Returns:
-        The colours.
-    """
+    """Give a colour for each of some curves, lowest level first."""
     return (AFTER,) if count == 1 else tuple(LEVELS[place % len(LEVELS)] for place in range(count))
 
 

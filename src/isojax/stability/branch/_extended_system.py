@@ -280,14 +280,5 @@ polish_jitted = eqx.filter_jit(polish)
 
 
 def first_places(family: ParameterFamily, states: int, turns: float) -> int:
-    """Give how many crossings of kinks to make room for first.
-
-    Args:
-        family: isolators and drives.
-        states: count of states.
-        turns: drive periods.
-
-    Returns:
-        Four a kink and period.
-    """
+    """Give how many crossings of kinks to make room for first."""
     return math.ceil(4 * len(family.model.kinks((jnp.zeros(()),) * states)) * turns)

@@ -88,17 +88,7 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
 
 
 def lanes_of(found: Found, candidates: Candidates, window: MapWindow, picked: np.ndarray) -> Lane:
-    """Give orbits that were found as starts.
-
-    Args:
-        found: the orbits.
-        candidates: what they were found from.
-        window: of the map.
-        picked: which of them.
-
-    Returns:
-        Lanes.
-    """
+    """Give orbits that were found as starts."""
     push = window.amplitudes[candidates.force[picked]]
     sine, cosine = (jnp.asarray(push * part) for part in found.direction[picked].T)
     drive = Sine(sine, cosine, jnp.asarray(window.frequencies[candidates.frequency[picked]]))
