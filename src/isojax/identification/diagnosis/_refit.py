@@ -160,15 +160,7 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
 
 
 def refit_to_convergence(found: Estimate, search: Search) -> Estimate:
-    """Take a rough refit to the end of its search, with the scatter that repeats show beside its law.
-
-    Args:
-        found: the refit.
-        search: how to search.
-
-    Returns:
-        The estimate, no worse than the refit.
-    """
+    """Take a rough refit to the end of its search, with the scatter that repeats show beside its law."""
     search.progress("the finding, fitted to the end")
     search = search._replace(max_steps=search.rules.final_evaluations)
     again = estimate(found.simulator, found.model, found.places, search, found.point.nuisances, anew=True)
@@ -227,17 +219,7 @@ def follows_freely(fitted: Estimate, found: Estimate) -> bool:
 def rivals(
     scores: tuple[Score, ...], refits: list[Refit], twins: tuple[AbstractElement, ...], names: tuple[str, ...]
 ) -> tuple[AbstractElement, ...]:
-    """Give effects as they imitate another: refitted where they were, else with the shape of their score.
-
-    Args:
-        scores: the scores of all absent effects.
-        refits: those that were refitted.
-        twins: effects that are the other by another name.
-        names: catalogue names of the effects.
-
-    Returns:
-        One element a name.
-    """
+    """Give effects as they imitate another: refitted where they were, else with the shape of their score."""
     shapes = {score.element.name: score.element for score in scores}
     for refit in refits:
         element = refit.estimate.model.element(refit.score.element.name)

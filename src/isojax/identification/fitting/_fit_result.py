@@ -116,12 +116,6 @@ def fit_report(fit: Fit) -> str:
     Coefficients with standard error, relative error and start value; those at a bound, never moved, or not
     determined by the data by name; strong correlations; errors in physical units and over the noise. Of a
     search that failed there are no numbers but NaN, and why it failed.
-
-    Args:
-        fit: the fit.
-
-    Returns:
-        Lines of plain text, SI units.
     """
     sections = [
         ("Model", _model(fit)),

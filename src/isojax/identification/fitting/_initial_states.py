@@ -157,13 +157,6 @@ def find_initial_states(problem: Problem, model: Isolator) -> Float[np.ndarray, 
     """Find the initial state of each record: the one from which the model follows its first samples best.
 
     Internal states start at rest.
-
-    Args:
-        problem: the records.
-        model: the isolator.
-
-    Returns:
-        States, one column a record.
     """
     simulator = Simulator(problem._replace(segments=head_segments(problem.records), heads=()), at_rest=True)
     point = best_nuisances(simulator, model, HELD)

@@ -50,14 +50,7 @@ def weighted_sum(*terms: tuple[float, Matrix]) -> Matrix:
 
 
 def around(values: Array) -> tuple[Array, Array, Array, Array]:
-    """Give the values at the samples before and at the start of each step, at its end and after that.
-
-    Args:
-        values: a series, time first.
-
-    Returns:
-        Four series.
-    """
+    """Give the values at the samples before and at the start of each step, at its end and after that."""
     time = values.shape[0]
     padded = jnp.concatenate([values[:1], values, values[-1:], values[-1:]])
     before, now, ahead, after = (padded[first : first + time] for first in range(4))

@@ -104,12 +104,6 @@ def doubt_words(loop: Loop) -> str:
     """Give what held-out records say against the finding.
 
     They never change a verdict, or they would not be held out; but the reader must know.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        A sentence, or nothing where they agree.
     """
     before, after = loop.before.errors["holdout"], loop.after.errors["holdout"]
     if before is None or after is None or not loop.findings or not is_successful(loop.after.result):

@@ -60,14 +60,6 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
     """Give the steps a period at which the multipliers of a map are as good as its integrator promises.
 
     From a sample of orbits and the order of the integrator: the error falls with the fourth power.
-
-    Args:
-        solver: with the steps that are tried.
-        candidates: of the map.
-        window: of the map.
-
-    Returns:
-        Steps a period, even.
     """
     integrator = solver.method.integrator
     picked = np.unique(np.linspace(0, candidates.force.size - 1, SAMPLED).astype(int))
