@@ -16,7 +16,7 @@ from ._quantities import (
 )
 from ._sentences import effect_words, own_strength, scatter_words
 
-_MOST_PLACES = 6
+_MOST_NAMED = 6
 
 _NEAR = 0.05
 """A fold within this share of the drive counts as near."""
@@ -110,8 +110,8 @@ def mains_words(health: CampaignHealth, unit: str) -> tuple[str, ...]:
         f"dwell at {frequency:.2f} Hz: harmonic {order} falls on {mains:g} Hz"
         for frequency, order, mains in sorted(met)
     ]
-    shown = "; ".join(places[:_MOST_PLACES]) + (
-        f"; {len(places) - _MOST_PLACES} more" if places[_MOST_PLACES:] else ""
+    shown = "; ".join(places[:_MOST_NAMED]) + (
+        f"; {len(places) - _MOST_NAMED} more" if places[_MOST_NAMED:] else ""
     )
     if not health.hum:
         hidden = f"No hum of the mains stands out; where it could hide: {shown}."

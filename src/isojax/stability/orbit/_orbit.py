@@ -23,6 +23,7 @@ from ._period_map import trajectory
 from ._shooting import ShootingSolution, shoot
 from ._shooting_method import ShootingMethod
 from ._sine import recorded_sine
+from ._state_path import AbstractStatePath
 from ._symmetry import is_odd
 
 _CROSSINGS = 4
@@ -36,7 +37,7 @@ _SYMMETRIC_TO = 1e-4
 sampled with the steps of maps, whose error at a kink is a few times 1e-5."""
 
 
-class Orbit(eqx.Module):
+class Orbit(AbstractStatePath):
     """A periodic orbit of the forced isolator.
 
     Attributes:
@@ -62,16 +63,6 @@ class Orbit(eqx.Module):
     states: Float[Array, "time state"]
     error: Float[Array, ""]
     result: RESULTS
-
-    @property
-    def displacement(self) -> Float[Array, " time"]:
-        """[m]."""
-        return self.states[:, 0]
-
-    @property
-    def velocity(self) -> Float[Array, " time"]:
-        """[m/s]."""
-        return self.states[:, 1]
 
     @property
     def amplitude(self) -> Float[Array, ""]:
