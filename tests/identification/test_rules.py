@@ -97,3 +97,8 @@ def test_a_loop_hands_its_rules_on(rubbing):
     assert loop.rules == rules
     assert loop.remainder is not None
     assert loop.remainder.pursuit.laws == ()
+
+
+def test_the_loop_with_its_report_hands_on_what_is_excluded(rubbing):
+    with pytest.raises(ValueError, match="`excluded` must hold catalogue names, but 'nothing_known'"):
+        isojax.close_loop(rubbing, excluded=("nothing_known",))

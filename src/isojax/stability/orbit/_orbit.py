@@ -215,14 +215,14 @@ def _orbit(
     mirrored = jnp.array(True) if method.half else jnp.all(apart <= _SYMMETRIC_TO * size)
     time = jnp.linspace(0.0, 1.0, path.shape[0]) * method.periods / excitation.frequency
     return Orbit(
-        model,
-        excitation,
-        method.periods,
-        solution.state * blank,
-        floquet,
-        found & (mirrored if method.periods == 1 else False),
-        time,
-        path * blank,
-        solution.error * blank,
-        result,
+        model=model,
+        excitation=excitation,
+        periods=method.periods,
+        y0=solution.state * blank,
+        floquet=floquet,
+        symmetric=found & (mirrored if method.periods == 1 else False),
+        time=time,
+        states=path * blank,
+        error=solution.error * blank,
+        result=result,
     )
