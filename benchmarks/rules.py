@@ -39,7 +39,7 @@ DEFAULTS = {field.name: field.default for field in dataclasses.fields(Rules)}
 REPEATED = (
     (_diagnose, "score_test"),
     (_diagnose, "transferred_share"),
-    (_diagnose, "polish"),
+    (_diagnose, "refit_to_convergence"),
     (_candidate_refits, "find_balance_start"),
     (_candidate_refits, "refit_candidate"),
     (_candidate_refits, "refit_from"),

@@ -41,7 +41,7 @@ _WIDTH = 120
 
 _NOT_CONVERGED = 1
 
-_CELLS = 200
+_MAP_STEPS = 200
 """Values along each side of a map, if omitted."""
 
 _EXIT_CODES = (
@@ -153,7 +153,7 @@ def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
         required=True,
         nargs="+",
         metavar=("START STOP", "COUNT"),
-        help=f"{words}; COUNT equal steps apart, {_CELLS} if omitted",
+        help=f"{words}; COUNT equal steps apart, {_MAP_STEPS} if omitted",
     )
 
 
@@ -245,7 +245,7 @@ def _values(option: str, words: Sequence[str]) -> np.ndarray:
     start, stop, count = math.nan, math.nan, 0
     if 2 <= len(words) <= 3:
         with contextlib.suppress(ValueError):
-            start, stop, count = float(words[0]), float(words[1]), int((*words, _CELLS)[2])
+            start, stop, count = float(words[0]), float(words[1]), int((*words, _MAP_STEPS)[2])
     if count < 2 or not 0.0 < start < stop < math.inf:
         raise ValueError(
             f"{option} must be START STOP [COUNT], two ascending positive numbers and a count of at least 2, "

@@ -15,7 +15,10 @@ from isojax import paper
 from isojax._parameters import list_parameters, own_parameters, replace_parameters, to_free, to_physical
 from isojax._results import is_successful
 from isojax.elements import CATALOGUE, AbstractElement, Scales
-from isojax.elements._base import CONTRACTS, Group
+from isojax.elements._base import Group
+from isojax.elements._follower import AbstractFollower
+from isojax.elements._force import AbstractForce
+from isojax.elements._instrument import AbstractInstrument
 from isojax.excitations import Harmonic
 from isojax.models import Instant, Integrator, Isolator, load_model, save_model, simulate
 from isojax.stability.orbit._describing_function import response_start
@@ -23,6 +26,7 @@ from isojax.stability.orbit._floquet import multipliers
 from isojax.stability.orbit._period_map import period_map
 from isojax.stability.orbit._sine import recorded_sine
 
+CONTRACTS = (AbstractForce, AbstractInstrument, AbstractFollower)
 SCALES = Scales(
     mass=800.0,
     force=150.0,

@@ -18,7 +18,7 @@ from isojax.elements import (
     LinearStiffness,
 )
 from isojax.identification import Rules, fit, scales
-from isojax.identification.diagnosis._refit import polish
+from isojax.identification.diagnosis._refit import refit_to_convergence
 from isojax.identification.diagnosis._score import absent_effects, score_test
 from isojax.identification.fitting._elimination import Nuisances, Reduced, Spread
 from isojax.identification.fitting._problem import Point
@@ -87,7 +87,7 @@ def test_scatter_that_a_wrong_model_showed_is_given_up_with_the_finding(simulate
     old = right.estimate.point.nuisances
     moved = old._replace(spread=Spread(old.spread.records, 1e-3), segments=old.segments + 1e-3)
     wrong = right.estimate._replace(point=right.estimate.point._replace(nuisances=moved))
-    again = polish(wrong, Search(scales(campaign), solver=optx.LevenbergMarquardt(1e-3, 1e-3)))
+    again = refit_to_convergence(wrong, Search(scales(campaign), solver=optx.LevenbergMarquardt(1e-3, 1e-3)))
     assert again.point.nuisances.spread.segments == 0.0
     np.testing.assert_array_equal(again.point.nuisances.segments, 0.0)
     np.testing.assert_allclose(

@@ -47,8 +47,9 @@ def test_cells_are_the_single_orbits_within_the_error_that_the_map_reports(small
 
 
 def test_inside_the_lens_of_folds_there_are_three_orbits_and_outside_one(lens_map):
-    # facts.md: at 4.1 Hz 190.62 to 194.01 N, at 4.2 Hz 171.89 to 178.12 N, at 4.4 Hz 144.52 to 150.66 N;
-    # rows 120, 148, 150, 160, 175, 192.5, 210 N, columns 4.1, 4.2, 4.4, 4.8 Hz.
+    # Folds by the table of test_continuation: at 4.1 Hz 190.62 to 194.01 N, at 4.2 Hz 171.89 to 178.12 N, at
+    # 4.4 Hz 144.52 to 150.66 N; rows 120, 148, 150, 160, 175, 192.5, 210 N,
+    # columns 4.1, 4.2, 4.4, 4.8 Hz.
     expected = np.ones((7, 4), int)
     for cell in ((1, 2), (2, 2), (4, 1), (5, 0)):
         expected[cell] = 3

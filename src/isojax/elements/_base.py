@@ -10,8 +10,6 @@ from ._follower import AbstractFollower
 from ._force import AbstractForce
 from ._instrument import AbstractInstrument
 
-CONTRACTS = (AbstractForce, AbstractInstrument, AbstractFollower)
-
 
 class AbstractElement(AbstractForce, AbstractInstrument, AbstractFollower):
     """One physical effect. An element overrides methods of one contract; those of the others stay neutral.

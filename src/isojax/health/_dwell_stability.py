@@ -147,7 +147,7 @@ def _held_against_orbits(model: Isolator, measured: list[_Measured]) -> list[Dwe
     apart = np.max(np.abs(np.asarray(found.y0)[:, :2] - starts[:, :2]) / size, axis=1)
     radius = np.asarray(found.spectral_radius)
     changes = [
-        _nearest(np.asarray(folds), own)
+        _change_to_fold(np.asarray(folds), own)
         for folds, own in ((found.fold_amplitude, amplitude), (found.fold_frequency, frequency))
     ]
     held = []
@@ -165,7 +165,7 @@ def _held_against_orbits(model: Isolator, measured: list[_Measured]) -> list[Dwe
     return held
 
 
-def _nearest(
+def _change_to_fold(
     folds: Float[np.ndarray, "dwell side"], own: Float[np.ndarray, " dwell"]
 ) -> Float[np.ndarray, " dwell"]:
     """Give the change to the nearer of two folds; infinite where there is neither."""

@@ -178,17 +178,7 @@ def _without_evidence(failed: Fit) -> Verdict:
 def search_effects(
     before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...] = ()
 ) -> tuple[tuple[Extension, ...], Verdict]:
-    """Add effects while they are significant; search again without one that later ones made superfluous.
-
-    Args:
-        before: the declared model, fitted.
-        search: how to search.
-        max_iterations: effects that may be added at most.
-        excluded: catalogue names that are not to be considered.
-
-    Returns:
-        The steps of the better model, and its last diagnosis.
-    """
+    """Add effects while they are significant; search again without one that later ones made superfluous."""
     extensions, verdict = _grow(before, search, max_iterations, excluded)
     if len(extensions) < 2:
         return extensions, verdict
@@ -230,18 +220,7 @@ def _grow(
 
 
 def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules: Rules) -> VerdictWord:
-    """Give the verdict over all iterations.
-
-    Args:
-        before: the declared model, fitted.
-        final: the last fit.
-        findings: count of the effects that it has more.
-        last: its diagnosis.
-        rules: the numbers that decide.
-
-    Returns:
-        The verdict in one word.
-    """
+    """Give the verdict over all iterations."""
     first, found = before.estimate, final.estimate
     if not findings or not is_successful(final.result):
         return last.verdict

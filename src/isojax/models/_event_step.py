@@ -13,7 +13,7 @@ from ._instant import Instant
 from ._isolator import Isolator, Quantity
 from ._laws import Regime, State
 
-_ROUNDS = 6
+_EVENT_ITERATIONS = 6
 """Safeguarded Newton steps to an event: two make a crossing exact, the others are for near tangents."""
 
 _ROUNDING = 1e-9
@@ -79,8 +79,7 @@ def find_ringing(jump: Jump, step: Int[Array, "..."] | int, steps: int) -> Ringi
     """
     place = (step + jump.share) / steps
     return Ringing(
-        (1.0 - place) * (0.5 - 0.8 * place) * jump.size,
-        -place * (0.5 - 0.8 * (1.0 - place)) * jump.size,
+        (1.0 - place) * (0.5 - 0.8 * place) * jump.size, -place * (0.5 - 0.8 * (1.0 - place)) * jump.size
     )
 
 
@@ -259,7 +258,7 @@ def _root(value: Callable[[Lanes], Lanes], like: Lanes) -> Lanes:
     """Find where a function that is not negative at 0 and negative at 1 crosses zero."""
     low, high = jnp.zeros_like(like), jnp.ones_like(like)
     share = 0.5 * high
-    for _ in range(_ROUNDS):
+    for _ in range(_EVENT_ITERATIONS):
         here, slope = jax.jvp(value, (share,), (jnp.ones_like(share),))
         low, high = jnp.where(here > 0.0, share, low), jnp.where(here > 0.0, high, share)
         newton = share - here / slope

@@ -36,16 +36,7 @@ def share_internal(elements: Elements, state: State) -> list[Internal]:
 def evaluate_switches(
     elements: Elements, state: State, which: Literal["kinks", "corners"]
 ) -> list[tuple[Lanes, ...]]:
-    """Evaluate the functions at whose zeros laws are not smooth.
-
-    Args:
-        elements: the isolator's.
-        state: displacement, velocity and internal states.
-        which: the method of the elements that gives them.
-
-    Returns:
-        Those of each element.
-    """
+    """Evaluate the functions at whose zeros laws are not smooth."""
     shares = zip(elements, share_internal(elements, state), strict=True)
     return [getattr(element, which)(state[0], state[1], own) for element, own in shares]
 

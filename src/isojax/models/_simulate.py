@@ -44,7 +44,7 @@ class Simulation(eqx.Module):
 
 
 @eqx.filter_jit
-def _solve(
+def _solve_ode(
     model: Isolator,
     excitation: AbstractExcitation,
     time: Float[Array, " time"],
@@ -133,7 +133,7 @@ def simulate(
         raise ValueError(f"Argument `initial_state` must hold {size} states, but holds {len(start)}.")
     state = tuple(as_float64(value) for value in start)
     time = jnp.arange(count + 1, dtype=float) / rate
-    states, ended = _solve(model, excitation, time, state, integrator, quantity, rate)
+    states, ended = _solve_ode(model, excitation, time, state, integrator, quantity, rate)
     shift = model.shift()
     at = Instant(jax.vmap(excitation)(time - shift), jax.vmap(excitation.rate)(time - shift))
     ran = ended == diffrax.RESULTS.successful

@@ -123,15 +123,15 @@ def load_model(path: str | Path) -> Isolator:
         values = {key: value for key, value in entry.items() if key != "name"}
         if sorted(values) != sorted(expected):
             raise ValueError(f"{path}: element {name} must hold {expected}, but holds {sorted(values)}.")
-        numbers = {key: _number(path, name, key, value) for key, value in values.items()}
+        numbers = {key: _finite_number(path, name, key, value) for key, value in values.items()}
         elements.append(CATALOGUE[name](**numbers))
-    mass = _number(path, "the model", "mass", content.get("mass"))
+    mass = _finite_number(path, "the model", "mass", content.get("mass"))
     if not mass > 0:
         raise ValueError(f"{path}: mass of the model must be positive, but is {mass}.")
     return Isolator(mass, tuple(elements), content["excitation"])
 
 
-def _number(path: Path, owner: str, key: str, value: Any) -> float:
+def _finite_number(path: Path, owner: str, key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{path}: {key} of {owner} must be a finite number, but is {value!r}.")
     return float(value)

@@ -84,6 +84,7 @@ def close_loop(
     campaign: Campaign,
     *,
     max_iterations: int = 3,
+    excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
@@ -93,6 +94,7 @@ def close_loop(
     Args:
         campaign: the measurements.
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
+        excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.
         progress: receives a line a step.
         rules: the numbers that decide verdicts.
@@ -101,7 +103,8 @@ def close_loop(
         The closed loop; `.report(folder)` writes it, `print` shows it.
 
     Raises:
-        ValueError: if the campaign has no record to fit, or names an effect that is not in the catalogue.
+        ValueError: if the campaign has no record to fit, or names an effect that is not in the catalogue;
+            if `excluded` holds what is no catalogue name.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Example:
@@ -112,5 +115,12 @@ def close_loop(
         ('found', ['coulomb_friction'])
         >>> loop.report("out")
     """
-    loop = find_loop(campaign, max_iterations=max_iterations, solver=solver, progress=progress, rules=rules)
+    loop = find_loop(
+        campaign,
+        max_iterations=max_iterations,
+        excluded=excluded,
+        solver=solver,
+        progress=progress,
+        rules=rules,
+    )
     return ClosedLoop(loop)

@@ -5,7 +5,7 @@ import time
 
 import jax.monitoring
 
-_STAGES = ("jaxpr_trace_duration", "jaxpr_to_mlir_module_duration", "backend_compile_duration")
+_COMPILE_STAGES = ("jaxpr_trace_duration", "jaxpr_to_mlir_module_duration", "backend_compile_duration")
 
 
 def compile_seconds() -> float:
@@ -27,7 +27,7 @@ def _spans() -> list[tuple[float, float]]:
     spans: list[tuple[float, float]] = []
 
     def listen(event: str, duration_secs: float, **_: str | int) -> None:
-        if event.endswith(_STAGES):
+        if event.endswith(_COMPILE_STAGES):
             now = time.perf_counter()
             spans.append((now - duration_secs, now))
 

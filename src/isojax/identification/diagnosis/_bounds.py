@@ -10,14 +10,7 @@ from ._score import ScoreTest
 
 
 def strength_unit(element: AbstractElement) -> str:
-    """Give the unit of an element's strength.
-
-    Args:
-        element: the element.
-
-    Returns:
-        The unit.
-    """
+    """Give the unit of an element's strength."""
     return dict(own_parameters(element))[element.strength].unit
 
 

@@ -13,7 +13,7 @@ from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, least_difference, rank_candidates, smallest_inflation
 from ._findings import Candidate, Finding, Verdict
-from ._refit import Refit, bic, polish, rivals
+from ._refit import Refit, bic, refit_to_convergence, rivals
 from ._score import absent_effects, score_test
 from ._separating_words import is_exact, separating_experiment
 from ._transfer import transferred_share
@@ -119,10 +119,10 @@ def diagnose_with(
         search.rules.significance if significance is None else significance,
         search,
     )
-    return _judge(case, refit_candidates(case))
+    return _weigh_refits(case, refit_candidates(case))
 
 
-def _judge(case: Case, refits: list[Refit]) -> Verdict:
+def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     """Weigh the refits, and word the verdict."""
     fitted, rules, test = case.fitted, case.rules, case.test
     inflation = smallest_inflation(by_evidence(refits, rules))
@@ -141,8 +141,8 @@ def _judge(case: Case, refits: list[Refit]) -> Verdict:
         share = transferred_share(fitted, best.estimate, case.search)
         if share > 0.0:
             ranking = rank_candidates(test, refits, usable, inflation)
-            usable[0] = best._replace(estimate=polish(best.estimate, case.search))
-            return _found(case, usable, ranking, share)
+            usable[0] = best._replace(estimate=refit_to_convergence(best.estimate, case.search))
+            return _verdict_of_finding(case, usable, ranking, share)
         # What imitates the missing effect on the records of its refit alone must not hide that effect.
         reason = f"{too_little}, but it does not carry over to data left out of its refit"
         place = next(index for index, one in enumerate(refits) if one is best)
@@ -207,7 +207,9 @@ def _look_alikes(name: str, best: Refit, ranking: tuple[Candidate, ...], rules: 
     )
 
 
-def _found(case: Case, usable: list[Refit], ranking: tuple[Candidate, ...], share: float) -> Verdict:
+def _verdict_of_finding(
+    case: Case, usable: list[Refit], ranking: tuple[Candidate, ...], share: float
+) -> Verdict:
     """Word a finding."""
     fitted, best, rules, test = case.fitted, usable[0], case.rules, case.test
     name = best.score.element.name

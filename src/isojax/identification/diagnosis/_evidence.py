@@ -14,13 +14,6 @@ def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
 
     Of those that these data do not distinguish the simplest goes first: fewest coefficients, then internal
     states.
-
-    Args:
-        refits: all of them.
-        rules: the evidence that distinguishes two effects.
-
-    Returns:
-        Those without a violation.
     """
     usable = [refit for refit in refits if refit.violation is None]
     if not usable:
@@ -37,15 +30,7 @@ def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
 
 
 def least_difference(found: Estimate, rules: Rules) -> float:
-    """Give the difference of Schwarz's criterion up to which two effects are indistinguishable.
-
-    Args:
-        found: the better one.
-        rules: clear evidence, and the smallest gain that is no tie.
-
-    Returns:
-        The difference.
-    """
+    """Give the difference of Schwarz's criterion up to which two effects are indistinguishable."""
     return max(rules.close_bic, rules.smallest_gain * found.dof)
 
 

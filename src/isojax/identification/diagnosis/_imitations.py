@@ -24,17 +24,7 @@ class _Opponent(NamedTuple):
 
 
 def _best_addition(found: Estimate, excluded: str, opponent: _Opponent, search: Search) -> Estimate | None:
-    """Add the one effect that makes a model clearly better than another of as many coefficients.
-
-    Args:
-        found: the model to add to, fitted.
-        excluded: catalogue name of the effect that is not to be considered.
-        opponent: the other model.
-        search: how to search.
-
-    Returns:
-        The first admissible refit that is clearly better, or None.
-    """
+    """Add the one effect that makes a model clearly better than another of as many coefficients."""
     rules, other = search.rules, opponent.estimate
     search = search._replace(max_steps=rules.partner_evaluations)
     test = score_test(found, search, absent_effects(found.model, search.scales, (excluded,)))
@@ -64,14 +54,6 @@ def find_simpler_pair(fitted: Estimate, usable: list[Refit], search: Search) -> 
 
     A search that adds one effect a time prefers a law of three coefficients that imitates two effects a
     little to either of them. Such a law has to beat the best simpler candidate and its best partner.
-
-    Args:
-        fitted: the estimate without any of them.
-        usable: admissible refits, best first.
-        search: how to search.
-
-    Returns:
-        Both names in words, or None where the best candidate stands.
     """
     best = usable[0].estimate
     room = len(best.places) - len(fitted.places)

@@ -38,16 +38,7 @@ class Refit(NamedTuple):
 
 
 def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
-    """Fit the model with one absent effect, everything free, from the linear step that the score gives.
-
-    Args:
-        test: the score test.
-        index: the candidate.
-        search: how to search.
-
-    Returns:
-        The refit.
-    """
+    """Fit the model with one absent effect, everything free, from the linear step that the score gives."""
     fitted, score = test.fitted, test.scores[index]
     best: tuple[float, Isolator, Nuisances] | None = None
     places = _free_places(fitted, fitted.model.with_elements(score.element))
@@ -168,16 +159,8 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
     return replace_parameters(model, numbers)
 
 
-def polish(found: Estimate, search: Search) -> Estimate:
-    """Take a rough refit to the end of its search, with the scatter that repeats show beside its law.
-
-    Args:
-        found: the refit.
-        search: how to search.
-
-    Returns:
-        The estimate, no worse than the refit.
-    """
+def refit_to_convergence(found: Estimate, search: Search) -> Estimate:
+    """Take a rough refit to the end of its search, with the scatter that repeats show beside its law."""
     search.progress("the finding, fitted to the end")
     search = search._replace(max_steps=search.rules.final_evaluations)
     again = estimate(found.simulator, found.model, found.places, search, found.point.nuisances, anew=True)
@@ -205,15 +188,7 @@ def is_determined(found: Estimate, score: Score, errors: float) -> bool:
 
 
 def strength_place(found: Estimate, score: Score) -> int:
-    """Give the place of a candidate's strength among the free coefficients of its refit.
-
-    Args:
-        found: the refit.
-        score: the score of its effect.
-
-    Returns:
-        Its column.
-    """
+    """Give the place of a candidate's strength among the free coefficients of its refit."""
     listed = [entry.name for entry in list_parameters(found.model)]
     fields = [name for name, _ in own_parameters(score.element)]
     return found.places.index(len(listed) - len(fields) + fields.index(score.element.strength))
@@ -242,22 +217,9 @@ def follows_freely(fitted: Estimate, found: Estimate) -> bool:
 
 
 def rivals(
-    scores: tuple[Score, ...],
-    refits: list[Refit],
-    twins: tuple[AbstractElement, ...],
-    names: tuple[str, ...],
+    scores: tuple[Score, ...], refits: list[Refit], twins: tuple[AbstractElement, ...], names: tuple[str, ...]
 ) -> tuple[AbstractElement, ...]:
-    """Give effects as they imitate another: refitted where they were, else with the shape of their score.
-
-    Args:
-        scores: the scores of all absent effects.
-        refits: those that were refitted.
-        twins: effects that are the other by another name.
-        names: catalogue names of the effects.
-
-    Returns:
-        One element a name.
-    """
+    """Give effects as they imitate another: refitted where they were, else with the shape of their score."""
     shapes = {score.element.name: score.element for score in scores}
     for refit in refits:
         element = refit.estimate.model.element(refit.score.element.name)

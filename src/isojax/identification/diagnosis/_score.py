@@ -67,16 +67,7 @@ class ScoreTest(NamedTuple):
 def absent_effects(
     model: Isolator, scales: Scales, excluded: tuple[str, ...] = ()
 ) -> tuple[AbstractElement, ...]:
-    """Give every catalogue effect that the model lacks, over the grids of their shape parameters.
-
-    Args:
-        model: the isolator.
-        scales: magnitudes of the records.
-        excluded: catalogue names to leave out.
-
-    Returns:
-        Elements at zero strength.
-    """
+    """Give every catalogue effect that the model lacks, over the grids of their shape parameters."""
     held = {element.name for element in model.elements}
     present = held | set(excluded)
     present |= {name for element in model.elements for name in element.absorbs}

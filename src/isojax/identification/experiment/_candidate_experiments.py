@@ -15,7 +15,7 @@ from ..diagnosis import AGAIN, Experiment
 DWELLS = 6
 """Segments of a record, each simulated from a state of its own."""
 
-LEVELS = 3
+MOST_LEVELS = 3
 
 MIDDLE_CYCLES = 10.0
 """Cycles of the middle frequency in a segment."""
@@ -88,7 +88,7 @@ def find_test_outline(campaign: Campaign, substeps: int, every_sample: bool) -> 
     longest = max(MOST_STEPS / substeps, FEWEST_CYCLES * rate / middle)
     samples = min(rate * max(MIDDLE_CYCLES / middle, SLOW_CYCLES / lowest), longest)
     stepped = any(one.dwells or one.kind == "swept" for one in driven)
-    levels = tuple(sizes[place] for place in chosen)[:LEVELS]
+    levels = tuple(sizes[place] for place in chosen)[:MOST_LEVELS]
     return TestOutline(levels, lowest, highest, stepped, rate, int(np.ceil(samples)))
 
 
@@ -143,15 +143,7 @@ def drive_of(
 
 
 def repeated_campaign(campaign: Campaign, outline: TestOutline) -> Experiment:
-    """Give the test that the campaign was.
-
-    Args:
-        campaign: the measurements.
-        outline: what it did.
-
-    Returns:
-        The experiment.
-    """
+    """Give the test that the campaign was."""
     drive = drive_of(outline, outline.levels, outline.lowest, outline.highest, outline.stepped)
     return Experiment(
         AGAIN, "repeat the same test", drive, outline.rate, campaign.output.quantity, outline.stepped

@@ -39,11 +39,7 @@ class TrialRun(NamedTuple):
 
 @eqx.filter_jit
 def _run(
-    model: Isolator,
-    record: Instant,
-    start: State,
-    quantity: Quantity,
-    sample_time: float,
+    model: Isolator, record: Instant, start: State, quantity: Quantity, sample_time: float
 ) -> tuple[State, Array]:
     """Give states and readings at the samples; the record is over time, stage and lanes."""
     _, path, ringing = scan_records(
@@ -54,14 +50,7 @@ def _run(
 
 
 def blank_records(experiment: Experiment) -> tuple[Record, ...]:
-    """Give the records of an experiment before it was made: no output yet.
-
-    Args:
-        experiment: the test.
-
-    Returns:
-        One record a row of its drive.
-    """
+    """Give the records of an experiment before it was made: no output yet."""
     rows, total = experiment.drive.shape
     length = total // DWELLS
     records = []
@@ -95,24 +84,12 @@ def blank_records(experiment: Experiment) -> tuple[Record, ...]:
 
 
 def missing_channels(model: Isolator, records: tuple[Record, ...]) -> tuple[str, ...]:
-    """Name the signals that a model follows and that a planned record does not have.
-
-    Args:
-        model: the isolator.
-        records: the records.
-
-    Returns:
-        Their names.
-    """
+    """Name the signals that a model follows and that a planned record does not have."""
     return tuple(name for name in model.channels if not all(carries(record, name) for record in records))
 
 
 def trial_run(
-    model: Isolator,
-    experiment: Experiment,
-    blank: tuple[Record, ...],
-    problem: Problem,
-    rest: float,
+    model: Isolator, experiment: Experiment, blank: tuple[Record, ...], problem: Problem, rest: float
 ) -> TrialRun:
     """Carry out an experiment on a model.
 

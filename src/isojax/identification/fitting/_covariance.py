@@ -87,13 +87,6 @@ def uncertainty(matrix: Float[np.ndarray, "column column"], inflation: float = 1
 
 
 def unknown(count: int) -> Uncertainty:
-    """Give what is known after a search that failed: nothing.
-
-    Args:
-        count: coefficients.
-
-    Returns:
-        The uncertainty, all NaN.
-    """
+    """Give what is known after a search that failed: nothing."""
     nothing = np.full((count, count), np.nan)
     return Uncertainty(nothing, np.full(count, np.nan), nothing, np.zeros(count, dtype=bool), ())

@@ -212,7 +212,7 @@ def descend(
             break
         owner = simulator.prepared(best.model, len(best.model.elements)).record
         if refused == DOUBTFUL and evaluations < search.max_steps - 1:
-            settled = _settled(simulator, best, places, physical(best_free)[1], owner)
+            settled = _with_implied_nuisances(simulator, best, places, physical(best_free)[1], owner)
             evaluations += 1
             if settled.is_finite and settled.chi2 - best.chi2 > tolerance * max(1.0, chi2):
                 search.progress("restarting the search: the predicted decrease was not reached")
@@ -226,7 +226,7 @@ def descend(
     return Descent(_in_physical_units(best, physical(best_free)[1]), result, evaluations)
 
 
-def _settled(
+def _with_implied_nuisances(
     simulator: Simulator,
     best: Point,
     places: tuple[int, ...],

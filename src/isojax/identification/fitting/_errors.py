@@ -72,14 +72,7 @@ class Restarts(NamedTuple):
 
 
 def without_values(run: Run) -> Run:
-    """Give the run of a search that failed: no number may pass for its simulation.
-
-    Args:
-        run: the run.
-
-    Returns:
-        The same, its simulation NaN.
-    """
+    """Give the run of a search that failed: no number may pass for its simulation."""
     return run._replace(simulated=np.full_like(run.simulated, np.nan))
 
 

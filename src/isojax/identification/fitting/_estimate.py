@@ -124,16 +124,7 @@ def free_places(
 
 
 def magnitudes(model: Isolator, places: tuple[int, ...], scales: Scales) -> tuple[float, ...]:
-    """Give the magnitude of each free coefficient: its value, or what would matter where it is zero.
-
-    Args:
-        model: the isolator.
-        places: free coefficients.
-        scales: magnitudes of the records.
-
-    Returns:
-        One positive number a coefficient.
-    """
+    """Give the magnitude of each free coefficient: its value, or what would matter where it is zero."""
     typical = {
         f"{element.name}.{element.strength}": abs(element.typical_strength(scales))
         for element in model.elements

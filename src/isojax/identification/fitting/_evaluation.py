@@ -23,13 +23,7 @@ def _chi2_of(point: Point, places: list[int]) -> float:
 
 
 def _carried_over(found: Estimate, simulator: Simulator, places: list[int]) -> Nuisances:
-    """Give the nuisances of a fit for a simulator that has other records beside the fitted ones.
-
-    Args:
-        found: the fit.
-        simulator: all records.
-        places: place of each fitted record among them.
-    """
+    """Give the nuisances of a fit for a simulator that has other records beside the fitted ones."""
     model, carried, old = found.model, len(found.model.elements), found.point.nuisances
     start = simulator.settle(None, model, carried, old.spread)
     own, scales = found.simulator.starts(model, found.simulator.prepared(model, carried))

@@ -116,17 +116,11 @@ def fit_report(fit: Fit) -> str:
     Coefficients with standard error, relative error and start value; those at a bound, never moved, or not
     determined by the data by name; strong correlations; errors in physical units and over the noise. Of a
     search that failed there are no numbers but NaN, and why it failed.
-
-    Args:
-        fit: the fit.
-
-    Returns:
-        Lines of plain text, SI units.
     """
     sections = [
         ("Model", _model(fit)),
         ("Fit statistics", _statistics(fit)),
-        ("Errors", _errors(fit)),
+        ("Errors", _error_table(fit)),
         ("Coefficients", _coefficients(fit)),
         (f"Correlations of {_STRONG:g} and more", _correlations(fit)),
         ("Warnings", warnings_of(fit)),
@@ -168,10 +162,7 @@ def _statistics(fit: Fit) -> list[str]:
         ("BIC", f"{stats.bic:.8g}"),
         ("noise", f"{fit.noise.sigma:.4g} {unit} rms, from {fit.noise.method.replace('_', ' ')}"),
         ("stiffness scatter", scatter),
-        (
-            "integration",
-            f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample",
-        ),
+        ("integration", f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample"),
     ]
     if math.isfinite(stats.integration_error):
         rows.append(("integration error", f"{stats.integration_error:.2g} of the noise when halved"))
@@ -179,7 +170,7 @@ def _statistics(fit: Fit) -> list[str]:
     return [f"{label:<20} = {value}" for label, value in rows]
 
 
-def _errors(fit: Fit) -> list[str]:
+def _error_table(fit: Fit) -> list[str]:
     unit = OUTPUT_UNITS[fit.campaign.output.quantity]
     lines = [f"{'records':<10}{'free run RMSE':>20}{'NRMSE':>10}{'restarted NRMSE':>18}{'chi2/dof':>11}"]
     return lines + [

@@ -16,7 +16,7 @@ ROUNDS = 3
 RELEASED_ROUNDS = 12
 """The same where a record starts with a release: its first states are poorly known, its motion is large."""
 
-WORSE = 1.1
+MOST_WORSENING = 1.1
 """Factor on the error of a record up to which a step stands: chi2 is that at the end of the next one."""
 
 HALVINGS = 5
@@ -124,7 +124,7 @@ def _shortened(
     known, share = before.reduced.by_record[:, -1, -1], np.ones(before.samples.size)
     old, new, found = before.nuisances, after.nuisances, after
     for halving in range(HALVINGS + 1):
-        worse = ~(found.reduced.by_record[:, -1, -1] <= WORSE * known + 1.0)
+        worse = ~(found.reduced.by_record[:, -1, -1] <= MOST_WORSENING * known + 1.0)
         if not np.any(worse):
             break
         share = np.where(worse, 0.5 * share if halving < HALVINGS else 0.0, share)
@@ -144,14 +144,7 @@ def _between(old: np.ndarray, new: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
-    """Give the first samples of each record: those that the campaign gives for it, else the first second.
-
-    Args:
-        records: the records.
-
-    Returns:
-        One segment a record.
-    """
+    """Give the first samples of each record: those that the campaign gives for it, else the first second."""
 
     def head(place: int, record: Record) -> Segment:
         length = record.settle if record.settle >= 8 else round(record.rate)
@@ -164,13 +157,6 @@ def find_initial_states(problem: Problem, model: Isolator) -> Float[np.ndarray, 
     """Find the initial state of each record: the one from which the model follows its first samples best.
 
     Internal states start at rest.
-
-    Args:
-        problem: the records.
-        model: the isolator.
-
-    Returns:
-        States, one column a record.
     """
     simulator = Simulator(problem._replace(segments=head_segments(problem.records), heads=()), at_rest=True)
     point = best_nuisances(simulator, model, HELD)

@@ -77,14 +77,7 @@ class Point(NamedTuple):
 
 
 def stiffness_deviation(nuisances: Nuisances) -> Float[np.ndarray, " record"]:
-    """Give each record's relative deviation of the linear stiffness.
-
-    Args:
-        nuisances: where they stand.
-
-    Returns:
-        Relative deviations, one a record.
-    """
+    """Give each record's relative deviation of the linear stiffness."""
     return nuisances.stiffness * STIFFNESS_SCALE_UNIT
 
 

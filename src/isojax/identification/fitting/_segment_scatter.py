@@ -28,11 +28,7 @@ class _Pair(NamedTuple):
 
 
 def segment_scatter(
-    records: tuple[Record, ...],
-    segments: tuple[Segment, ...],
-    point: Point,
-    inflation: float,
-    rules: Rules,
+    records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point, inflation: float, rules: Rules
 ) -> float:
     """Give the standard deviation of the linear stiffness from segment to segment within a record.
 

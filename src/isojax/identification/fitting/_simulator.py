@@ -5,14 +5,7 @@ from jaxtyping import Float
 
 from ..._parameters import element_names, list_parameters
 from ...models import Isolator
-from ..jacobian import (
-    Prepared,
-    Unknowns,
-    information,
-    internal_starts,
-    prepare,
-    score_information,
-)
+from ..jacobian import Prepared, Unknowns, information, internal_starts, prepare, score_information
 from ._elimination import Nuisances, Spread, eliminate
 from ._problem import Point, Problem
 

@@ -32,11 +32,7 @@ class BalanceStart(NamedTuple):
 
 
 def find_balance_start(
-    campaign: Campaign,
-    model: Isolator,
-    scales: Scales,
-    absent: tuple[AbstractElement, ...],
-    rules: Rules,
+    campaign: Campaign, model: Isolator, scales: Scales, absent: tuple[AbstractElement, ...], rules: Rules
 ) -> BalanceStart | None:
     """Find the absent effect without which the measured forces do not balance, if there is one.
 

@@ -11,7 +11,7 @@ from ._logarithmic_decrement import about_rest, logarithmic_decrement
 from ._measured_receptance import MeasuredResponse
 from ._physical_fit import fit_physically
 
-_SMOOTH = np.array([0.25, 0.5, 0.25])
+_SMOOTHING = np.array([0.25, 0.5, 0.25])
 """Weights of a half cycle and its neighbours: what differs between the two sides of rest drops out."""
 
 _HALF_CYCLES_A_COEFFICIENT = 1
@@ -39,8 +39,8 @@ def decaying_response(campaign: Campaign, record: Record) -> MeasuredResponse:
     if cycles.amplitude.size < 3:
         empty = np.zeros((0, 1), complex)
         return MeasuredResponse(record.name, record.level, record.direction, nothing, empty, empty, nothing)
-    half = np.convolve(0.5 / cycles.frequency, _SMOOTH, mode="valid")
-    size = np.convolve(np.log(cycles.amplitude), _SMOOTH, mode="valid")
+    half = np.convolve(0.5 / cycles.frequency, _SMOOTHING, mode="valid")
+    size = np.convolve(np.log(cycles.amplitude), _SMOOTHING, mode="valid")
     omega = np.pi / half
     alpha = 0.5 * np.log(cycles.amplitude[:-2] / cycles.amplitude[2:]) / half
     displacement = np.exp(size) / np.hypot(omega, alpha) ** order

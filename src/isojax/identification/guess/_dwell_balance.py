@@ -13,9 +13,7 @@ _PHASES = 128
 """Samples of a cycle over which the force of a law is evaluated."""
 
 
-def _over_a_cycle(
-    amplitudes: Complex[np.ndarray, "dwell harmonic"],
-) -> Float[np.ndarray, " time"]:
+def _over_a_cycle(amplitudes: Complex[np.ndarray, "dwell harmonic"]) -> Float[np.ndarray, " time"]:
     """Give the real signals of all dwells over one cycle each, one after the other."""
     harmonic = np.arange(1, amplitudes.shape[1] + 1)
     phase = 2 * np.pi * np.arange(_PHASES) / _PHASES

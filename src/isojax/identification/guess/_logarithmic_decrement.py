@@ -68,12 +68,5 @@ def logarithmic_decrement(
 
 
 def about_rest(output: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
-    """Give a free decay about its position at rest: the mean of its last fifth.
-
-    Args:
-        output: the decay.
-
-    Returns:
-        The decay less that mean.
-    """
+    """Give a free decay about its position at rest: the mean of its last fifth."""
     return output - np.mean(output[-max(1, output.size // _LAST_FIFTH) :])

@@ -10,14 +10,7 @@ from ._force_balance import with_strength
 
 
 def output_mean(campaign: Campaign) -> float:
-    """Give the mean reading over the records to fit [SI unit of the output].
-
-    Args:
-        campaign: the campaign.
-
-    Returns:
-        The mean, each record counting by its length.
-    """
+    """Give the mean reading over the records to fit [SI unit of the output]."""
     return float(np.mean(np.concatenate([record.output for record in campaign.fit_records])))
 
 

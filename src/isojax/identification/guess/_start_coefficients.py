@@ -38,17 +38,7 @@ class TimeStart:
 def start_from_dwells(
     base: Isolator, names: tuple[str, ...], responses: tuple[MeasuredResponse, ...], mass_free: bool
 ) -> tuple[BalanceFit, tuple[str, ...]]:
-    """Start from the harmonic balance of every dwell.
-
-    Args:
-        base: the declared structure.
-        names: catalogue names of the elements to fit.
-        responses: measured harmonics of the records.
-        mass_free: whether the mass is unknown too.
-
-    Returns:
-        The fit and its notes.
-    """
+    """Start from the harmonic balance of every dwell."""
     motion = dwell_motion(base, responses)
     return fit_physically(
         lambda chosen: fit_all_dwells(base, chosen, responses, mass_free=mass_free), names, *motion.largest

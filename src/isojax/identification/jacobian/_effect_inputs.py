@@ -134,16 +134,13 @@ def input_columns(
     Returns:
         The changes, by effect input.
     """
-    internal = follow(family.elements, motion.stages, start, step)[1] if start else ()
+    internal = internal_state_path(family.elements, motion.stages, start, step)[1] if start else ()
     return _input_columns(family.elements, motion._replace(stages=()), internal)
 
 
 @eqx.filter_jit
-def follow(
-    members: AbstractElement,
-    stages: tuple[Float[Array, "time 3 lanes"], ...],
-    start: State,
-    step: float,
+def internal_state_path(
+    members: AbstractElement, stages: tuple[Float[Array, "time 3 lanes"], ...], start: State, step: float
 ) -> tuple[State, State]:
     """Integrate the internal states of effects of one kind along a motion.
 

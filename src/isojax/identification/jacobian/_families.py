@@ -24,14 +24,7 @@ class ElementFamily(NamedTuple):
 
 
 def find_families(probes: tuple[AbstractElement, ...]) -> tuple[ElementFamily, ...]:
-    """Put elements of one kind side by side.
-
-    Args:
-        probes: the elements.
-
-    Returns:
-        One family a kind.
-    """
+    """Put elements of one kind side by side."""
     groups: dict[Any, list[int]] = {}
     for place, probe in enumerate(probes):
         groups.setdefault((type(probe), jax.tree_util.tree_structure(probe)), []).append(place)
@@ -47,13 +40,6 @@ def in_turn(families: tuple[ElementFamily, ...], part: int) -> tuple[ElementFami
     """Give families in the order in which a worker takes them: two workers start at either end.
 
     Each kind is compiled by itself; workers that took them in one order would wait for each other.
-
-    Args:
-        families: the families.
-        part: number of the worker.
-
-    Returns:
-        The same families.
     """
     return families if part % 2 == 0 else families[::-1]
 

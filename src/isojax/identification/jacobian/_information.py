@@ -82,10 +82,7 @@ def _sampler(
     solver = RK4()
 
     def sample(
-        values: tuple[Array, ...],
-        scale: Array,
-        state: State,
-        stages: tuple[Instant, ...],
+        values: tuple[Array, ...], scale: Array, state: State, stages: tuple[Instant, ...]
     ) -> tuple[Array, State, Array | None]:
         current = scaled_model(model, values, scale)
         # The table already holds the delayed drive; only the derivative with respect to the delay is still to
@@ -163,16 +160,7 @@ def _lane_information(
 
 
 def share_lanes(values: np.ndarray, part: int, parts: int) -> tuple[Array, ...]:
-    """Give one worker's lanes.
-
-    Args:
-        values: rows of all lanes.
-        part: number of the worker.
-        parts: count of workers.
-
-    Returns:
-        One array a row.
-    """
+    """Give one worker's lanes."""
     size = values.shape[-1] // parts
     return tuple(jnp.asarray(row[part * size : (part + 1) * size]) for row in values)
 

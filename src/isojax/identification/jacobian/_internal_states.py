@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from ...models import Isolator
 from ...records import Record
 from ._batch import Prepared, coordinate_motion, workers
-from ._effect_inputs import follow
+from ._effect_inputs import internal_state_path
 from ._families import ElementFamily, find_families, in_turn
 
 
@@ -77,13 +77,13 @@ def internal_starts(
         tables = (tuple(_stages(row, steps) for row in motion[:rows, :, own]) for motion in (before, over))
         step = prepared.sample_time / steps
         rest = (jnp.zeros((len(family.places), lanes // parts)),) * family.elements.internal_states
-        first, _ = follow(family.elements, next(tables), rest, step)
+        first, _ = internal_state_path(family.elements, next(tables), rest, step)
         places = [[int(ends[place]) + state for place in family.places] for state in range(len(rest))]
         for state, values in zip(places, first, strict=True):
             starts[state, own] = np.asarray(values)
         if min(family.places) >= acting:
             return
-        _, path = follow(family.elements, next(tables), first, step)
+        _, path = internal_state_path(family.elements, next(tables), first, step)
         for state, values in zip(places, path, strict=True):
             # Not the square: an internal state that diverged may be too large for it.
             size = np.where(inside[:, None, own], np.abs(np.asarray(values)[::steps]), 0.0)

@@ -34,15 +34,7 @@ class Propagation(NamedTuple):
 
 
 def product(left: Matrix, right: Matrix) -> Matrix:
-    """Multiply small matrices: written out, so that all of it is one pass over the series.
-
-    Args:
-        left: rows of columns.
-        right: rows of columns.
-
-    Returns:
-        The product.
-    """
+    """Multiply small matrices: written out, so that all of it is one pass over the series."""
     columns = list(zip(*right, strict=True))
 
     def entry(row: list[Array], column: tuple[Array, ...]) -> Array:
@@ -52,27 +44,13 @@ def product(left: Matrix, right: Matrix) -> Matrix:
 
 
 def weighted_sum(*terms: tuple[float, Matrix]) -> Matrix:
-    """Add small matrices, the first number of each term times its matrix.
-
-    Args:
-        *terms: factor and matrix.
-
-    Returns:
-        The sum.
-    """
+    """Add small matrices, the first number of each term times its matrix."""
     size = range(len(terms[0][1]))
     return [[sum((f * m[row][column] for f, m in terms), jnp.zeros(())) for column in size] for row in size]
 
 
 def around(values: Array) -> tuple[Array, Array, Array, Array]:
-    """Give the values at the samples before and at the start of each step, at its end and after that.
-
-    Args:
-        values: a series, time first.
-
-    Returns:
-        Four series.
-    """
+    """Give the values at the samples before and at the start of each step, at its end and after that."""
     time = values.shape[0]
     padded = jnp.concatenate([values[:1], values, values[-1:], values[-1:]])
     before, now, ahead, after = (padded[first : first + time] for first in range(4))

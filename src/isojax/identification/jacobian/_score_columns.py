@@ -29,7 +29,7 @@ from ._transitions import Transitions, transitions_along
 _ENTRIES = 2e7
 """Numbers that one table of columns along the motion may hold."""
 
-_ROOM = 120
+_LEAST_COLUMNS = 120
 """Columns for which a table has room at least: few columns then share the compiled code of many."""
 
 _TOGETHER = 24
@@ -102,7 +102,7 @@ def score_information(
         scales = share_lanes(unknowns.state_scales[:size], part, parts)
         lanes = scale.shape[0]
         # A table of all columns along all lanes may not fit the memory: a few lanes at a time.
-        blocks = -(-lanes // max(1, int(_ENTRIES / (batch.drive.shape[0] * max(columns, _ROOM)))))
+        blocks = -(-lanes // max(1, int(_ENTRIES / (batch.drive.shape[0] * max(columns, _LEAST_COLUMNS)))))
         width = -(-lanes // blocks)
         done = []
         for first in range(0, lanes, width):

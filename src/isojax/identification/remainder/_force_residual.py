@@ -199,12 +199,12 @@ def _force_residual(
     for draw in range(_NOISE_DRAWS):
         stray = _noise_motion(campaign, record, motion, fit.noise.white, (seed, draw))
         shaken = missing(x + stray[0], v + stray[1], a + stray[2]) - force
-        noise.append(_band_limited(np.asarray(shaken), record.rate, lowest, highest))
+        noise.append(_filter_to_band(np.asarray(shaken), record.rate, lowest, highest))
     return ForceResidual(
         record,
         motion.displacement,
         motion.velocity,
-        _band_limited(np.asarray(force), record.rate, lowest, highest),
+        _filter_to_band(np.asarray(force), record.rate, lowest, highest),
         np.stack(noise),
         highest,
         motion.trusted,
@@ -224,7 +224,7 @@ def _highest(record: Record, motion: Motion) -> float:
     return float(min(max(motion.band.highest, orders), 0.39 * record.rate))
 
 
-def _band_limited(
+def _filter_to_band(
     signal: Float[np.ndarray, " time"], rate: float, lowest: float | None, highest: float
 ) -> Float[np.ndarray, " time"]:
     """Filter a signal to a band with zero phase; without a lower end the mean stays."""

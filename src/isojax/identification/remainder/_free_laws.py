@@ -54,7 +54,7 @@ class AbstractFreeForce(AbstractElement):
         """Give formula, words and unit."""
 
 
-def _factor(letter: str, power: float, odd: bool) -> str:
+def _power_term(letter: str, power: float, odd: bool) -> str:
     """Give one factor of a power law: "x^3", "|x|^1.5", "|v|v", "sgn(x)"."""
     if power == 0.0:
         return f"sgn({letter})" if odd else ""
@@ -145,7 +145,7 @@ class PowerForce(AbstractFreeForce):
     def wording(self) -> Wording:
         p, q = float(self.power), float(self.speed_power)
         odd, speed_odd = bool(self.odd > 0.5), bool(self.speed_odd > 0.5)
-        factors = [one for one in (_factor("x", p, odd), _factor("v", q, speed_odd)) if one]
+        factors = [one for one in (_power_term("x", p, odd), _power_term("v", q, speed_odd)) if one]
         formula = " ".join(factors) or "1"
         factor = 1.0 / float(self.displacement**p * self.velocity**q)
         halves = 10.0 * ((p % 1.0 > 0.0) + (q % 1.0 > 0.0))
@@ -270,7 +270,7 @@ class FadingForce(AbstractFreeForce):
 
     def wording(self) -> Wording:
         power = float(self.power)
-        formula = f"fade({_factor('x', power, True)}; {1e3 * float(self.time_constant):.3g} ms)"
+        formula = f"fade({_power_term('x', power, True)}; {1e3 * float(self.time_constant):.3g} ms)"
         factor = float(self.displacement) ** -power
         return Wording(formula, "a force that relaxes", factor, _power_unit(power, 0.0), 30.0 + power)
 

@@ -13,10 +13,10 @@ from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 from ._matching_pursuit import Pursuit, pursue_laws
 
-_CELLS = 20
+_SURFACE_CELLS = 20
 """Cells of the force map along each axis."""
 
-_FEWEST_SAMPLES = 4
+_FEWEST_CELL_SAMPLES = 4
 """Fewest samples of a cell of the force map; a cell with fewer stays empty."""
 
 
@@ -96,8 +96,8 @@ def _force_map(residuals: tuple[ForceResidual, ...]) -> ForceMap:
         np.concatenate([getattr(one, name)[one.trusted] for one in used])
         for name in ("displacement", "velocity", "force")
     )
-    edges = [np.linspace(-1.0, 1.0, _CELLS + 1) * float(np.max(np.abs(values))) for values in (x, v)]
+    edges = [np.linspace(-1.0, 1.0, _SURFACE_CELLS + 1) * float(np.max(np.abs(values))) for values in (x, v)]
     count = np.histogram2d(x, v, edges)[0]
     total = np.histogram2d(x, v, edges, weights=force)[0]
-    mean = np.where(count >= _FEWEST_SAMPLES, total / np.maximum(count, 1.0), np.nan)
+    mean = np.where(count >= _FEWEST_CELL_SAMPLES, total / np.maximum(count, 1.0), np.nan)
     return ForceMap(edges[0], edges[1], mean)

@@ -36,10 +36,10 @@ def read_tdms_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
     chosen = {name: channels[find_channel(file, name, known)] for name in names}
     clocks = [channel.properties.get("wf_start_time") for channel in chosen.values()]
     origin = next((clock for clock in clocks if clock is not None), None)
-    return {name: _column(file, name, channel, origin) for name, channel in chosen.items()}
+    return {name: _channel_column(file, name, channel, origin) for name, channel in chosen.items()}
 
 
-def _column(file: Path, name: str, channel: Any, origin: Any) -> Column:
+def _channel_column(file: Path, name: str, channel: Any, origin: Any) -> Column:
     samples = as_samples(channel[:], file, name)
     increment = channel.properties.get("wf_increment")
     if increment is None or not float(increment) > 0:

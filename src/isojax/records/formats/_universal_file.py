@@ -34,7 +34,7 @@ def read_universal_columns(file: Path, names: Sequence[str]) -> dict[str, Column
     """
     histories = _time_histories(file)
     labels = [_labels(one) for one in histories]
-    return {name: _column(file, name, histories[find_channel(file, name, labels)]) for name in names}
+    return {name: _dataset_column(file, name, histories[find_channel(file, name, labels)]) for name in names}
 
 
 def _time_histories(file: Path) -> list[dict[str, Any]]:
@@ -80,7 +80,7 @@ def _labels(one: dict[str, Any]) -> list[str]:
     return list(dict.fromkeys([*named, f"{one.get('rsp_node')}:{one.get('rsp_dir')}"]))
 
 
-def _column(file: Path, name: str, one: dict[str, Any]) -> Column:
+def _dataset_column(file: Path, name: str, one: dict[str, Any]) -> Column:
     samples, announced = as_samples(one["data"], file, name), int(one["num_pts"])
     if announced != samples.size:
         raise ValueError(

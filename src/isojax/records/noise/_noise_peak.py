@@ -15,7 +15,7 @@ from ..spectrum import MOST_HARMONICS, NoiseBand, harmonic_basis
 _LINE_COUNT = 48
 """Frequencies, evenly spaced on a logarithmic scale, at which a peak is sought."""
 
-_HIGHEST = 0.9
+_HIGHEST_LINE = 0.9
 """Share of the noise band up to which lines are sought and harmonics removed."""
 
 _QUIET = 0.35
@@ -87,7 +87,7 @@ def noise_peak(campaign: Campaign) -> NoisePeak | None:
     if len(late) < _FEWEST_WINDOWS:
         return None
     longest = max(signal.size for signal, _ in late)
-    lines = np.geomspace(campaign.rate / longest, _HIGHEST * band.highest, _LINE_COUNT)
+    lines = np.geomspace(campaign.rate / longest, _HIGHEST_LINE * band.highest, _LINE_COUNT)
     density, count = _spectrum(late, lines, band)
     quiet = lines > _QUIET * band.highest
     if not np.any(np.isfinite(density[quiet])):
@@ -164,7 +164,7 @@ def _line_bases(
     time = (np.arange(size) - 0.5 * (size - 1)) / rate
     design = np.ones((size, 1))
     if frequency:
-        orders = min(MOST_HARMONICS, int(_HIGHEST * highest / frequency), max(1, size // 8))
+        orders = min(MOST_HARMONICS, int(_HIGHEST_LINE * highest / frequency), max(1, size // 8))
         basis = harmonic_basis(time, frequency, orders)
         design = np.concatenate([basis, (time / time[-1])[:, None] * basis[:, :3]], axis=1)
     known, _ = np.linalg.qr(design)

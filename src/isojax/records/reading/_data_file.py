@@ -25,7 +25,7 @@ _READERS: Mapping[str, Callable[[Path, Sequence[str]], dict[str, Column]]] = {
     ".tdms": read_tdms_columns,
 }
 
-_SAME_RATE = 1e-6
+_RATE_MATCH = 1e-6
 """Relative difference of the rates of two channels that are sampled together."""
 
 _WHOLE_SHIFT = 0.05
@@ -68,7 +68,7 @@ def _aligned(file: Path, columns: dict[str, Column]) -> dict[str, Column]:
     if stated:
         first, reference = next(iter(stated.items()))
         for name, column in stated.items():
-            if abs(column.rate / reference.rate - 1.0) > _SAME_RATE:  # type: ignore[operator]
+            if abs(column.rate / reference.rate - 1.0) > _RATE_MATCH:  # type: ignore[operator]
                 raise ValueError(
                     f"{file}: channel `{name}` is sampled at {column.rate:.9g} Hz, but `{first}` at "
                     f"{reference.rate:.9g} Hz; resample them to one rate"

@@ -123,11 +123,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "applied": _flag(default=True),
         "compensate": _flag(),
     },
-    "model": {
-        "stiffness": _names(("linear",)),
-        "damping": _names(("linear",)),
-        "elements": _names(()),
-    },
+    "model": {"stiffness": _names(("linear",)), "damping": _names(("linear",)), "elements": _names(())},
 }
 RECORD: Mapping[str, Field] = {
     "file": _file(required=True),
@@ -142,7 +138,7 @@ RECORD: Mapping[str, Field] = {
     "schedule": _file(),
     "kind": _choice(*get_args(ExcitationKind)),
 }
-__REQUIRED_SECTIONS = ("campaign", "input", "output")
+_REQUIRED_SECTIONS = ("campaign", "input", "output")
 _ABSENT_SECTIONS = ("floor", "filter")
 """Sections that are None where the file has none; of the others every field is then at its default."""
 
@@ -187,10 +183,9 @@ def read_declaration(path: str | Path) -> Declaration:
     _check_names(file, "the file", table, (*SECTIONS, "record"), "section")
     sections: dict[str, Any] = {}
     for name, fields in SECTIONS.items():
-        if name not in table and name in __REQUIRED_SECTIONS:
-            raise ValueError(
-                f"{file}: section [{name}] is missing; it must hold {listing(_required(fields))}"
-            )
+        if name not in table and name in _REQUIRED_SECTIONS:
+            needed = [name for name, field in fields.items() if field.required]
+            raise ValueError(f"{file}: section [{name}] is missing; it must hold {listing(needed)}")
         absent = name not in table
         sections[name] = (
             None
@@ -220,10 +215,6 @@ def _parse(file: Path) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{file} is not valid TOML: {error}") from error
-
-
-def _required(fields: Mapping[str, Field]) -> list[str]:
-    return [name for name, field in fields.items() if field.required]
 
 
 def _check_names(file: Path, where: str, table: Mapping[str, Any], known: tuple[str, ...], what: str) -> None:

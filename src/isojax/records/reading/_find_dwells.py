@@ -13,7 +13,7 @@ from jaxtyping import Float
 from .._record import Dwell
 from ..spectrum import harmonic_basis
 
-_FEWEST_CYCLES = 4
+_FEWEST_DWELL_CYCLES = 4
 """Cycles of one frequency without which a segment is no dwell."""
 
 _MOST_CROSSINGS = 6000
@@ -95,7 +95,9 @@ def crossing_lines(crossings: Float[np.ndarray, " crossing"]) -> list[tuple[int,
         )
         # Two crossings always lie on a line: the penalty of short lines keeps noise from being fitted by
         # pairs.
-        cost = best[first] + error + penalty + np.where(size < _FEWEST_CYCLES, 2.0 * penalty * size, 0.0)
+        cost = (
+            best[first] + error + penalty + np.where(size < _FEWEST_DWELL_CYCLES, 2.0 * penalty * size, 0.0)
+        )
         came[last] = int(np.argmin(cost))
         best[last] = cost[came[last]]
     runs, last = [], count
@@ -116,9 +118,11 @@ def segment_dwells(signal: Float[np.ndarray, " time"], rate: float) -> tuple[Dwe
         Dwells in order of time; empty where the signal is no stepped sine (no segment of four equal cycles).
     """
     crossings = rising_crossings(signal, rate)
-    if not _FEWEST_CYCLES <= crossings.size <= _MOST_CROSSINGS:
+    if not _FEWEST_DWELL_CYCLES <= crossings.size <= _MOST_CROSSINGS:
         return ()
-    runs = [(first, last) for first, last in crossing_lines(crossings) if last - first >= _FEWEST_CYCLES]
+    runs = [
+        (first, last) for first, last in crossing_lines(crossings) if last - first >= _FEWEST_DWELL_CYCLES
+    ]
     lines = [
         (first, last, *np.polyfit(np.arange(first, last), crossings[first:last], 1)) for first, last in runs
     ]

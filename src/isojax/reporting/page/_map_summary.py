@@ -43,16 +43,16 @@ def map_summary(
     ]
     if count.any():
         unstable = np.any(layers >= 1.0, axis=0)
-        lines.append(("unstable", f"{_cells(unstable)} an unstable orbit{_where(smap, unstable)}"))
+        lines.append(("unstable", f"{_cells_holding(unstable)} an unstable orbit{_where(smap, unstable)}"))
         if coexisting:
-            lines.append(("several", f"{_cells(several)} several orbits{_where(smap, several)}"))
+            lines.append(("several", f"{_cells_holding(several)} several orbits{_where(smap, several)}"))
         row, column = np.unravel_index(int(np.nanargmax(worst)), worst.shape)
         place = f"{quantity(amplitudes[row], unit)}, {quantity(frequencies[column], 'Hz')}"
         lines.append(("largest |µ|", f"{worst[row, column]:.4f} at {place}"))
         steps = smap.integrator.steps_per_period
         lines.append(("error", f"{smap.error:.1e} in |µ| by integration, {steps} steps a period"))
     if folds is not None:
-        lines.append(("folds", _folds(folds, unit)))
+        lines.append(("folds", _fold_curve_words(folds, unit)))
     lines.append(("not found", _missing(smap, count, coexisting)))
     for name, (compiling, running) in (seconds or {}).items():
         words = f"{compiling + running:.1f} s: {compiling:.1f} s compiling, {running:.1f} s running"
@@ -65,7 +65,7 @@ def _span(axis: np.ndarray, unit: str) -> str:
     return f"{axis[0]:.4g} to {quantity(axis[-1], unit)}" if axis.size > 1 else quantity(axis[0], unit)
 
 
-def _cells(mask: np.ndarray) -> str:
+def _cells_holding(mask: np.ndarray) -> str:
     total = int(mask.sum())
     return f"{total} cell{'' if total == 1 else 's'} hold{'s' if total == 1 else ''}"
 
@@ -87,7 +87,7 @@ def _scope(smap: StabilityMap, coexisting: bool) -> str:
     return kind if coexisting else f"that of smallest motion in each, others not sought; {kind}"
 
 
-def _folds(folds: FoldCurve, unit: str) -> str:
+def _fold_curve_words(folds: FoldCurve, unit: str) -> str:
     ends = [
         f"{quantity(float(c.amplitude), unit)}, {quantity(float(c.frequency), 'Hz')}" for c in folds.cusps
     ]

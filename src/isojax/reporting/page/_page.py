@@ -38,7 +38,7 @@ _VERDICTS = {
     "partly_explained": "partly explained",
     "unexplained": "unexplained",
 }
-_MOST = 12
+_RANKS_ON_PAGE = 12
 
 
 def render_page(loop: Loop, health: CampaignHealth | None = None) -> str:
@@ -75,11 +75,11 @@ def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
                 "effect": one.effect,
                 "words": effect_words(one.effect),
                 "lines": finding_words(one),
-                "ranking": [_candidate(candidate, campaign) for candidate in one.ranking[:_MOST]],
+                "ranking": [_candidate(candidate, campaign) for candidate in one.ranking[:_RANKS_ON_PAGE]],
             }
             for one in loop.findings
         ],
-        "last_ranking": [_candidate(candidate, campaign) for candidate in loop.last.ranking[:_MOST]],
+        "last_ranking": [_candidate(candidate, campaign) for candidate in loop.last.ranking[:_RANKS_ON_PAGE]],
         "unit": typeset_unit(OUTPUT_UNITS[quantity]),
         "errors": error_rows(before, after),
         "declared": _elements(before),

@@ -59,14 +59,7 @@ class Picture(NamedTuple):
 
 
 def encode(figure: Figure) -> str:
-    """Give a figure as PNG in base64.
-
-    Args:
-        figure: the figure.
-
-    Returns:
-        The text.
-    """
+    """Give a figure as PNG in base64."""
     page = BytesIO()
     figure.savefig(page, format="png", dpi=_DPI)
     return base64.b64encode(page.getvalue()).decode("ascii")
@@ -99,12 +92,7 @@ def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture
 
 
 def _draw(
-    name: str,
-    caption: str,
-    plot: Callable[..., Figure],
-    *args: Any,
-    wide: bool = False,
-    **options: Any,
+    name: str, caption: str, plot: Callable[..., Figure], *args: Any, wide: bool = False, **options: Any
 ) -> tuple[Picture, ...]:
     """Draw one picture, as a row of its own to join to others."""
     size = (_WHOLE if wide else _HALF, _HEIGHT)

@@ -7,7 +7,7 @@ from ..._parameters import list_parameters
 from ..._results import is_successful
 from ...health import CampaignHealth
 from ...identification import Errors, Finding, Fit, Loop, plain_unit
-from ..words import health_dict, remainder_dict
+from ..words import finite_or_none, health_dict, remainder_dict
 
 SCHEMA = 1
 
@@ -29,59 +29,55 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
     return {
         "schema": SCHEMA,
         "campaign": loop.campaign.title,
-        "before": _fit(loop.before),
+        "before": _fit_dict(loop.before),
         "verdict": loop.verdict,
-        "findings": [_finding(finding) for finding in loop.findings],
-        "after": _fit(loop.after),
+        "findings": [_finding_dict(finding) for finding in loop.findings],
+        "after": _fit_dict(loop.after),
         "bounds": {
-            effect: {"upper": _number(upper), "unit": plain_unit(unit, loop.campaign)}
+            effect: {"upper": finite_or_none(upper), "unit": plain_unit(unit, loop.campaign)}
             for effect, (upper, unit) in loop.bounds.items()
         },
-        "seconds": _number(loop.seconds),
+        "seconds": finite_or_none(loop.seconds),
         **({} if health is None else {"health": health_dict(health)}),
         **({} if remainder is None else {"remainder": remainder_dict(remainder)}),
     }
 
 
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _fit(fit: Fit) -> dict[str, Any]:
+def _fit_dict(fit: Fit) -> dict[str, Any]:
     errors, found = fit.standard_errors, is_successful(fit.result)
     return {
         "elements": [element.name for element in fit.model.elements],
         "parameters": {
             entry.name: {
-                "value": _number(float(entry.value)) if found or entry.name not in errors else None,
-                "standard_error": _number(errors.get(entry.name, math.nan)),
+                "value": finite_or_none(float(entry.value)) if found or entry.name not in errors else None,
+                "standard_error": finite_or_none(errors.get(entry.name, math.nan)),
                 "unit": plain_unit(entry.spec.unit, fit.campaign),
             }
             for entry in list_parameters(fit.model)
         },
-        "error": {role: _errors(fit.errors[role]) for role in ("fit", "holdout")},
+        "error": {role: _error_dict(fit.errors[role]) for role in ("fit", "holdout")},
     }
 
 
-_ERRORS = ("rmse", "nrmse", "nrmse_segments", "chi2_per_dof")
+_ERROR_FIELDS = ("rmse", "nrmse", "nrmse_segments", "chi2_per_dof")
 
 
-def _errors(errors: Errors | None) -> dict[str, float | None] | None:
-    return None if errors is None else {name: _number(getattr(errors, name)) for name in _ERRORS}
+def _error_dict(errors: Errors | None) -> dict[str, float | None] | None:
+    return None if errors is None else {name: finite_or_none(getattr(errors, name)) for name in _ERROR_FIELDS}
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
+def _finding_dict(finding: Finding) -> dict[str, Any]:
     return {
         "effect": finding.effect,
         "indistinguishable": list(finding.indistinguishable),
-        "p_value": _number(finding.p_value),
-        "excess_explained": _number(finding.excess_explained),
+        "p_value": finite_or_none(finding.p_value),
+        "excess_explained": finite_or_none(finding.excess_explained),
         "ranking": [
             {
                 "effect": candidate.effect,
-                "z": _number(candidate.z),
-                "p_value": _number(candidate.p_value),
-                "delta_bic": _number(candidate.delta_bic),
+                "z": finite_or_none(candidate.z),
+                "p_value": finite_or_none(candidate.p_value),
+                "delta_bic": finite_or_none(candidate.delta_bic),
                 "admissible": candidate.admissible,
             }
             for candidate in finding.ranking

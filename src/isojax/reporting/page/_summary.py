@@ -26,7 +26,7 @@ from ..words import (
 )
 from ..words import typeset_with_error as with_error
 
-_MOST = 8
+_RANKS_IN_SUMMARY = 8
 
 
 def render_text(content: RenderableType, width: int = 110) -> str:
@@ -168,7 +168,7 @@ def ranking_table(ranking: Sequence[Candidate]) -> Table:
         A table for rich.
     """
     table = _table("Effects, best first", "effect", "z", "p", "strength", "χ²/dof", "ΔBIC", "admissible")
-    for one in ranking[:_MOST]:
+    for one in ranking[:_RANKS_IN_SUMMARY]:
         table.add_row(
             one.effect,
             typeset_number(one.z, 3),

@@ -16,7 +16,7 @@ from ._stability_style import (
     draw_special_points,
     drive_unit,
     level_colours,
-    parameter_words,
+    parameter_label,
     quantity,
     stability_legend,
 )
@@ -44,7 +44,7 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
             )
     figure, ax = axes_for(ax, 6.4, 3.8)
     kinds: set[str] = set()
-    curves = [(one, place) for one in (branch, *others) for place in range(_count(one))]
+    curves = [(one, place) for one in (branch, *others) for place in range(_motion_count(one))]
     unstable = False
     for (one, place), colour in zip(curves, level_colours(len(curves)), strict=True):
         points = one.points
@@ -55,7 +55,7 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
         draw_curve(ax, x, MILLIMETRES * y, stable, colour, _level(one, place) if len(curves) > 1 else "")
     for one in (branch, *others):
         kinds |= set(draw_special_points(ax, [_placed(one, point) for point in one.special_points]))
-    ax.set_xlabel(parameter_words(branch.model, branch.parameter))
+    ax.set_xlabel(parameter_label(branch.model, branch.parameter))
     ax.set_ylabel("response, half peak to peak [mm]")
     entitle(ax, "Periodic response" + (f" at {_level(branch, 0)}" if len(curves) == 1 else ""))
     stability_legend(ax, kinds, unstable=unstable)
@@ -89,7 +89,7 @@ def plot_frequency_response(
     branch = response.branch
     shift = np.asarray(response.amplitude) * MILLIMETRES
     values = shift if what == "displacement" else np.degrees(np.asarray(response.phase))
-    count, unstable = _count(branch), False
+    count, unstable = _motion_count(branch), False
     places = []
     for place, colour in zip(range(count), level_colours(count), strict=True):
         x, y, stable = (_row(np.asarray(v), place) for v in (response.frequency, values, response.stable))
@@ -97,7 +97,7 @@ def plot_frequency_response(
         draw_curve(ax, x, y, stable, colour, _level(branch, place))
         for point in response.special_points:
             if point.branch == place:
-                nearest = _nearest(branch, place, point)
+                nearest = _nearest_point(branch, place, point)
                 height = MILLIMETRES * nearest[1] if what == "displacement" else y[nearest[0]]
                 places.append((point, float(point.frequency), float(height)))
     kinds = draw_special_points(ax, places)
@@ -208,7 +208,7 @@ def _draw_backbone(ax: Axes, backbone: BackboneCurve) -> list[Line2D]:
     ]
 
 
-def _count(branch: Branch) -> int:
+def _motion_count(branch: Branch) -> int:
     return branch.points.value.shape[0] if branch.points.value.ndim == 2 else 1
 
 
@@ -229,7 +229,7 @@ def _level(branch: Branch, place: int) -> str:
     return ", ".join(words) + (f", period {branch.periods}" if branch.periods > 1 else "")
 
 
-def _nearest(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:
+def _nearest_point(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:
     """Give the point of a branch that is nearest to a bifurcation, and the response in between."""
     states = (
         np.asarray(branch.points.y0) if branch.points.y0.ndim == 2 else np.asarray(branch.points.y0[place])
@@ -250,5 +250,5 @@ def _nearest(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, floa
 
 
 def _placed(branch: Branch, point: SpecialPoint) -> tuple[SpecialPoint, float, float]:
-    _, response = _nearest(branch, point.branch, point)
+    _, response = _nearest_point(branch, point.branch, point)
     return point, float(point.value), MILLIMETRES * response

@@ -13,7 +13,7 @@ from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle, pair
 
 _LIKE = "#8fb8de"
 _WRONG = "#f0d5d0"
-_MOST = 10
+_RANKS_IN_PLOT = 10
 
 
 def plot_ranking(
@@ -34,7 +34,7 @@ def plot_ranking(
     Returns:
         The figure.
     """
-    shown = list(ranking)[:_MOST]
+    shown = list(ranking)[:_RANKS_IN_PLOT]
     figure, ax = axes_for(ax, height=0.9 + 0.27 * max(3, len(shown)))
     kinds = [_kind(candidate, effect, indistinguishable) for candidate in shown]
     styles = {

@@ -49,14 +49,11 @@ def plot_fold_curve(curve: FoldCurve, *, excitation: str = "force", ax: Axes | N
     ax.legend(handles=handles, fontsize=7.5, frameon=False)
     state = "closed" if bool(curve.closed) else "leaves the window"
     ends = [
-        f"{np.nanmin(v):.4g} to {np.nanmax(v):.4g} {u}" for v, u in _ranges(frequency, amplitude, excitation)
+        f"{np.nanmin(values):.4g} to {np.nanmax(values):.4g} {unit}"
+        for values, unit in ((frequency, "Hz"), (amplitude, drive_unit(excitation)))
     ]
     entitle(ax, f"Folds: inside, orbits coexist and one is unstable ({state})\n{ends[0]}, {ends[1]}")
     return figure
-
-
-def _ranges(frequency: np.ndarray, amplitude: np.ndarray, excitation: str) -> list[tuple[np.ndarray, str]]:
-    return [(frequency, "Hz"), (amplitude, drive_unit(excitation))]
 
 
 def draw_lens(ax: Axes, curve: FoldCurve, *, filled: bool) -> list[Any]:

@@ -122,12 +122,7 @@ def effect_on_its_own(model: Isolator, effect: str) -> Isolator:
 
 
 def plot_effect(
-    fit: Fit,
-    effect: str,
-    amplitudes: Sequence[float],
-    frequency: float,
-    *,
-    ax: Axes | None = None,
+    fit: Fit, effect: str, amplitudes: Sequence[float], frequency: float, *, ax: Axes | None = None
 ) -> Figure:
     """Draw the force of one effect around a steady cycle: line, curve, loop or rectangle.
 

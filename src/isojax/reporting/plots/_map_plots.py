@@ -19,8 +19,8 @@ _STABLE = ("#08306b", "#2f7fbc", "#9ccbe3", "#e8f3fa")
 _UNSTABLE = ("#fdae3d", "#e8552d", "#8e0f1f")
 _EMPTY = "#d4d4d4"
 _OUTLINE = "#111111"
-_TONES = 256
-_ROOM = 1e-3
+_COLOURS = 256
+_LEAST_SPAN = 1e-3
 """Least range of the colours beyond one."""
 
 _LEAST = 1e-9
@@ -137,20 +137,20 @@ def _caption(smap: StabilityMap) -> str:
 
 
 def _colormap(colours: tuple[str, ...]) -> Colormap:
-    return LinearSegmentedColormap.from_list("isojax", colours, _TONES)
+    return LinearSegmentedColormap.from_list("isojax", colours, _COLOURS)
 
 
 def _about_one(radius: Float[np.ndarray, "amplitude frequency"]) -> tuple[Colormap, Normalize]:
     """Give colours that break at one, and the range that they span."""
     seen = radius[np.isfinite(radius)]
-    low = min(float(seen.min(initial=1.0)), 1.0 - _ROOM)
+    low = min(float(seen.min(initial=1.0)), 1.0 - _LEAST_SPAN)
     high = float(seen.max(initial=0.0))
     if high < 1.0:
         return _colormap(_STABLE), Normalize(low, 1.0)
-    below = LinearSegmentedColormap.from_list("below", _STABLE, _TONES)(np.linspace(0.0, 1.0, _TONES))
-    above = LinearSegmentedColormap.from_list("above", _UNSTABLE, _TONES)(np.linspace(0.0, 1.0, _TONES))
-    both = LinearSegmentedColormap.from_list("isojax", np.concatenate([below, above]), 2 * _TONES)
-    return both, TwoSlopeNorm(1.0, low, max(high, 1.0 + _ROOM))
+    below = LinearSegmentedColormap.from_list("below", _STABLE, _COLOURS)(np.linspace(0.0, 1.0, _COLOURS))
+    above = LinearSegmentedColormap.from_list("above", _UNSTABLE, _COLOURS)(np.linspace(0.0, 1.0, _COLOURS))
+    both = LinearSegmentedColormap.from_list("isojax", np.concatenate([below, above]), 2 * _COLOURS)
+    return both, TwoSlopeNorm(1.0, low, max(high, 1.0 + _LEAST_SPAN))
 
 
 def _ticks(norm: Normalize) -> list[float]:

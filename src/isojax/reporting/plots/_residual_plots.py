@@ -12,10 +12,10 @@ from ._over_time import draw_signal, finish_time_axes, is_dense, shown_samples
 from ._style import BAND, ROLES, axes_for, entitle, pair
 from ._time_history_plots import worst_window
 
-_SMOOTH = 60
+_SMOOTHED_POINTS = 60
 """A window is smoothed over this share of its length, where it is short enough for a curve."""
 
-_PHASES = 36
+_PHASE_BINS = 36
 """Pieces of a cycle over which a residual is averaged."""
 
 
@@ -48,7 +48,7 @@ def plot_residual(
         values = fit.restarts.runs[place].residual[shown]
         if not is_dense(values):
             ax.plot(time, values, color=colour, linewidth=0.6, alpha=0.3)
-            length = max(1, values.size // _SMOOTH)
+            length = max(1, values.size // _SMOOTHED_POINTS)
             values = np.convolve(values, np.ones(length) / length, mode="same")
             label = f"{label}, smoothed"
         draw_signal(ax, time, values, colour=colour, label=label, width=1.6)
@@ -156,12 +156,12 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
     _, place, dwell = max(dwells, key=lambda entry: entry[0])
     record = before.restarts.runs[place].record
     phase = np.arange(dwell.stop - dwell.start) * dwell.frequency / record.rate % 1.0
-    part = np.minimum((phase * _PHASES).astype(int), _PHASES - 1)
-    count = np.maximum(np.bincount(part, minlength=_PHASES), 1)
-    degrees = (np.arange(_PHASES) + 0.5) * 360.0 / _PHASES
+    part = np.minimum((phase * _PHASE_BINS).astype(int), _PHASE_BINS - 1)
+    count = np.maximum(np.bincount(part, minlength=_PHASE_BINS), 1)
+    degrees = (np.arange(_PHASE_BINS) + 0.5) * 360.0 / _PHASE_BINS
     for label, fit, colour in pair(before, after):
         values = fit.restarts.runs[place].residual[dwell.start : dwell.stop]
-        mean = np.bincount(part, values, minlength=_PHASES) / count
+        mean = np.bincount(part, values, minlength=_PHASE_BINS) / count
         ax.plot(degrees, mean, "o-", color=colour, markersize=3, linewidth=1.0, label=label)
     band = 2.0 * before.noise.sigma / np.sqrt(count)
     ax.fill_between(degrees, -band, band, color=BAND, zorder=0, label="noise of the mean, ±2σ")

@@ -15,7 +15,7 @@ from ._style import AFTER, BEFORE, LEVELS
 
 MILLIMETRES = 1e3
 
-_UNSTABLE = (0, (4, 2))
+_DASHES = (0, (4, 2))
 
 
 class Mark(NamedTuple):
@@ -68,7 +68,7 @@ def drive_unit(excitation: str) -> str:
     return "N" if excitation == "force" else typeset_unit("m/s^2")
 
 
-def parameter_words(model: Isolator, parameter: str) -> str:
+def parameter_label(model: Isolator, parameter: str) -> str:
     """Give what an axis of a branch's parameter is called.
 
     Args:
@@ -112,21 +112,13 @@ def draw_curve(
     touched[:-1] |= unstable[1:]
     ax.plot(x, np.where(stable, y, np.nan), color=colour, linewidth=1.6, label=label or None)
     if unstable.any():
-        ax.plot(x, np.where(touched, y, np.nan), color=colour, linewidth=1.3, linestyle=_UNSTABLE)
+        ax.plot(x, np.where(touched, y, np.nan), color=colour, linewidth=1.3, linestyle=_DASHES)
 
 
 def draw_special_points(
     ax: Axes, points: Iterable[tuple[SpecialPoint | Any, float, float]]
 ) -> tuple[str, ...]:
-    """Mark bifurcations.
-
-    Args:
-        ax: the axes.
-        points: each with its place.
-
-    Returns:
-        The kinds that were drawn.
-    """
+    """Mark bifurcations."""
     found: dict[str, list[tuple[float, float]]] = {}
     for point, x, y in points:
         if np.isfinite(x) and np.isfinite(y):
@@ -148,23 +140,12 @@ def _form(mark: Mark) -> dict[str, Any]:
 
 
 def mark_handle(kind: str) -> Line2D:
-    """Give the entry of a bifurcation in a legend.
-
-    Args:
-        kind: of the bifurcation.
-
-    Returns:
-        The handle.
-    """
+    """Give the entry of a bifurcation in a legend."""
     return Line2D([], [], label=MARKS[kind].words, **_form(MARKS[kind]))
 
 
 def stability_legend(
-    ax: Axes,
-    kinds: Iterable[str] = (),
-    *,
-    unstable: bool = True,
-    extra: Iterable[Any] = (),
+    ax: Axes, kinds: Iterable[str] = (), *, unstable: bool = True, extra: Iterable[Any] = ()
 ) -> None:
     """Write what solid, dashed and the markers mean, below what is labelled already.
 
@@ -178,21 +159,14 @@ def stability_legend(
     grey = "#555555"
     handles.append(Line2D([], [], color=grey, linewidth=1.6, label="stable"))
     if unstable:
-        handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_UNSTABLE, label="unstable"))
+        handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_DASHES, label="unstable"))
     handles += [mark_handle(kind) for kind in MARKS if kind in set(kinds)]
     handles += list(extra)
     ax.legend(handles=handles, fontsize=7.5, frameon=False)
 
 
 def level_colours(count: int) -> tuple[str, ...]:
-    """Give a colour for each of some curves, lowest level first.
-
-    Args:
-        count: of the curves.
-
-    Returns:
-        The colours.
-    """
+    """Give a colour for each of some curves, lowest level first."""
     return (AFTER,) if count == 1 else tuple(LEVELS[place % len(LEVELS)] for place in range(count))
 
 

@@ -62,10 +62,5 @@ def axes_for(ax: Axes | None, width: float = 7.0, height: float = 3.2) -> tuple[
 
 
 def entitle(ax: Axes, title: str) -> None:
-    """Write the title over axes, to the left.
-
-    Args:
-        ax: the axes.
-        title: what is to be seen.
-    """
+    """Write the title over axes, to the left."""
     ax.set_title(title, fontsize=9.5, loc="left")

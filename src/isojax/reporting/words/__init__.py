@@ -11,6 +11,7 @@ from ._health_words import dwell_words as dwell_words
 from ._health_words import health_dict as health_dict
 from ._health_words import mains_words as mains_words
 from ._quantities import INPUT_WORDS as INPUT_WORDS
+from ._quantities import finite_or_none as finite_or_none
 from ._quantities import typeset_goodness as typeset_goodness
 from ._quantities import typeset_number as typeset_number
 from ._quantities import typeset_p_value as typeset_p_value

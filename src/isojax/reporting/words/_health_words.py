@@ -6,10 +6,17 @@ from collections.abc import Sequence
 from ..._parameters import list_parameters
 from ...health import REACH, CampaignHealth, DwellStability
 from ...identification import DriftBudget, Finding, Fit, plain_unit
-from ._quantities import INPUT_WORDS, typeset_number, typeset_share, typeset_unit, typeset_with_error
+from ._quantities import (
+    INPUT_WORDS,
+    finite_or_none,
+    typeset_number,
+    typeset_share,
+    typeset_unit,
+    typeset_with_error,
+)
 from ._sentences import effect_words, own_strength, scatter_words
 
-_MOST_PLACES = 6
+_MOST_NAMED = 6
 
 _NEAR = 0.05
 """A fold within this share of the drive counts as near."""
@@ -103,8 +110,8 @@ def mains_words(health: CampaignHealth, unit: str) -> tuple[str, ...]:
         f"dwell at {frequency:.2f} Hz: harmonic {order} falls on {mains:g} Hz"
         for frequency, order, mains in sorted(met)
     ]
-    shown = "; ".join(places[:_MOST_PLACES]) + (
-        f"; {len(places) - _MOST_PLACES} more" if places[_MOST_PLACES:] else ""
+    shown = "; ".join(places[:_MOST_NAMED]) + (
+        f"; {len(places) - _MOST_NAMED} more" if places[_MOST_NAMED:] else ""
     )
     if not health.hum:
         hidden = f"No hum of the mains stands out; where it could hide: {shown}."
@@ -191,43 +198,43 @@ def health_dict(health: CampaignHealth) -> dict[str, object]:
         Numbers and words; None where a number is not finite. A dwell without a reason and without folds has
         none within reach.
     """
-
-    def number(value: float) -> float | None:
-        return float(value) if math.isfinite(value) else None
-
     return {
         "dwells": [
             {
                 "record": one.record,
-                "frequency": number(one.dwell.frequency),
-                "amplitude": number(one.amplitude),
-                "spectral_radius": number(one.spectral_radius),
-                "fold_amplitude": number(one.fold_amplitude),
-                "fold_frequency": number(one.fold_frequency),
+                "frequency": finite_or_none(one.dwell.frequency),
+                "amplitude": finite_or_none(one.amplitude),
+                "spectral_radius": finite_or_none(one.spectral_radius),
+                "fold_amplitude": finite_or_none(one.fold_amplitude),
+                "fold_frequency": finite_or_none(one.fold_frequency),
                 "reason": one.reason,
             }
             for one in health.dwells
         ],
         "hum": [
-            {"record": one.record, "frequency": number(one.frequency), "amplitude": number(one.amplitude)}
+            {
+                "record": one.record,
+                "frequency": finite_or_none(one.frequency),
+                "amplitude": finite_or_none(one.amplitude),
+            }
             for one in health.hum
         ],
         "mains_collisions": [
             {
                 "record": one.record,
-                "frequency": number(one.dwell.frequency),
+                "frequency": finite_or_none(one.dwell.frequency),
                 "harmonic": one.order,
-                "mains": number(one.mains),
+                "mains": finite_or_none(one.mains),
             }
             for one in health.collisions
         ],
-        "stiffness_scatter": number(health.budget.scatter),
-        "stiffness_scatter_within_records": number(health.budget.within),
+        "stiffness_scatter": finite_or_none(health.budget.scatter),
+        "stiffness_scatter_within_records": finite_or_none(health.budget.within),
         "repeatability": {
             share.name: {
-                "noise": number(share.noise),
-                "repeatability": number(share.repeatability),
-                "pretended": number(share.if_ignored),
+                "noise": finite_or_none(share.noise),
+                "repeatability": finite_or_none(share.repeatability),
+                "pretended": finite_or_none(share.if_ignored),
             }
             for share in health.budget.shares
         },

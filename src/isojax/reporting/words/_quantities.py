@@ -27,6 +27,11 @@ def typeset_unit(unit: str) -> str:
     return "" if unit == "1" else re.sub(r"\^(-?\d+)", lambda found: found.group(1).translate(_RAISED), unit)
 
 
+def finite_or_none(value: float) -> float | None:
+    """Give a number as JSON holds it: None where it is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
 def typeset_number(value: float, digits: int = 4) -> str:
     """Give a number with a power of ten where that reads better.
 

@@ -5,10 +5,10 @@ import re
 from typing import Any
 
 from ...identification import Loop, Pursuit, Remainder
-from ._quantities import typeset_goodness, typeset_number, typeset_share, typeset_unit
+from ._quantities import finite_or_none, typeset_goodness, typeset_number, typeset_share, typeset_unit
 from ._quantities import typeset_with_error as with_error
 
-_RAISED = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
+_RAISED_FACTORS = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
 
 
 def remainder_summary(loop: Loop) -> tuple[str, ...]:
@@ -52,7 +52,7 @@ def pursuit_words(pursuit: Pursuit) -> str:
 
 def _typeset_formula(formula: str) -> str:
     """Give a force law with raised exponents: "|x|¹·⁵ v" for "|x|^1.5 v"."""
-    return re.sub(r"\^([0-9.]+)", lambda match: match[1].translate(_RAISED), formula)
+    return re.sub(r"\^([0-9.]+)", lambda match: match[1].translate(_RAISED_FACTORS), formula)
 
 
 def law_rows(pursuit: Pursuit) -> list[dict[str, str]]:
@@ -91,20 +91,16 @@ def remainder_dict(remainder: Remainder) -> dict[str, Any]:
         "laws": [
             {
                 "formula": law.formula,
-                "coefficient": _number(law.coefficient),
-                "standard_error": _number(law.error),
+                "coefficient": finite_or_none(law.coefficient),
+                "standard_error": finite_or_none(law.error),
                 "unit": law.unit,
-                "share": _number(law.share),
+                "share": finite_or_none(law.share),
                 "alike": list(law.alike),
             }
             for law in pursuit.laws
         ],
         "laws_tried": pursuit.tried,
-        "chi2_per_dof": _number(pursuit.chi2_per_dof),
-        "chi2_per_dof_linear": _number(pursuit.linear),
-        "chi2_per_dof_refitted": _number(pursuit.refitted),
+        "chi2_per_dof": finite_or_none(pursuit.chi2_per_dof),
+        "chi2_per_dof_linear": finite_or_none(pursuit.linear),
+        "chi2_per_dof_refitted": finite_or_none(pursuit.refitted),
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -81,7 +81,7 @@ def error_words(before: Fit, after: Fit) -> str:
     return f"{place} {typeset_goodness(first.chi2_per_dof, 2)} → {typeset_goodness(last.chi2_per_dof, 2)}"
 
 
-WORSE = 0.01
+LEAST_RISE = 0.01
 """Rise of the held-out chi2/dof that matters, where chance does not explain it."""
 
 _CHANCE = 0.01
@@ -104,12 +104,6 @@ def doubt_words(loop: Loop) -> str:
     """Give what held-out records say against the finding.
 
     They never change a verdict, or they would not be held out; but the reader must know.
-
-    Args:
-        loop: the closed loop.
-
-    Returns:
-        A sentence, or nothing where they agree.
     """
     before, after = loop.before.errors["holdout"], loop.after.errors["holdout"]
     if before is None or after is None or not loop.findings or not is_successful(loop.after.result):
@@ -120,7 +114,7 @@ def doubt_words(loop: Loop) -> str:
     if last <= loop.rules.good or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
         return ""
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
-    if rise > WORSE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
+    if rise > LEAST_RISE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
         return "The held-out records contradict it: they are predicted worse than without it."
     if loop.verdict == "found":
         return (
@@ -132,7 +126,7 @@ def doubt_words(loop: Loop) -> str:
 def _verdict_words(loop: Loop) -> str:
     if not is_successful(loop.after.result):
         return f"The fit failed, so there is no statement about the model. {RESULTS[loop.after.result]}"
-    found = [_found(loop.after, one) for one in loop.findings]
+    found = [_finding_sentence(loop.after, one) for one in loop.findings]
     effects, error = " and ".join(found), error_words(loop.before, loop.after)
     verb = "were" if len(found) > 1 else "was"
     if loop.verdict == "none":
@@ -156,7 +150,7 @@ def _verdict_words(loop: Loop) -> str:
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
 
 
-def _found(fit: Fit, finding: Finding) -> str:
+def _finding_sentence(fit: Fit, finding: Finding) -> str:
     others = [effect_words(name) for name in finding.indistinguishable if name != finding.effect]
     words = f"{effect_words(finding.effect)}, {strength_words(fit, finding.effect)}"
     return (

@@ -112,12 +112,7 @@ def basins_of_attraction(
 
 @eqx.filter_jit
 def _settled(
-    model: Isolator,
-    excitation: Harmonic,
-    how: Watch,
-    state: State,
-    looks: int,
-    repetition: Repetition,
+    model: Isolator, excitation: Harmonic, how: Watch, state: State, looks: int, repetition: Repetition
 ) -> tuple[Float[Array, "sample lane state"], Int[Array, " lane"]]:
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
 

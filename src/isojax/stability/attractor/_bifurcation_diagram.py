@@ -143,9 +143,9 @@ def bifurcation_diagram(
         legs = ("anew",)
     else:
         legs = ("up", "down") if direction == "both" else (direction,)
-        path, growth = _turned(model, how, points, legs, lanes)
+        path, growth = _swept(model, how, points, legs, lanes)
     runs = tuple(leg for leg in legs for _ in range(lanes[0].size))
-    judged = _judge(points[1], path, growth, Repetition(longest, tolerance))
+    judged = _classify_motions(points[1], path, growth, Repetition(longest, tolerance))
     shown = (values[:, 0] if single else jnp.swapaxes(values, 0, 1) for values in judged)
     kept, period, exponent, chaotic, finite = shown
     result = bounded_or_not(finite)
@@ -190,7 +190,7 @@ def _seen(
 
 
 @eqx.filter_jit
-def _turned(
+def _swept(
     model: Isolator, how: Watch, points: Points, legs: tuple[str, ...], begin: State
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
     def point(carry: tuple[State, State], setting: tuple[Array, Array]) -> Any:
@@ -221,7 +221,7 @@ def _anew(
 
 
 @eqx.filter_jit
-def _judge(
+def _classify_motions(
     frequencies: Float[Array, " point"],
     path: Float[Array, "point run sample state"],
     growth: Float[Array, "point run sample"],

@@ -10,11 +10,11 @@ from ..._results import RESULTS
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State
-from ..orbit import recorded_sine, trajectory
+from ..orbit import AbstractStatePath, recorded_sine, trajectory
 from ._stroboscope import bounded_or_not, check_counts, settle_down, start_states
 
 
-class PhasePortrait(eqx.Module):
+class PhasePortrait(AbstractStatePath):
     """The motion over some drive periods.
 
     Attributes:
@@ -26,16 +26,6 @@ class PhasePortrait(eqx.Module):
     time: Float[Array, " time"]
     states: Float[Array, "time state"]
     result: RESULTS
-
-    @property
-    def displacement(self) -> Float[Array, " time"]:
-        """[m]."""
-        return self.states[:, 0]
-
-    @property
-    def velocity(self) -> Float[Array, " time"]:
-        """[m/s]."""
-        return self.states[:, 1]
 
 
 def phase_portrait(

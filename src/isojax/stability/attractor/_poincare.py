@@ -13,11 +13,11 @@ from ..._results import RESULTS
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, advance
-from ..orbit import Sine, recorded_sine, trajectory
+from ..orbit import AbstractStatePath, Sine, recorded_sine, trajectory
 from ._stroboscope import Watch, bounded_or_not, check_counts, settle_down, start_states
 
 
-class PoincareSection(eqx.Module):
+class PoincareSection(AbstractStatePath):
     """Points of the settled motion at fixed phases of the drive.
 
     Attributes:
@@ -29,16 +29,6 @@ class PoincareSection(eqx.Module):
     phases: Float[Array, " phase"]
     states: Float[Array, "phase period state"]
     result: RESULTS
-
-    @property
-    def displacement(self) -> Float[Array, "phase period"]:
-        """[m]."""
-        return self.states[..., 0]
-
-    @property
-    def velocity(self) -> Float[Array, "phase period"]:
-        """[m/s]."""
-        return self.states[..., 1]
 
 
 def poincare_section(
@@ -88,11 +78,7 @@ def poincare_section(
 
 @eqx.filter_jit
 def _section(
-    model: Isolator,
-    excitation: Harmonic,
-    phases: Float[Array, " phase"],
-    state: State,
-    how: Watch,
+    model: Isolator, excitation: Harmonic, phases: Float[Array, " phase"], state: State, how: Watch
 ) -> PoincareSection:
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
     integrator, steps = how.integrator, how.integrator.steps_a_period(model)

@@ -61,14 +61,7 @@ class Watched(NamedTuple):
 
 
 def any_disturbance(state: State) -> State:
-    """Give a disturbance that has a share in every direction.
-
-    Args:
-        state: the state that it goes with.
-
-    Returns:
-        One value a state.
-    """
+    """Give a disturbance that has a share in every direction."""
     return tuple(jnp.ones_like(value) for value in state)
 
 

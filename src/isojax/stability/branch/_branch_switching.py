@@ -15,11 +15,7 @@ _ASIDE = 0.25
 
 
 def switch_branch(
-    branch: Branch,
-    special_point: SpecialPoint,
-    *,
-    step: float | None = None,
-    most: int = 1000,
+    branch: Branch, special_point: SpecialPoint, *, step: float | None = None, most: int = 1000
 ) -> Branch:
     """Follow the branch that leaves at a period doubling or at a broken symmetry.
 

@@ -233,7 +233,7 @@ def trace(
 
 
 @eqx.filter_jit
-def _points(
+def _branch_points(
     family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
 ) -> BranchPoints:
     def lane(
@@ -270,7 +270,7 @@ def assemble(
     # Rounded up, so that few shapes are compiled.
     room = min(-(-max(int(counts.max()), 2) // 128) * 128, followed.unknowns.shape[1])
     unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
-    points = _points(family, method, scale, unknowns, tangents)
+    points = _branch_points(family, method, scale, unknowns, tangents)
     special = find_special_points(family, method, scale, unknowns, tangents, counts)
     longest = int(counts.max())
 

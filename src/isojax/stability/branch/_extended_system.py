@@ -140,12 +140,7 @@ def _pair_equations(motion: _Motion, shares: Array) -> tuple[Equations, Array]:
         a, b = one[:states], other[:states]
         norm = jnp.stack([functional @ a - 1.0, functional @ b])
         closed = [moved - place[:states], missed]
-        pair = [
-            first - cosine * a + sine * b,
-            first_missed,
-            second - sine * a - cosine * b,
-            second_missed,
-        ]
+        pair = [first - cosine * a + sine * b, first_missed, second - sine * a - cosine * b, second_missed]
         return jnp.concatenate([*closed, *pair, norm])
 
     parts = [motion.unknown, motion.lift(real), motion.lift(imaginary), angle[None], shares]
@@ -285,14 +280,5 @@ polish_jitted = eqx.filter_jit(polish)
 
 
 def first_places(family: ParameterFamily, states: int, turns: float) -> int:
-    """Give how many crossings of kinks to make room for first.
-
-    Args:
-        family: isolators and drives.
-        states: count of states.
-        turns: drive periods.
-
-    Returns:
-        Four a kink and period.
-    """
+    """Give how many crossings of kinks to make room for first."""
     return math.ceil(4 * len(family.model.kinks((jnp.zeros(()),) * states)) * turns)

@@ -201,7 +201,7 @@ def find_special_points(
     located = _locate(there, method, scale[lane], ends, change, _BISECTIONS)
     crossed, points = _crossed(family, method), []
     for branch, test, found, matrix, repeats in zip(lanes, kinds, *located, strict=False):
-        judged = _judge(int(test), method, np.asarray(matrix))
+        judged = _kind_of_sign_change(int(test), method, np.asarray(matrix))
         if test == 0 and crossed is not None and _distance(crossed[0], repeats) < _SAME_MOTION:
             judged = crossed
         if judged is not None:
@@ -245,7 +245,7 @@ def _is_fold(family: ParameterFamily, scale: Array, point: SpecialPoint, crossin
     return _distance(crossing, repeats) >= _SAME_MOTION
 
 
-def _judge(
+def _kind_of_sign_change(
     which: int, method: ShootingMethod, matrix: np.ndarray
 ) -> tuple[BifurcationKind, ShootingMethod] | None:
     """Say which bifurcation a sign change is that is no crossing, or None for two real multipliers."""
@@ -260,11 +260,7 @@ def _judge(
 
 
 def special_point(
-    family: ParameterFamily,
-    method: ShootingMethod,
-    kind: BifurcationKind,
-    branch: int,
-    guess: PointGuess,
+    family: ParameterFamily, method: ShootingMethod, kind: BifurcationKind, branch: int, guess: PointGuess
 ) -> SpecialPoint:
     """Give a bifurcation found from a start, the motion split at its kinks.
 

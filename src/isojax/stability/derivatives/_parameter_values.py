@@ -28,8 +28,7 @@ def with_values(model: Isolator, names: Sequence[str], numbers: Float[Array, " p
     entries = list_parameters(model)
     places = {name: place for place, name in enumerate(names)}
     return replace_parameters(
-        model,
-        [numbers[places[entry.name]] if entry.name in places else entry.value for entry in entries],
+        model, [numbers[places[entry.name]] if entry.name in places else entry.value for entry in entries]
     )
 
 

@@ -16,7 +16,7 @@ from ..orbit import Orbit, find_periodic_orbit
 from ._map_derivatives import map_slopes
 from ._parameter_values import differentiate, drive_values, with_values
 
-Slopes = tuple[Mapping[str, Array], Mapping[str, Array]]
+Derivatives = tuple[Mapping[str, Array], Mapping[str, Array]]
 """Quantities by name, and their derivatives, parameter first."""
 
 
@@ -33,7 +33,7 @@ class Subject(NamedTuple):
     model: Isolator
     drive: tuple[Array, Array] | None
     solved: tuple[str, ...]
-    slopes: Callable[[tuple[str, ...], Array], Slopes]
+    slopes: Callable[[tuple[str, ...], Array], Derivatives]
 
 
 def _of_orbit(orbit: Orbit) -> Subject:
@@ -47,7 +47,7 @@ def _of_orbit(orbit: Orbit) -> Subject:
 @eqx.filter_jit
 def _orbit_slopes(
     orbit: Orbit, drive: tuple[Array, Array], symmetric: bool, names: tuple[str, ...], at: Array
-) -> Slopes:
+) -> Derivatives:
     def quantities(numbers: Array) -> dict[str, Array]:
         found = find_periodic_orbit(
             with_values(orbit.model, names, numbers),
@@ -78,7 +78,7 @@ def _of_point(point: SpecialPoint) -> Subject:
     guess = PointGuess(jax.lax.stop_gradient(point.y0), family.shares(point.value[None]))
     solved = tuple(f"drive.{own}" if own in ("amplitude", "frequency") else own for own in family.names)
 
-    def slopes(names: tuple[str, ...], at: Array) -> Slopes:
+    def slopes(names: tuple[str, ...], at: Array) -> Derivatives:
         def quantities(numbers: Array) -> dict[str, Array]:
             model, drive = with_values(family.model, names, numbers), drive_values(names, numbers, fixed)
             there = ParameterFamily(model, *drive, family.start, family.stop, family.names)
@@ -91,7 +91,7 @@ def _of_point(point: SpecialPoint) -> Subject:
 
 
 def _of_function(function: Callable[[Isolator], Mapping[str, Array] | Array], model: Isolator) -> Subject:
-    def slopes(names: tuple[str, ...], at: Array) -> Slopes:
+    def slopes(names: tuple[str, ...], at: Array) -> Derivatives:
         def quantities(numbers: Array) -> Mapping[str, Array]:
             given = function(with_values(model, names, numbers))
             return given if isinstance(given, Mapping) else {"value": jnp.asarray(given)}

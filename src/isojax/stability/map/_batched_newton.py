@@ -247,15 +247,7 @@ class CellSolver(eqx.Module):
 
 
 def padded(values: np.ndarray, size: int) -> np.ndarray:
-    """Fill up to a fixed length by repeating the last value, so that one compiled step serves.
-
-    Args:
-        values: the values.
-        size: the length.
-
-    Returns:
-        Values of that length.
-    """
+    """Fill up to a fixed length by repeating the last value, so that one compiled step serves."""
     return np.concatenate([values, np.repeat(values[-1:], size - values.shape[0], axis=0)])
 
 

@@ -21,14 +21,7 @@ FEWEST = 1024
 
 
 def fingerprint(*parts: object) -> str:
-    """Give a short word that distinguishes one map from another.
-
-    Args:
-        *parts: models, integrators, arrays, numbers.
-
-    Returns:
-        Hexadecimal word.
-    """
+    """Give a short word that distinguishes one map from another."""
     word = hashlib.sha256()
     for part in parts:
         leaves, structure = jax.tree_util.tree_flatten(part)

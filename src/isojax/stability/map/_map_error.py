@@ -60,14 +60,6 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
     """Give the steps a period at which the multipliers of a map are as good as its integrator promises.
 
     From a sample of orbits and the order of the integrator: the error falls with the fourth power.
-
-    Args:
-        solver: with the steps that are tried.
-        candidates: of the map.
-        window: of the map.
-
-    Returns:
-        Steps a period, even.
     """
     integrator = solver.method.integrator
     picked = np.unique(np.linspace(0, candidates.force.size - 1, SAMPLED).astype(int))
@@ -88,17 +80,7 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
 
 
 def lanes_of(found: Found, candidates: Candidates, window: MapWindow, picked: np.ndarray) -> Lane:
-    """Give orbits that were found as starts.
-
-    Args:
-        found: the orbits.
-        candidates: what they were found from.
-        window: of the map.
-        picked: which of them.
-
-    Returns:
-        Lanes.
-    """
+    """Give orbits that were found as starts."""
     push = window.amplitudes[candidates.force[picked]]
     sine, cosine = (jnp.asarray(push * part) for part in found.direction[picked].T)
     drive = Sine(sine, cosine, jnp.asarray(window.frequencies[candidates.frequency[picked]]))

@@ -61,15 +61,7 @@ class PlacedSurface(NamedTuple):
 
 
 def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"]) -> Candidates:
-    """Find every orbit of the surface that a force of the window holds.
-
-    Args:
-        surface: the orbits over displacement and frequency.
-        forces: drive amplitudes, ascending.
-
-    Returns:
-        One candidate for each passage of the surface through a force.
-    """
+    """Find every orbit of the surface that a force of the window holds."""
     # The count of forces below the surface; between two nodes it changes by the forces that are passed.
     rank = np.searchsorted(forces, surface.force).astype(np.int32)
     low, high = np.minimum(rank[:, :-1], rank[:, 1:]), np.maximum(rank[:, :-1], rank[:, 1:])

@@ -176,17 +176,7 @@ def _displacements(model: Isolator, window: MapWindow) -> tuple[float, float, fl
 
 
 def find_surface(model: Isolator, integrator: Integrator, half: bool, window: MapWindow) -> Surface:
-    """Find the orbits over displacement and frequency that a window of force and frequency can hold.
-
-    Args:
-        model: the isolator.
-        integrator: steps a period.
-        half: whether to seek symmetric orbits by the half-period map.
-        window: of the map.
-
-    Returns:
-        The surface at the frequencies given.
-    """
+    """Find the orbits over displacement and frequency that a window of force and frequency can hold."""
     (rest, low, high), frequencies = _displacements(model, window), window.frequencies
     displacements, columns = _GRID_NODES
     single = len(frequencies) == 1

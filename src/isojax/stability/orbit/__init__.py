@@ -32,4 +32,5 @@ from ._split_period_map import find_split as find_split
 from ._split_period_map import split_image as split_image
 from ._split_period_map import split_jacobian as split_jacobian
 from ._split_period_map import state_scale as state_scale
+from ._state_path import AbstractStatePath as AbstractStatePath
 from ._symmetry import is_odd as is_odd

@@ -118,10 +118,7 @@ def imposed_balance(
 
 
 def response_amplitudes(
-    model: Isolator,
-    frequency: Lanes,
-    amplitudes: Float[Array, " amplitude"],
-    rest: Lanes | float = 0.0,
+    model: Isolator, frequency: Lanes, amplitudes: Float[Array, " amplitude"], rest: Lanes | float = 0.0
 ) -> Lanes:
     """Give the drive amplitude that each displacement amplitude needs, to one harmonic.
 

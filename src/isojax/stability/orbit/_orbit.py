@@ -23,6 +23,7 @@ from ._period_map import trajectory
 from ._shooting import ShootingSolution, shoot
 from ._shooting_method import ShootingMethod
 from ._sine import recorded_sine
+from ._state_path import AbstractStatePath
 from ._symmetry import is_odd
 
 _CROSSINGS = 4
@@ -36,7 +37,7 @@ _SYMMETRIC_TO = 1e-4
 sampled with the steps of maps, whose error at a kink is a few times 1e-5."""
 
 
-class Orbit(eqx.Module):
+class Orbit(AbstractStatePath):
     """A periodic orbit of the forced isolator.
 
     Attributes:
@@ -62,16 +63,6 @@ class Orbit(eqx.Module):
     states: Float[Array, "time state"]
     error: Float[Array, ""]
     result: RESULTS
-
-    @property
-    def displacement(self) -> Float[Array, " time"]:
-        """[m]."""
-        return self.states[:, 0]
-
-    @property
-    def velocity(self) -> Float[Array, " time"]:
-        """[m/s]."""
-        return self.states[:, 1]
 
     @property
     def amplitude(self) -> Float[Array, ""]:
@@ -224,14 +215,14 @@ def _orbit(
     mirrored = jnp.array(True) if method.half else jnp.all(apart <= _SYMMETRIC_TO * size)
     time = jnp.linspace(0.0, 1.0, path.shape[0]) * method.periods / excitation.frequency
     return Orbit(
-        model,
-        excitation,
-        method.periods,
-        solution.state * blank,
-        floquet,
-        found & (mirrored if method.periods == 1 else False),
-        time,
-        path * blank,
-        solution.error * blank,
-        result,
+        model=model,
+        excitation=excitation,
+        periods=method.periods,
+        y0=solution.state * blank,
+        floquet=floquet,
+        symmetric=found & (mirrored if method.periods == 1 else False),
+        time=time,
+        states=path * blank,
+        error=solution.error * blank,
+        result=result,
     )

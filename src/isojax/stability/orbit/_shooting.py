@@ -13,14 +13,7 @@ from ._kink_crossings import find_crossings
 from ._period_map import period_map, trajectory
 from ._shooting_method import ShootingMethod
 from ._sine import Sine
-from ._split_period_map import (
-    FEWEST_STEPS,
-    Split,
-    kink_scale,
-    split_image,
-    state_scale,
-    steps_wanted,
-)
+from ._split_period_map import FEWEST_STEPS, Split, kink_scale, split_image, state_scale, steps_wanted
 
 _MOST_STEPS_A_PIECE = 1 << 14
 """Steps a piece at most, for an orbit."""

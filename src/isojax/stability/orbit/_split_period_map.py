@@ -164,16 +164,7 @@ def state_scale(path: State) -> Float[Array, " state"]:
 
 
 def kink_scale(model: Isolator, path: State, crossings: Crossings) -> Float[Array, " crossing"]:
-    """Give the size of the kink function that belongs to each crossing.
-
-    Args:
-        model: the isolator.
-        path: states, time first.
-        crossings: where the motion passes kinks.
-
-    Returns:
-        Sizes.
-    """
+    """Give the size of the kink function that belongs to each crossing."""
     kinks = model.kinks(path)
     if not kinks:
         return jnp.ones(crossings.phases.shape)

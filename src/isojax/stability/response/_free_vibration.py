@@ -15,7 +15,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 _PLACES, _SHARES = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 """Gauss's nodes and weights on [0, 1]."""
 
-_HALVINGS = 60
+_BISECTIONS = 60
 """Halvings of the interval in which the other turning point lies: as far as float64 goes."""
 
 _MET = 1e-9
@@ -85,7 +85,7 @@ def natural_frequencies(model: Isolator, amplitudes: Float[Array, " point"]) -> 
         trials = amplitude * jnp.asarray(np.linspace(0.0, _WIDEST, _PLACES_TRIED))
         first = jnp.argmax(jax.vmap(excess)(trials) > 0.0)
         begin = (trials[jnp.maximum(first - 1, 0)], trials[first])
-        low, high = jax.lax.fori_loop(0, _HALVINGS, halve, begin)
+        low, high = jax.lax.fori_loop(0, _BISECTIONS, halve, begin)
         mirrored = jnp.abs(excess(amplitude)) <= _ALIKE * jnp.abs(energy)
         depth = jax.lax.stop_gradient(jnp.where(mirrored, amplitude, 0.5 * (low + high)))
         # One step with the derivative kept: by the implicit function theorem it carries that of the root.
