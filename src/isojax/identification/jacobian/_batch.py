@@ -147,8 +147,12 @@ def prepare(
     def known(place: int) -> tuple[_Table, tuple[np.ndarray, ...], dict[str, np.ndarray]]:
         record = records[place]
         extra = {name: channel_table(name, record, hold, substeps, shift) for name in channels}
-        table = tabulate(record.input, record.rate, hold, substeps, shift)
-        return table, coordinate_motion(record, quantity, based), extra
+        # The last table is kept: it is large, and the next fit to these records mostly asks for it again.
+        tables, key = record.once("drive table", dict), (hold, substeps, shift)
+        if key not in tables:
+            tables.clear()
+            tables[key] = tabulate(record.input, record.rate, hold, substeps, shift)
+        return tables[key], coordinate_motion(record, quantity, based), extra
 
     with ThreadPoolExecutor(workers()) as pool:
         used = sorted({segment.record for segment in segments})
