@@ -140,6 +140,7 @@ class Trial:
         with tempfile.TemporaryDirectory() as folder:
             self.campaign: Campaign = read_campaign(simulated(drawn, Path(folder))[1])
         self.scales = scales(self.campaign)
+        self.guess = classical_guess(self.campaign)
         self.known: list = []
 
     def outcome(self, rules: Rules) -> Outcome:
@@ -148,7 +149,7 @@ class Trial:
         try:
             for module, name, function in originals:
                 setattr(module, name, remembered(function, self.known))
-            guess = remembered(classical_guess, self.known)(self.campaign, rules=rules)
+            guess = self.guess
             before = remembered(fit, self.known)(guess.model, self.campaign, rules=rules)
             search = Search(self.scales, rules, max_steps=rules.evaluations, tolerance=rules.converged)
             extensions, last = search_effects(before, search, 3)

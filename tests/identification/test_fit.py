@@ -19,7 +19,7 @@ from isojax.elements import (
     MaxwellBranch,
 )
 from isojax.excitations import Sampled
-from isojax.identification import Rules, fit, scales
+from isojax.identification import fit, scales
 from isojax.identification.fitting._build_problem import build_problem
 from isojax.identification.fitting._estimate import estimate
 from isojax.identification.fitting._fit import simulator_for
@@ -86,7 +86,7 @@ def test_covariance_is_the_same_from_three_starts(linear):
     for stiffness, damping in ((9e5, 5e3), (1.25e6, 2e4), (1.08e6, 1e4)):
         start = START.replace(linear_stiffness__coefficient=stiffness, linear_damping__coefficient=damping)
         found = estimate(
-            simulator_for(start, linear, estimate_noise(linear), ONE_STEP, Rules()),
+            simulator_for(start, linear, estimate_noise(linear), ONE_STEP),
             start,
             (1, 2),
             Search(scales(linear), max_steps=40, tolerance=1e-12),
@@ -350,7 +350,7 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
     problem = _stiff_problem(simulated, model)
     coarse, fine = step_error(problem, model, 1), step_error(problem, model, 2)
     assert coarse / fine == pytest.approx(16.0, rel=0.35)
-    chosen = find_integrator(problem, model, 0.05).integrator
+    chosen = find_integrator(problem, model).integrator
     assert chosen.substeps > 1
     assert (
         step_error(problem, model, chosen.substeps) <= 0.05 < step_error(problem, model, chosen.substeps // 2)
@@ -360,7 +360,7 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
 def test_an_element_with_a_sharp_law_keeps_its_own_steps(simulated):
     model = START.with_elements(LugreFriction(1.0, 1e-3, 0.0, 1e-2, 1e-3))
     problem = _stiff_problem(simulated, model)._replace(noise=1e3)
-    assert find_integrator(problem, model, 0.05).integrator.substeps == LugreFriction.substeps
+    assert find_integrator(problem, model).integrator.substeps == LugreFriction.substeps
     # Dry friction is split at its reversals instead.
     model = START.with_elements(CoulombFriction(1.0, 1.0))
-    assert find_integrator(problem, model, 0.05).integrator.substeps == 1
+    assert find_integrator(problem, model).integrator.substeps == 1

@@ -136,7 +136,7 @@ def close_loop(
         raise ValueError(f"Argument `excluded` must hold catalogue names, but {unknown[0]!r} is none.")
     start = time.perf_counter()
     progress(Stage("classical guess"))
-    guess = classical_guess(campaign, rules=rules)
+    guess = classical_guess(campaign)
     progress(Stage("fit of the declared model"))
     before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
@@ -207,8 +207,10 @@ def _grow(
     A good fit is diagnosed like any other: a second effect may still stand out of the residual.
     """
     extensions: tuple[Extension, ...] = ()
-    current, significance = before, search.rules.significance
+    current = before
     while True:
+        # Halved after each addition: the levels of all searches sum up to twice the first.
+        significance = search.rules.significance / 2 ** len(extensions)
         search.progress(Stage(f"diagnosis {len(extensions) + 1}: which effect is missing"))
         verdict = diagnose_with(search, current, before.estimate.excess, significance, excluded)
         search.progress(KeyFigure(verdict.reason))
@@ -216,7 +218,6 @@ def _grow(
             return extensions, verdict
         extensions = (*extensions, extend(current, verdict))
         current = extensions[-1].after
-        significance *= search.rules.significance_factor
 
 
 def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules: Rules) -> VerdictWord:

@@ -36,7 +36,7 @@ def upper_bounds(
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {
         score.element.name: (
-            abs(score.strength) + 1.96 * inflation * score.error,
+            abs(score.strength) + rules.determined * inflation * score.error,
             strength_unit(score.element),
         )
         for score in test.scores

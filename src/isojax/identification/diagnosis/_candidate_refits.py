@@ -10,9 +10,9 @@ from .._rules import Rules
 from ..fitting import Estimate, Fit, Rival, Search
 from ..guess import find_balance_start
 from ._admissibility import find_violation
-from ._evidence import by_evidence, least_difference
+from ._evidence import by_evidence
 from ._imitations import find_simpler_pair
-from ._refit import Refit, follows_freely, is_determined, refit_candidate, refit_from
+from ._refit import Refit, follows_freely, is_determined, least_difference, refit_candidate, refit_from
 from ._score import Score, ScoreTest
 
 
@@ -72,11 +72,6 @@ def refit_candidates(case: Case) -> list[Refit]:
             continue
         if strongest is not None and score.z**2 < rules.worth_refit * strongest**2:
             break
-        # The score says what one linear step could gain at most when the model is near; far away it only
-        # ranks.
-        largest_gain = rules.smallest_gain / rules.score_optimism
-        if case.chi2_per_dof <= rules.good and score.z**2 / case.fitted.dof < largest_gain:
-            continue
         strongest = score.z if strongest is None else strongest
         refits.append(_refit(case, index, refits, ""))
     refits = _without_imitations(case, refits)
@@ -119,19 +114,13 @@ def _correlated(case: Case, refits: list[Refit]) -> list[int]:
 
 
 def _rival(refits: list[Refit], rules: Rules) -> Rival | None:
-    """Give what a further candidate must not stay far behind.
-
-    One that leaves nothing to explain could only be equalled: what comes no nearer at once never will.
-    """
+    """Give what a further candidate must not stay far behind."""
     best = min(
         (one.estimate for one in refits if one.violation is None), key=lambda one: one.chi2, default=None
     )
     if best is None:
         return None
-    far = rules.rival_distance * least_difference(best, rules)
-    if best.chi2 / best.dof < 1.0 + rules.spotless_gain * rules.smallest_gain:
-        return Rival(best.chi2, far, rules.spotless_patience, rules.spotless_share)
-    return Rival(best.chi2, far, rules.rival_patience, rules.rival_share)
+    return Rival(best.chi2, rules.rival_distance * least_difference(best, rules), rules.rival_patience)
 
 
 def _violation(case: Case, found: Estimate, score: Score) -> str | None:
@@ -161,7 +150,7 @@ def _refit_from_balance(case: Case) -> Refit | None:
     """Refit the effect that the balance of measured forces asks for, if there is one."""
     fit, test, search = case.fit, case.test, case.search
     absent = tuple(score.element for score in test.scores)
-    start = find_balance_start(fit.campaign, fit.model, search.scales, absent, case.rules)
+    start = find_balance_start(fit.campaign, fit.model, search.scales, absent)
     if start is None:
         return None
     search.progress(f"refit with {start.element.name}, from the balance of measured forces")

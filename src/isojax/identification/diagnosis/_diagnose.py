@@ -11,9 +11,9 @@ from .._rules import Rules
 from ..fitting import DEFAULT_SOLVER, Estimate, Fit, Search, search_of, silent
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
-from ._evidence import by_evidence, least_difference, rank_candidates, smallest_inflation
+from ._evidence import by_evidence, rank_candidates, smallest_inflation
 from ._findings import Candidate, Finding, Verdict
-from ._refit import Refit, bic, refit_to_convergence, rivals
+from ._refit import Refit, bic, least_difference, refit_to_convergence, rivals
 from ._score import absent_effects, score_test
 from ._separating_words import is_exact, separating_experiment
 from ._transfer import transferred_share

@@ -2,10 +2,9 @@
 
 from ..._parameters import list_parameters
 from .._rules import Rules
-from ..fitting import Estimate
 from ._bounds import strength_unit
 from ._findings import Candidate
-from ._refit import Refit, bic, strength_place
+from ._refit import Refit, bic, least_difference, strength_place
 from ._score import Score, ScoreTest
 
 
@@ -27,11 +26,6 @@ def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
 
     first = min((one for one in usable if bic(one.estimate, inflation) <= most), key=simplicity)
     return [first, *(one for one in usable if one is not first)]
-
-
-def least_difference(found: Estimate, rules: Rules) -> float:
-    """Give the difference of Schwarz's criterion up to which two effects are indistinguishable."""
-    return max(rules.close_bic, rules.smallest_gain * found.dof)
 
 
 def smallest_inflation(usable: list[Refit]) -> float:

@@ -26,11 +26,10 @@ class _Opponent(NamedTuple):
 def _best_addition(found: Estimate, excluded: str, opponent: _Opponent, search: Search) -> Estimate | None:
     """Add the one effect that makes a model clearly better than another of as many coefficients."""
     rules, other = search.rules, opponent.estimate
-    search = search._replace(max_steps=rules.partner_evaluations)
     test = score_test(found, search, absent_effects(found.model, search.scales, (excluded,)))
     tried = 0
     for index, score in enumerate(test.scores):
-        if tried == rules.tried or found.chi2 - rules.room * score.z**2 > other.chi2:
+        if tried == rules.survivors or found.chi2 - score.z**2 > other.chi2:
             break
         if not score.admissible:
             continue
@@ -88,14 +87,13 @@ def find_superfluous(final: Estimate, names: tuple[str, ...], search: Search) ->
     Returns:
         Its catalogue name, or None where each is needed.
     """
-    short = search._replace(max_steps=search.rules.partner_evaluations)
     for name in names:
         if final.model.element(name) is None:  # a later one contains it
             continue
         search.progress(f"is {name} still needed?")
         left = tuple(element for element in final.model.elements if element.name != name)
         model = Isolator(final.model.mass, left, final.model.excitation)
-        without = refit_from(final, model, short)
+        without = refit_from(final, model, search)
         if without.result != RESULTS.successful:
             continue
 

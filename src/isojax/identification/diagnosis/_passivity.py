@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...elements import AbstractElement
-from .._rules import Rules
 
 CYCLES = 6
 """Cycles of the motion; the work is that of the last, so that no internal state depends on its start."""
@@ -17,6 +16,9 @@ STEPS = 1024
 
 STEADY = 1e-2
 """Share of its range by which a settled force may differ between the last two cycles."""
+
+ROUNDING = 1e-3
+"""Share of the elastic energy of a loop up to which its work is the error of the steps."""
 
 
 @eqx.filter_jit
@@ -81,14 +83,13 @@ def work_per_cycle(
     return np.where(rings, np.mean(works, axis=0), works[-1]), 0.5 * reach * amplitude
 
 
-def find_activity(element: AbstractElement, largest_x: float, largest_v: float, rules: Rules) -> str | None:
+def find_activity(element: AbstractElement, largest_x: float, largest_v: float) -> str | None:
     """Find how an element with internal states feeds energy into the visited motion, if it does.
 
     Args:
         element: the element.
         largest_x: largest displacement visited [m].
         largest_v: largest velocity visited [m/s].
-        rules: the smaller loop that is tried, too, and the energy that is rounding.
 
     Returns:
         A sentence, or None where every loop takes energy, the element is declared active, or it has no
@@ -99,12 +100,11 @@ def find_activity(element: AbstractElement, largest_x: float, largest_v: float, 
     shape = element.unphysical_shape(largest_x)
     if shape is not None:
         return f"its {element.words} {shape}"
-    shares = np.array([rules.smaller_loop, 1.0])
-    amplitude = largest_x * shares
+    amplitude = largest_x * np.array([0.25, 1.0])  # a passive law is so over smaller loops, too
     work, elastic = work_per_cycle(element, amplitude, np.full(2, largest_v / largest_x))
     if not np.all(np.isfinite(work)):
         return f"its {element.words} diverges over the visited loop"
-    if not element.active and np.any(work < -rules.energy_tolerance * elastic):
+    if not element.active and np.any(work < -ROUNDING * elastic):
         where = 1e3 * float(amplitude[int(np.argmin(work / np.maximum(elastic, 1e-300)))])
         return f"its {element.words} feeds energy into a loop of {where:.3g} mm, within the visited motion"
     return None

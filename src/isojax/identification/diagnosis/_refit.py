@@ -9,6 +9,7 @@ from ..._parameters import list_parameters, own_parameters, replace_parameters
 from ..._results import RESULTS
 from ...elements import AbstractElement
 from ...models import Isolator
+from .._rules import Rules
 from ..fitting import (
     Estimate,
     Nuisances,
@@ -21,6 +22,9 @@ from ..fitting import (
 )
 from ..jacobian import has_stiffness_scale
 from ._score import Score, ScoreTest
+
+STEP_SHARES = (1.0, 0.3, 0.03)
+"""Shares of the score's linear step at which a refit may start: the first that lowers chi2."""
 
 
 class Refit(NamedTuple):
@@ -42,7 +46,7 @@ def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
     fitted, score = test.fitted, test.scores[index]
     best: tuple[float, Isolator, Nuisances] | None = None
     places = _free_places(fitted, fitted.model.with_elements(score.element))
-    for share in search.rules.step_shares:
+    for share in STEP_SHARES:
         model = _extended(fitted, score.element, share * score.strength, share * test.steps[index])
         old, new = fitted.point.nuisances, test.nuisances[index]
         motion = old.states[:, :2] + share * (new.states[:, :2] - old.states[:, :2])
@@ -67,8 +71,7 @@ def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
     # Beside a fold the initial states that followed the steps may lie on the other branch: the measured ones
     # again.
     search.progress("the search stalled: again, from the measured states")
-    steps = int(search.rules.second_try * search.max_steps)
-    again = refit_from(found, found.model, search._replace(max_steps=steps, rival=None))
+    again = refit_from(found, found.model, search._replace(rival=None))
     return again if again.chi2 <= found.chi2 else found
 
 
@@ -100,8 +103,7 @@ def refit_from(fitted: Estimate, model: Isolator, search: Search, far: bool = Fa
 
 def _rough(search: Search, fitted: Estimate) -> Search:
     """Give the search of a refit that is only ranked: with many samples smaller steps separate nothing."""
-    rules = search.rules
-    return search._replace(tolerance=max(rules.rough, rules.rough_share * rules.smallest_gain * fitted.dof))
+    return search._replace(tolerance=search.rules.rough * least_difference(fitted, search.rules))
 
 
 def bic(found: Estimate, inflation: float) -> float:
@@ -119,6 +121,11 @@ def bic(found: Estimate, inflation: float) -> float:
     samples = float(np.log(found.point.samples.sum()))
     taken = found.misfit - found.chi2
     return found.chi2 / inflation + taken + (len(found.places) + phases) * samples
+
+
+def least_difference(found: Estimate, rules: Rules) -> float:
+    """Give the difference of Schwarz's criterion up to which two effects are indistinguishable."""
+    return max(rules.close_bic, rules.smallest_gain * found.dof)
 
 
 def _free_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
@@ -162,7 +169,6 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
 def refit_to_convergence(found: Estimate, search: Search) -> Estimate:
     """Take a rough refit to the end of its search, with the scatter that repeats show beside its law."""
     search.progress("the finding, fitted to the end")
-    search = search._replace(max_steps=search.rules.final_evaluations)
     again = estimate(found.simulator, found.model, found.places, search, found.point.nuisances, anew=True)
     # With another scatter another sum is made least.
     comparable = again.point.nuisances.spread == found.point.nuisances.spread

@@ -79,7 +79,7 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
         on the unseen part.
     """
     seen, unseen = _split(fitted, extended, search.rules)
-    search, excess = search._replace(max_steps=search.rules.transfer_evaluations), []
+    excess = []
     for found in (fitted, extended):
         search.progress("carry-over: refit on a part of the data")
         nuisances = found.point.nuisances

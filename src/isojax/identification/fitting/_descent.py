@@ -201,7 +201,8 @@ def descend(
         rival = search.rival
         if rival is not None:
             behind = best.chi2 - rival.chi2
-            if behind > rival.far and _gain(reached, rival.patience) < rival.share * behind:
+            pace = _gain(reached, rival.patience) / rival.patience
+            if behind > rival.far and pace * search.max_steps < behind:
                 result = RESULTS.outdone
                 break
         if refused == MOST_REFUSALS or (idle and is_least):

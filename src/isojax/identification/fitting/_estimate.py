@@ -138,34 +138,36 @@ def magnitudes(model: Isolator, places: tuple[int, ...], scales: Scales) -> tupl
     return tuple(sizes)
 
 
-def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: float, rules: Rules) -> float:
+SMALLEST_SCATTER = 1e-5
+"""Least scatter of the linear stiffness between records [relative]: that of a rig whose repeats show none."""
+
+
+def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: float) -> float:
     """Give the standard deviation of the linear stiffness between repeats of a record.
 
     Repeats at equal level and direction share every deterministic error of the model, so that their
     differences show repeatability alone; without repeats, records of equal level serve, then all records.
 
     Args:
-        records: the records.
+        records: the records, two at least.
         point: equations with loose stiffness scales.
         inflation: chi2/dof.
-        rules: the smallest scatter, and the one to assume where no two records can be compared.
 
     Returns:
         Relative standard deviation.
     """
     values = (point.nuisances.stiffness + point.reduced.stiffness_map[:, -1]) * STIFFNESS_SCALE_UNIT
     variance = point.reduced.stiffness_variance * max(1.0, inflation)
+    groups: list[list[int]] = []
     for key in (lambda r: (r.level, r.direction), lambda r: r.level, lambda r: None):
-        groups = defaultdict(list)
+        alike = defaultdict(list)
         for place, record in enumerate(records):
-            groups[key(record)].append(place)
-        groups = [group for group in groups.values() if len(group) > 1]
-        if groups:
-            squares = sum(np.sum((values[group] - values[group].mean()) ** 2) for group in groups)
-            expected = sum(np.mean(variance[group]) * (len(group) - 1) for group in groups)
-            freedom = sum(len(group) - 1 for group in groups)
-            return float(np.sqrt(max((squares - expected) / freedom, rules.smallest_scatter**2)))
-    return rules.single_scatter
+            alike[key(record)].append(place)
+        groups = groups or [group for group in alike.values() if len(group) > 1]
+    squares = sum(np.sum((values[group] - values[group].mean()) ** 2) for group in groups)
+    expected = sum(np.mean(variance[group]) * (len(group) - 1) for group in groups)
+    freedom = sum(len(group) - 1 for group in groups)
+    return float(np.sqrt(max((squares - expected) / freedom, SMALLEST_SCATTER**2)))
 
 
 def _spread(
@@ -174,14 +176,14 @@ def _spread(
     """Estimate the scatter of the stiffness between records, beside that within them."""
     records = simulator.problem.records
     if len(records) == 1:
-        return Spread(rules.smallest_scatter, within)
+        return Spread(SMALLEST_SCATTER, within)
     inflation = _inflation(point)
     loose = Spread(rules.first_scatter, within)
     if point.nuisances.spread != loose:
         # What scatters within records moves their means, too, and must not count twice.
         directions = one_hot(point.model, places, [1.0] * len(places))
         point = simulator.evaluate(point.model, directions, point.nuisances._replace(spread=loose))
-    return Spread(stiffness_scatter(records, point, inflation, rules), within)
+    return Spread(stiffness_scatter(records, point, inflation), within)
 
 
 def _check_delay(model: Isolator, places: tuple[int, ...], hold: Hold) -> None:
@@ -232,7 +234,11 @@ def estimate(
     known, scatters = nuisances is not None, has_stiffness_scale(model)
     sizes = magnitudes(model, places, search.scales)
     # The scatter of the stiffness is estimated at a rough solution; the search goes on from there.
-    rough = max(search.tolerance, search.rules.rough) if scatters and not known else search.tolerance
+    rough = (
+        max(search.tolerance, search.rules.rough * search.rules.close_bic)
+        if scatters and not known
+        else search.tolerance
+    )
     start = _start(simulator, model, nuisances, Spread(search.rules.first_scatter))
     found = descend(simulator, model, places, sizes, start, search._replace(tolerance=rough))
     steps = found.steps
@@ -268,8 +274,7 @@ def _with_scatter(
     """Give the nuisances with the scatter that repeats show; None where it is known and stays as it is."""
     problem, old, rules = simulator.problem, point.nuisances, search.rules
     within = segment_scatter(problem.records, problem.segments, point, _inflation(point), rules)
-    largest = max(within, old.spread.segments)
-    if known and not abs(within - old.spread.segments) > rules.same_scatter * largest:
+    if known and within == old.spread.segments:
         return None
     spread = _spread(simulator, point, places, within, rules)
     search.progress(

@@ -79,7 +79,7 @@ def fit(
     search = search_of(campaign, rules, solver, progress, max_steps)
 
     def fit_from(start: Isolator) -> Estimate:
-        return estimate(simulator_for(start, campaign, noise, integrator, rules), start, places, search)
+        return estimate(simulator_for(start, campaign, noise, integrator), start, places, search)
 
     found = fit_from(model)
     if found.result == RESULTS.not_finite:
@@ -114,7 +114,7 @@ def _check_excitation(model: Isolator, campaign: Campaign) -> None:
 
 
 def simulator_for(
-    model: Isolator, campaign: Campaign, noise: NoiseEstimate, integrator: Integrator | None, rules: Rules
+    model: Isolator, campaign: Campaign, noise: NoiseEstimate, integrator: Integrator | None
 ) -> Simulator:
     """Give the simulator of a campaign's fitting records.
 
@@ -123,7 +123,6 @@ def simulator_for(
         campaign: the measurements.
         noise: the noise of the output.
         integrator: solver and steps, or None to choose them.
-        rules: the integration error to choose them for.
 
     Returns:
         The simulator.
@@ -138,7 +137,7 @@ def simulator_for(
         integrator=Integrator() if integrator is None else integrator,
     )
     if integrator is None:
-        problem = find_integrator(problem, model, rules.integration_error)
+        problem = find_integrator(problem, model)
     return Simulator(problem)
 
 

@@ -9,6 +9,9 @@ from ._simulator import Simulator
 
 FINEST = 32
 
+SMALL_ERROR = 0.05
+"""Integration error over the noise that is small enough: it adds 0.0025 to chi2/dof at most."""
+
 
 def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     """Give the rms change of the readings when the steps are halved, over the noise.
@@ -39,20 +42,19 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise)
 
 
-def find_integrator(problem: Problem, model: Isolator, largest: float) -> Problem:
+def find_integrator(problem: Problem, model: Isolator) -> Problem:
     """Find the coarsest steps whose error is a small share of the noise.
 
     Args:
         problem: the records.
         model: the isolator; a start will do.
-        largest: integration error over the noise that is small enough.
 
     Returns:
         The problem with its integrator (the finest that was tried where none suffices) and its step error.
     """
     substeps = Integrator().record_steps(model)
     error = step_error(problem, model, substeps)
-    while substeps < FINEST and error > largest:
+    while substeps < FINEST and error > SMALL_ERROR:
         substeps *= 2
         error = step_error(problem, model, substeps)
     return problem._replace(integrator=Integrator(problem.integrator.solver, substeps), step_error=error)

@@ -8,6 +8,9 @@ from ._estimate import Estimate, estimate
 from ._search import Search
 from ._simulator import Simulator
 
+WINDOWS = (16, 4)
+"""Windows a record, in the order in which they are fitted."""
+
 
 def fit_by_multiple_shooting(
     fitted: Estimate, model: Isolator, places: tuple[int, ...], search: Search
@@ -31,8 +34,8 @@ def fit_by_multiple_shooting(
     Source: van Domselaar & Hemker 1975, Mathematisch Centrum report NW 18/75, and Bock 1983 (multiple
     shooting), without its matching of the pieces.
     """
-    problem, search = fitted.problem, search._replace(max_steps=search.rules.window_evaluations)
-    for count in search.rules.windows:
+    problem = fitted.problem
+    for count in WINDOWS:
         pieces = (
             segments_between(place, record, cut_evenly(record.output.size, count))
             for place, record in enumerate(problem.records)

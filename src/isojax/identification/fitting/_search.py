@@ -38,14 +38,13 @@ class Rival(NamedTuple):
     Attributes:
         chi2: what it reaches.
         far: how much more chi2 is far behind; a nearer search may take its time.
-        patience: evaluations in which a search must catch up.
-        share: how much of its distance it must then have made good to go on.
+        patience: evaluations over which the pace of a search is taken. One that would not catch up so
+            within all its evaluations is given up.
     """
 
     chi2: float
     far: float
     patience: int
-    share: float
 
 
 class Search(NamedTuple):

@@ -58,7 +58,7 @@ def segment_scatter(
         squares += float(np.sum(weights * (pair.differences - mean) ** 2))
         freedom += pair.differences.size - 1
         weight += float(weights.sum() - np.sum(weights**2) / weights.sum())
-    if freedom < 1 or not stats.chi2.sf(squares, freedom) < rules.scatter_significance:
+    if freedom < 1 or not stats.chi2.sf(squares, freedom) < rules.significance:
         return 0.0
     # A difference holds the scatter of two segments.
     return float(np.sqrt(max(0.0, squares - freedom) / weight / 2.0)) * STIFFNESS_SCALE_UNIT

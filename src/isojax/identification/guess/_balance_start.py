@@ -7,7 +7,6 @@ from ..._parameters import own_parameters
 from ...elements import AbstractElement, Scales
 from ...models import Isolator
 from ...records import Campaign
-from .._rules import Rules
 from ._dwell_balance import fit_all_dwells
 from ._force_balance import BalanceFit, fit_balance
 from ._measured_receptance import measured_receptance
@@ -32,7 +31,7 @@ class BalanceStart(NamedTuple):
 
 
 def find_balance_start(
-    campaign: Campaign, model: Isolator, scales: Scales, absent: tuple[AbstractElement, ...], rules: Rules
+    campaign: Campaign, model: Isolator, scales: Scales, absent: tuple[AbstractElement, ...]
 ) -> BalanceStart | None:
     """Find the absent effect without which the measured forces do not balance, if there is one.
 
@@ -45,7 +44,6 @@ def find_balance_start(
         model: the fitted model, for its structure.
         scales: magnitudes of the records.
         absent: absent effects; those without internal states take part.
-        rules: how much less an effect must leave unbalanced than the structure alone; what is no dwell.
 
     Returns:
         The effect that leaves the smallest unbalanced force, or None if none leaves so little.
@@ -54,7 +52,7 @@ def find_balance_start(
     """
     if any(element.internal_states for element in model.elements):
         return None
-    balance, names = _regression(campaign, rules), tuple(element.name for element in model.elements)
+    balance, names = _regression(campaign), tuple(element.name for element in model.elements)
     before = balance(model, names).unexplained
     found: list[BalanceStart] = []
     for name in dict.fromkeys(probe.name for probe in absent):
@@ -67,14 +65,14 @@ def find_balance_start(
             if (element.signed or strength > 0.0) and strength > lower:
                 found.append(BalanceStart(element, tried.model, tried.unexplained, before))
     best = min(found, key=lambda one: one.unexplained, default=None)
-    return best if best is not None and best.unexplained < rules.much_better * before else None
+    return best if best is not None and best.unexplained < before else None
 
 
-def _regression(campaign: Campaign, rules: Rules) -> Callable[[Isolator, tuple[str, ...]], BalanceFit]:
+def _regression(campaign: Campaign) -> Callable[[Isolator, tuple[str, ...]], BalanceFit]:
     """Give the balance that suits the records: of every dwell, or in time where a record has none."""
     records = campaign.fit_records
     if all(record.dwells for record in records):
-        responses = tuple(measured_receptance(campaign, record, rules) for record in records)
+        responses = tuple(measured_receptance(campaign, record) for record in records)
         return lambda model, names: fit_all_dwells(model, names, responses, mass_free=campaign.mass_free)
     motions = tuple(measured_motion(campaign, record) for record in records)
     projections = band_projections(campaign, records, motions)

@@ -7,7 +7,6 @@ from ..._parameters import list_parameters
 from ..._types import check_float64
 from ...models import Isolator
 from ...records import Campaign
-from .._rules import Rules
 from ._declared_model import base_model, declared_names
 from ._force_balance import BalanceFit
 from ._linear_response import LinearResponse
@@ -99,7 +98,6 @@ def classical_guess(
     *,
     damping: Literal["half_power", "circle"] = "half_power",
     resonance: Literal["peak", "phase"] = "peak",
-    rules: Rules = Rules(),
 ) -> ClassicalGuess:
     """Guess the coefficients of the declared structure by classical analysis.
 
@@ -111,7 +109,6 @@ def classical_guess(
         campaign: the campaign; only records with role "fit" are used.
         damping: where the paper's route takes its damping ratio from.
         resonance: which resonance the paper's route takes.
-        rules: which dwells are not steady or not driven.
 
     Returns:
         The start of a fit, with the measurements that it comes from.
@@ -132,7 +129,7 @@ def classical_guess(
     names = declared_names(campaign, extra=False)
     mass_free = campaign.mass_free and not campaign.input.gain_free
     dwelling = [record for record in campaign.fit_records if record.dwells]
-    responses = tuple(measured_receptance(campaign, record, rules) for record in dwelling)
+    responses = tuple(measured_receptance(campaign, record) for record in dwelling)
     others = tuple(record for record in campaign.fit_records if not record.dwells)
     in_time = start_from_time(campaign, base, names, others, mass_free) if others else None
     if responses:

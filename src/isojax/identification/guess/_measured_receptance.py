@@ -6,8 +6,16 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from ...records import TIME_DERIVATIVES, Campaign, Record, dwell_harmonics
-from .._rules import Rules
 from ._motion import is_absolute
+
+DROPPED_OUT = 1e-3
+"""Share of the strongest drive below which a dwell is left out."""
+
+UNSTEADY = 0.05
+"""Share of its first harmonic that the harmonics of a steady dwell may leave."""
+
+UNSTEADY_NOISE = 6.0
+"""Times the median of what all dwells leave, which is noise, that a steady dwell may leave as well."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,15 +51,12 @@ class MeasuredResponse:
         return self.displacement[:, 0] / self.force[:, 0]
 
 
-def measured_receptance(
-    campaign: Campaign, record: Record, rules: Rules, harmonics: int = 7
-) -> MeasuredResponse:
+def measured_receptance(campaign: Campaign, record: Record, harmonics: int = 7) -> MeasuredResponse:
     """Measure the receptance of a stepped-sine record at each dwell.
 
     Args:
         campaign: says what the channels measure.
         record: a record with dwells.
-        rules: which dwells are not steady or not driven.
         harmonics: how many harmonics to keep.
 
     Returns:
@@ -71,8 +76,8 @@ def measured_receptance(
     rest = np.array([(one.input_residual, one.output_residual) for one in measured])
     size = np.abs(np.stack([drive[:, 0], output[:, 0]], axis=1))
     noise = np.median(rest, axis=0)
-    steady = np.all((rest <= rules.unsteady * size) | (rest <= rules.unsteady_noise * noise), axis=1)
-    kept = steady & (size[:, 0] > rules.drop_out * np.max(size[:, 0])) & (size[:, 1] > 0)
+    steady = np.all((rest <= UNSTEADY * size) | (rest <= UNSTEADY_NOISE * noise), axis=1)
+    kept = steady & (size[:, 0] > DROPPED_OUT * np.max(size[:, 0])) & (size[:, 1] > 0)
     if is_absolute(campaign):
         output = output - drive
     if campaign.input.quantity == "base_acceleration":

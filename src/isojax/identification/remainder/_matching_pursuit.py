@@ -78,23 +78,23 @@ def _pursue(
     chi2, dof = fitted.chi2, fitted.dof
     excess, tests = max(chi2 - dof, 1.0), max(1, int(free.sum()))
     selected: list[_Selection] = []
-    while len(selected) < rules.pursuit_laws and np.any(free):
+    while np.any(free):
         own = np.diag(information)
         # A law that the selected ones imitate counts as unseen, like one that the coefficients imitate.
-        free &= own > 1e-3 * whole
+        free &= own > rules.smallest_visibility**2 * whole
         if not np.any(free):
             break
         gains = np.where(free, score**2 / np.where(free, own, 1.0), 0.0)
         inflation = max(1.0, chi2 / dof)
         best = int(np.argmax(gains))
-        tie = max(rules.close_bic * inflation, rules.pursuit_tie * gains[best])
+        tie = max(rules.close_bic * inflation, rules.pursuit_share * gains[best])
         close = free & (gains >= gains[best] - tie)
         order = np.lexsort((-gains, np.where(close, ranks, np.inf)))
         place = int(order[0])
         gain = float(gains[place])
         chance = tests * 2.0 * stats.norm.sf(np.sqrt(gain / inflation))
         smallest = max(rules.pursuit_share * excess, rules.smallest_gain * dof)
-        if chance > rules.pursuit_significance or gain < smallest:
+        if chance > rules.significance or gain < smallest:
             break
         size = np.sqrt(np.where(free, own, np.inf))
         likeness = np.abs(information[place]) / (size * size[place])
@@ -180,6 +180,6 @@ def _refitted_goodness(
         moved = float(numbers[place]) + float(change)
         if listed[place].spec.lower < moved < listed[place].spec.upper:
             numbers[place] = numbers[place] + float(change)
-    search = search._replace(max_steps=search.rules.description_evaluations, progress=silent)
+    search = search._replace(progress=silent)
     found = refit_from(fitted, replace_parameters(model, numbers), search)
     return found.chi2 / found.dof if is_successful(found.result) and np.isfinite(found.chi2) else float("nan")
