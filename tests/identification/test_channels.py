@@ -19,7 +19,7 @@ from isojax.elements import (
     MainsHum,
 )
 from isojax.identification import diagnose, fit, scales
-from isojax.identification.diagnosis._score import score_test
+from isojax.identification.diagnosis._score import chosen_phase_law, score_test
 from isojax.identification.fitting import Search
 from isojax.identification.jacobian._channels import channel_table, drive_harmonic, output_line
 from isojax.models import Isolator
@@ -171,24 +171,20 @@ def test_a_stiffness_that_drifts_over_two_records_is_named(campaign_of):
 
 
 def test_the_score_of_a_chosen_phase_is_normal_where_there_is_only_noise():
-    # Six records' amplitudes of a line of noise, as output_line gives them, against the mean and scatter
-    # that the score takes off.
-    from isojax.identification.diagnosis._score import _RAYLEIGH
-
+    # Six records of noise, each projected on a cosine whose phase is that of its own windowed line.
     rng = np.random.default_rng(5)
-    amplitudes = np.array(
-        [
-            [abs(output_line(record(values, values), 12.0)) for values in rng.standard_normal((6, 512))]
-            for _ in range(400)
-        ]
-    )
-    window = signal.windows.blackmanharris(512)
-    one = np.sqrt(2.0 * np.sum(window**2)) / np.sum(window)
-    scores = (np.sum(amplitudes / one, axis=1) / math.sqrt(6.0) - _RAYLEIGH[0] * math.sqrt(6.0)) / _RAYLEIGH[
-        1
-    ]
+    angle = 2.0 * np.pi * 12.0 * np.arange(512) / RATE
+
+    def share(values):
+        cosine = np.cos(angle + np.angle(output_line(record(values, values), 12.0)))
+        return values @ cosine / np.linalg.norm(cosine)
+
+    sums = np.array([sum(map(share, rng.standard_normal((6, 512)))) for _ in range(1500)]) / math.sqrt(6.0)
+    mean, deviation = chosen_phase_law([512] * 6)
+    scores = (sums - mean) / deviation
     assert stats.kstest(scores, "norm").pvalue > 1e-3
-    assert abs(np.mean(scores)) < 0.2
+    assert abs(np.mean(scores)) < 0.1
+    assert abs(np.std(scores) - 1.0) < 0.06
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """The score test: absent effects ride along at zero strength; what a refit would absorb is projected out."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +11,10 @@ from scipy import stats
 from ...elements import CATALOGUE, AbstractElement, Scales
 from ...models import Isolator
 from ..fitting import Estimate, Nuisances, Search, step_nuisances
-from ..jacobian import effects_without_signal
+from ..jacobian import effects_without_signal, line_coherence
 from ._projection import project
 
 NULL_DRAWS = 20_000
-
-
-_RAYLEIGH = (math.sqrt(0.5 * math.pi), math.sqrt(2.0 - 0.5 * math.pi))
-"""Mean and standard deviation of the amplitude of a line of noise, each part of which has unit variance."""
 
 
 class Score(NamedTuple):
@@ -110,10 +107,11 @@ def score_test(
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)
     z = score / safe
-    # A phase that each record chose for itself makes the sum of as many Rayleigh amplitudes of noise.
     chosen = np.array([probe.phased for probe in probes], dtype=bool)
-    records = len(fitted.problem.records)
-    z = np.where(chosen & seen, (z - _RAYLEIGH[0] * np.sqrt(records)) / _RAYLEIGH[1], z)
+    lengths = [record.output.size for record in fitted.problem.records]
+    mean, deviation = chosen_phase_law(lengths)
+    inflation = np.sqrt(max(1.0, fitted.chi2 / fitted.dof))
+    z = np.where(chosen & seen, (z - mean * inflation) / deviation, z)
 
     # Within a family a shape of admissible sign goes before any other: the others are evidence against those
     # shapes.
@@ -125,9 +123,9 @@ def score_test(
             best[probe.name] = column
     order = sorted(best.values(), key=lambda column: -abs(z[column]))
     correlation = information / np.outer(safe, safe)
-    inflation = np.sqrt(max(1.0, fitted.chi2 / fitted.dof))
-    either = np.array([probe.signed for probe in probes], dtype=bool)[seen]
-    family = _family_wise(correlation[np.ix_(seen, seen)], np.abs(z[order]) / inflation, either, seed)
+    either = np.array([probe.signed for probe in probes], dtype=bool)
+    sizes = np.where(either, np.abs(z), z)[order] / inflation
+    family = _family_wise(correlation[np.ix_(seen, seen)], sizes, either[seen], seed)
     scores, steps, moved = [], [], []
     owner = fitted.simulator.prepared(traces.model, carried).record
     for column, p_value in zip(order, family, strict=True):
@@ -154,6 +152,24 @@ def score_test(
     hidden = tuple(sorted({probe.name for probe in probes} - set(best)))
     likeness = correlation[np.ix_(order, order)]
     return ScoreTest(tuple(scores), hidden, likeness, fitted, tuple(steps), tuple(moved))
+
+
+def chosen_phase_law(lengths: Sequence[int]) -> tuple[float, float]:
+    """Give mean and standard deviation of the score of a line of white noise whose phase each record chose.
+
+    A record's share is the part of its line along the phase that `output_line` read: with C the coherence of
+    the windowed line and the whole one, `C R + sqrt(1 - C^2) n`, R of Rayleigh's law and n normal.
+
+    Args:
+        lengths: samples of each record.
+
+    Returns:
+        Both, of the sum over the records divided by the square root of their number.
+    """
+    coherence = np.array([line_coherence(samples) for samples in lengths])
+    mean = math.sqrt(0.5 * math.pi) * np.sum(coherence)
+    variance = np.mean(1.0 - coherence**2 * (0.5 * math.pi - 1.0))
+    return float(mean / math.sqrt(len(lengths))), float(np.sqrt(variance))
 
 
 def _family_wise(

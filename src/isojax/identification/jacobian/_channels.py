@@ -117,6 +117,21 @@ def drive_harmonic(record: Record, order: int, part: str) -> Float[np.ndarray, "
     return np.real(multiple) if part == "cosine" else np.imag(multiple)
 
 
+def line_coherence(samples: int) -> float:
+    """Give the correlation of white noise's line as `output_line` reads it with the line of all its samples.
+
+    Args:
+        samples: of the record.
+
+    Returns:
+        `sum(w) / sqrt(N sum(w^2))` of the window, one over the square root of its equivalent noise bandwidth.
+
+    Source: Harris 1978, Proc. IEEE 66:51, eq. (11).
+    """
+    window = blackmanharris(samples)
+    return float(np.sum(window) / np.sqrt(samples * np.sum(window**2)))
+
+
 def output_line(record: Record, frequency: float) -> complex:
     """Give the line of the output at a frequency that nothing in the record need be locked to.
 
