@@ -16,7 +16,7 @@ from isojax.models import Integrator, Isolator
 
 SOURCE = Path(isojax.__file__).parent
 ROOMS = SOURCE / "identification"
-GUARDS = {"NULL_DRAWS", "CYCLES", "STEPS", "STEADY"}
+GUARDS = {"NULL_DRAWS", "CYCLES", "STEPS", "STEADY", "ROUNDING"}
 """Numbers of the diagnosis that set the accuracy of a computation and decide nothing."""
 
 

@@ -1,11 +1,16 @@
 """Whether a finding carries over: refit on a part of the data, predict the rest."""
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Float
 
 from ..._results import RESULTS
 from .._rules import Rules
 from ..fitting import Estimate, Problem, Search, Simulator, Spread, best_nuisances, estimate, one_hot
+
+ROUNDING = 1e-12
+"""Share of its information below which a combination of coefficients counts as unknown."""
 
 
 def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem, Problem]:
@@ -43,12 +48,22 @@ def _misfit_by_record(found: Estimate) -> Float[np.ndarray, " record"]:
     return found.point.reduced.by_record[:, -1, -1] + found.point.reduced.eliminated
 
 
-def _excess_unseen(part: Estimate, unseen: Problem, spread: Spread) -> float:
-    """Give chi2 - dof of data that a refit did not see, with the refit's parameter uncertainty.
+class _Prediction(NamedTuple):
+    """Data that a refit did not see, with the refit's parameter uncertainty.
 
-    With r the whitened error, J its slopes and C the covariance of the coefficients, chi2 is
-    `r' (I + J C J')^-1 r = r'r - r'J (C^-1 + J'J)^-1 J'r`.
+    With r the whitened error, J its slopes and C the covariance of the coefficients:
+
+    Attributes:
+        excess: chi2 - dof, chi2 being `r' (I + J C J')^-1 r = r'r - r'J (C^-1 + J'J)^-1 J'r`.
+        volume: `log det(I + J C J')`: what the model might have predicted instead.
     """
+
+    excess: float
+    volume: float
+
+
+def _predict(part: Estimate, unseen: Problem, spread: Spread) -> _Prediction:
+    """Predict data that a refit did not see; NaN where the motion diverges."""
     simulator = Simulator(unseen, like=part.simulator)
     known = part.point.reduced.matrix[:-1, :-1]
     sizes = 1.0 / np.sqrt(np.maximum(np.diag(known), 1e-300))
@@ -57,9 +72,12 @@ def _excess_unseen(part: Estimate, unseen: Problem, spread: Spread) -> float:
     matrix = point.reduced.matrix
     slopes, error = matrix[:-1, :-1], matrix[:-1, -1]
     if not np.all(np.isfinite(matrix)):
-        return float("nan")
-    step = np.linalg.lstsq(known * np.outer(sizes, sizes) + slopes, error, rcond=1e-12)[0]
-    return float(matrix[-1, -1] - error @ step - point.free_samples)
+        return _Prediction(float("nan"), float("nan"))
+    # The diagonal of the known information is one in these units; its rounding alone keeps the rest apart.
+    before = known * np.outer(sizes, sizes) + ROUNDING * np.eye(len(sizes))
+    step = np.linalg.solve(before + slopes, error)
+    volume = np.linalg.slogdet(before + slopes)[1] - np.linalg.slogdet(before)[1]
+    return _Prediction(float(matrix[-1, -1] - error @ step - point.free_samples), float(volume))
 
 
 def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> float:
@@ -74,12 +92,14 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
         search: how to search.
 
     Returns:
-        1 - (excess with the effect)/(excess without it) on the unseen part; not positive where it does not
-        carry over or a refit diverges on the part that it sees, 1 where only the motion without it diverges
-        on the unseen part.
+        1 - (excess with the effect)/(excess without it) on the unseen part; 0 where that part is no more
+        probable with the effect than without it or a refit diverges on the part that it sees, 1 where only
+        the motion without it diverges on the unseen part.
+
+    Source: Gelman, Hwang & Vehtari 2014, Stat. Comput. 24:997 (log predictive density of unseen data).
     """
     seen, unseen = _split(fitted, extended, search.rules)
-    excess = []
+    predictions = []
     for found in (fitted, extended):
         search.progress("carry-over: refit on a part of the data")
         nuisances = found.point.nuisances
@@ -87,10 +107,13 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
         part = estimate(simulator, found.model, found.places, search, nuisances.afresh())
         if part.result == RESULTS.not_finite:
             return 0.0
-        excess.append(_excess_unseen(part, unseen, nuisances.spread))
-    without, with_effect = excess
-    if not np.isfinite(with_effect):
+        predictions.append(_predict(part, unseen, nuisances.spread))
+    without, with_effect = predictions
+    if not np.isfinite(with_effect.excess):
         return 0.0
-    # without the effect its coefficients, bent to make up for it, may let the motion diverge elsewhere
-    without = without if np.isfinite(without) else np.inf
-    return float(1.0 - with_effect / max(without, 1.0)) if with_effect < without else 0.0
+    # Without the effect its coefficients, bent to make up for it, may let the motion diverge elsewhere.
+    if not np.isfinite(without.excess):
+        return 1.0
+    inflation = max(1.0, extended.chi2 / extended.dof)
+    gained = (without.excess - with_effect.excess) / inflation + without.volume - with_effect.volume
+    return float(1.0 - with_effect.excess / max(without.excess, 1.0)) if gained > 0.0 else 0.0
