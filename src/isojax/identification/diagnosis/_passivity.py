@@ -17,7 +17,7 @@ STEPS = 1024
 STEADY = 1e-2
 """Share of its range by which a settled force may differ between the last two cycles."""
 
-ROUNDING = 1e-3
+WORK_OF_STEPS = 1e-3
 """Share of the elastic energy of a loop up to which its work is the error of the steps."""
 
 
@@ -104,7 +104,7 @@ def find_activity(element: AbstractElement, largest_x: float, largest_v: float) 
     work, elastic = work_per_cycle(element, amplitude, np.full(2, largest_v / largest_x))
     if not np.all(np.isfinite(work)):
         return f"its {element.words} diverges over the visited loop"
-    if not element.active and np.any(work < -ROUNDING * elastic):
+    if not element.active and np.any(work < -WORK_OF_STEPS * elastic):
         where = 1e3 * float(amplitude[int(np.argmin(work / np.maximum(elastic, 1e-300)))])
         return f"its {element.words} feeds energy into a loop of {where:.3g} mm, within the visited motion"
     return None

@@ -9,7 +9,7 @@ from ..._results import RESULTS
 from .._rules import Rules
 from ..fitting import Estimate, Problem, Search, Simulator, Spread, best_nuisances, estimate, one_hot
 
-ROUNDING = 1e-12
+UNKNOWN = 1e-12
 """Share of its information below which a combination of coefficients counts as unknown."""
 
 
@@ -74,7 +74,7 @@ def _predict(part: Estimate, unseen: Problem, spread: Spread) -> _Prediction:
     if not np.all(np.isfinite(matrix)):
         return _Prediction(float("nan"), float("nan"))
     # The diagonal of the known information is one in these units; its rounding alone keeps the rest apart.
-    before = known * np.outer(sizes, sizes) + ROUNDING * np.eye(len(sizes))
+    before = known * np.outer(sizes, sizes) + UNKNOWN * np.eye(len(sizes))
     step = np.linalg.solve(before + slopes, error)
     volume = np.linalg.slogdet(before + slopes)[1] - np.linalg.slogdet(before)[1]
     return _Prediction(float(matrix[-1, -1] - error @ step - point.free_samples), float(volume))

@@ -1,5 +1,6 @@
 """Lack of fit against pure error: what of a residual comes back with every cycle of the drive."""
 
+import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -10,10 +11,10 @@ from scipy import signal, stats
 from ...records import Record
 from ._errors import Run
 
-HARMONICS = 8
+HIGHEST_ORDER = 8
 """Harmonics of the drive at which a model may be wrong."""
 
-BESIDE = (2, 3)
+LINES_BESIDE = (2, 3)
 """Lines beside a harmonic, on either side, that hold noise alone. The next one also holds what drifts."""
 
 SWEPT_CYCLES = 16
@@ -65,7 +66,7 @@ def lack_of_fit(runs: tuple[Run, ...], coefficients: int, tolerance: float) -> L
     locked, lines, beside = 0.0, 0, 0
     for run in runs:
         powers = [_powers(run, piece) for piece in _pieces(run.record)]
-        for order in range(1, HARMONICS + 1):
+        for order in range(1, HIGHEST_ORDER + 1):
             own = [rows[order - 1] for rows in powers if len(rows) >= order]
             if not own:
                 continue
@@ -84,7 +85,7 @@ def lack_of_fit(runs: tuple[Run, ...], coefficients: int, tolerance: float) -> L
 
 def _pieces(record: Record) -> Iterator[_Piece]:
     """Cut a record into whole cycles of its drive; nothing where the drive has none."""
-    shortest = 2 * max(BESIDE) + 2
+    shortest = 2 * max(LINES_BESIDE) + 2
     if record.dwells:
         for dwell in record.dwells:
             first = max(dwell.start, record.settle)
@@ -100,7 +101,7 @@ def _pieces(record: Record) -> Iterator[_Piece]:
             turns = -turns
         edges = np.arange(turns[record.settle], turns[-1], 2.0 * np.pi * SWEPT_CYCLES)
         bounds = np.searchsorted(np.maximum.accumulate(turns), edges)
-        for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+        for start, stop in itertools.pairwise(bounds):
             if stop - start > 4 * SWEPT_CYCLES:
                 frequency = SWEPT_CYCLES * record.rate / (stop - start)
                 part = slice(int(start), int(stop))
@@ -108,11 +109,11 @@ def _pieces(record: Record) -> Iterator[_Piece]:
 
 
 def _orders(rate: float, frequency: float) -> int:
-    return min(HARMONICS, int(0.4 * rate / frequency))
+    return min(HIGHEST_ORDER, int(0.4 * rate / frequency))
 
 
 def _powers(run: Run, piece: _Piece) -> list[tuple[float, float, list[float]]]:
-    """Give, for each harmonic, power of the residual, of the response, and of the residual on lines beside it."""
+    """Give, for each harmonic, power of the residual, of the response, and of the residual beside it."""
     residual, output = run.residual[piece.part], run.record.output[piece.part]
     output = output - np.mean(output)
     rows = []
@@ -120,7 +121,7 @@ def _powers(run: Run, piece: _Piece) -> list[tuple[float, float, list[float]]]:
         at = np.exp(-1j * order * piece.phase)
         sides = [
             _power(residual, np.exp(-1j * (order + sign * line / piece.cycles) * piece.phase))
-            for line in BESIDE
+            for line in LINES_BESIDE
             for sign in (-1, 1)
         ]
         rows.append((_power(residual, at), _power(output, at), sides))

@@ -84,9 +84,6 @@ def error_words(before: Fit, after: Fit) -> str:
 LEAST_RISE = 0.01
 """Rise of the held-out chi2/dof that matters, where chance does not explain it."""
 
-_CHANCE = 0.01
-"""Of noise alone to lie as high as held-out records that are called unexplained."""
-
 
 def headline(loop: Loop) -> str:
     """Give the verdict in one sentence, and in a second one what held-out records say against it.
@@ -111,7 +108,7 @@ def doubt_words(loop: Loop) -> str:
     last, rise = after.chi2_per_dof, after.chi2_per_dof - before.chi2_per_dof
     if not math.isfinite(last):
         return "The held-out records contradict it: the model diverges on them."
-    if last <= loop.rules.good or scipy.stats.chi2.sf(last * after.dof, after.dof) > _CHANCE:
+    if last <= loop.rules.good or scipy.stats.chi2.sf(last * after.dof, after.dof) > loop.rules.significance:
         return ""
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
     if rise > LEAST_RISE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
