@@ -44,7 +44,7 @@ def _extension(campaign, start, effect, *rivals):
     after = fit(before.model.with_elements(effect), campaign, integrator=ONE_STEP)
     others = tuple(rival.name for rival in rivals)
     finding = Finding(effect.name, others, 0.0, 1.0, 1.0, (), "", rivals)
-    verdict = Verdict("found", finding, (), others, 0.0, (), {}, after.estimate, "")
+    verdict = Verdict("found", finding, (), others, 0.0, (), {}, after, "")
     return Extension(before, after, verdict)
 
 

@@ -48,7 +48,7 @@ def found(campaign):
     finding = Finding(
         "coulomb_friction", ("dahl_friction",), 1e-9, 0.97, float("nan"), RANKING, "a test at 5 N"
     )
-    verdict = Verdict("found", finding, RANKING, ("dahl_friction",), 0.03, (), {}, after.estimate, "It fits.")
+    verdict = Verdict("found", finding, RANKING, ("dahl_friction",), 0.03, (), {}, after, "It fits.")
     bounds = {"bouc_wen": (11021.0, "N/m"), "sensor_offset": (1e-4, "SI unit of the output")}
     last = Verdict(
         "none", None, RANKING[3:], (), 0.0, ("added_mass",), bounds, None, "Nothing is significant."

@@ -20,11 +20,10 @@ from .diagnosis import (
     diagnose_with,
     find_superfluous,
     findings_in,
-    is_clean,
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, Search, complete, fit, search_of, silent
+from .fitting import DEFAULT_SOLVER, Fit, Search, fit, search_of, silent
 from .guess import ClassicalGuess, classical_guess
 from .remainder import Remainder, explain_remainder
 
@@ -92,13 +91,12 @@ def extend(before: Fit, verdict: Verdict) -> Extension:
         >>> print(f"{float(better.after.model['coulomb_friction.force_level']):.1f} N")
         30.0 N
     """
-    if verdict.refit is None:
+    if verdict.after is None:
         raise ValueError(
             "Argument `verdict` must have found an effect to add, but its verdict is "
             f'"{verdict.verdict}": {verdict.reason}'
         )
-    after = complete(verdict.refit, before.model, before.campaign, before.noise)
-    return Extension(before, after, verdict)
+    return Extension(before, verdict.after, verdict)
 
 
 def close_loop(
@@ -149,7 +147,7 @@ def close_loop(
     after = extensions[-1].after if extensions else before
     if not is_successful(after.result):
         verdict = _without_evidence(after)
-    elif verdict.refit is not None:
+    elif verdict.after is not None:
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
     # Asked for here, so that the time of the loop counts it.
@@ -214,7 +212,7 @@ def _grow(
         search.progress(Stage(f"diagnosis {len(extensions) + 1}: which effect is missing"))
         verdict = diagnose_with(search, current, before.estimate.excess, significance, excluded)
         search.progress(KeyFigure(verdict.reason))
-        if verdict.refit is None or len(extensions) == max_iterations:
+        if verdict.after is None or len(extensions) == max_iterations:
             return extensions, verdict
         extensions = (*extensions, extend(current, verdict))
         current = extensions[-1].after
@@ -225,9 +223,7 @@ def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules
     first, found = before.estimate, final.estimate
     if not findings or not is_successful(final.result):
         return last.verdict
-    good = is_good(found.chi2 / found.dof, found.excess, first.excess, rules)
-    explained = 1.0 - found.excess / max(first.excess, 1.0)
-    most_of_it = explained >= rules.most_of_it
-    if good and findings <= rules.most_at_once and (is_clean(first, found, rules) or most_of_it):
+    if findings <= rules.most_at_once and is_good(final, first.excess, rules):
         return "found"
-    return "partly_explained" if most_of_it else "unexplained"
+    explained = 1.0 - found.excess / max(first.excess, 1.0)
+    return "partly_explained" if explained >= rules.most_of_it else "unexplained"

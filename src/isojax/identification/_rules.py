@@ -18,11 +18,15 @@ class Rules:
 
     # When a fit is good, and what counts as an explanation.
 
-    good: float = 1.05
-    """chi2/dof up to which a fit is good."""
+    lack_of_fit: float = 1e-3
+    """Chance, where the model is right, of residuals so much locked to the drive: below it a fit is not
+    good."""
 
-    clean: float = 1.02
-    """chi2/dof up to which a fit leaves as little as repeats of a test differ."""
+    response_error: float = 1e-3
+    """Error that a channel may have, over the response at the same frequency, before the model is blamed."""
+
+    good: float = 1.05
+    """chi2/dof up to which a fit is good where no drive repeats, so that nothing shows the noise itself."""
 
     left_over: float = 0.03
     """Share of the first excess that a good fit may leave where the noise is far below every model

@@ -9,7 +9,6 @@ and `_bounds`. `_findings` and `_separation` hold the results.
 
 from ._diagnose import diagnose as diagnose
 from ._diagnose import diagnose_with as diagnose_with
-from ._diagnose import is_clean as is_clean
 from ._diagnose import is_good as is_good
 from ._findings import Candidate as Candidate
 from ._findings import Extension as Extension

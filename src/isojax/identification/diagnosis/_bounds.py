@@ -20,19 +20,17 @@ def upper_bounds(
     """Say how large each effect that was not found could still be.
 
     A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
-    linear step from there says nothing of any strength: nothing is said there.
+    linear step from there says nothing of any strength: it is for good fits.
 
     Args:
         test: the score test.
         fitted: the fit.
         found: catalogue name of the effect that was found, or None.
-        rules: when a fit is good.
+        rules: the standard errors of an interval.
 
     Returns:
-        `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name; empty unless the fit is good.
+        `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name.
     """
-    if fitted.chi2 / fitted.dof > rules.good:
-        return {}
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {
         score.element.name: (

@@ -25,6 +25,7 @@ class Case(NamedTuple):
         first_excess: chi2 - dof of the first fit of the loop.
         significance: family-wise level of the score test.
         search: how to search.
+        is_good: whether the fit leaves nothing worth explaining.
     """
 
     fit: Fit
@@ -32,6 +33,7 @@ class Case(NamedTuple):
     first_excess: float
     significance: float
     search: Search
+    is_good: bool
 
     @property
     def rules(self) -> Rules:

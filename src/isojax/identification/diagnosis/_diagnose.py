@@ -8,7 +8,7 @@ import numpy as np
 from ..._results import RESULTS
 from ...elements import CATALOGUE, AbstractElement
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, Estimate, Fit, Search, search_of, silent
+from ..fitting import DEFAULT_SOLVER, Fit, Search, complete, lack_of_fit, search_of, silent
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, smallest_inflation
@@ -19,33 +19,26 @@ from ._separating_words import is_exact, separating_experiment
 from ._transfer import transferred_share
 
 
-def is_good(chi2_per_dof: float, excess: float, first_excess: float, rules: Rules) -> bool:
+def is_good(fit: Fit, first_excess: float, rules: Rules) -> bool:
     """Say whether a fit leaves nothing worth explaining.
 
     Args:
-        chi2_per_dof: of the fit.
-        excess: chi2 - dof of the fit.
-        first_excess: of the first fit of the loop.
+        fit: the fit.
+        first_excess: chi2 - dof of the first fit of the loop.
         rules: when that is so.
 
     Returns:
-        True if chi2/dof is near one, or hardly any of the first excess is left.
+        Where the drive of a record repeats: whether what is left is no more locked to it than noise and the
+        declared error of the response are. Elsewhere whether chi2/dof is near one. True also if hardly any of
+        the first excess is left.
     """
-    return chi2_per_dof <= rules.good or excess < rules.left_over * first_excess
-
-
-def is_clean(before: Estimate, after: Estimate, rules: Rules) -> bool:
-    """Say whether so little was to explain, or is left, that no share of it need be asked for.
-
-    Args:
-        before: the estimate without what was found.
-        after: the estimate with it.
-        rules: when that is so.
-
-    Returns:
-        True if either holds.
-    """
-    return before.chi2 / before.dof <= rules.good or after.chi2 / after.dof <= rules.clean
+    found = fit.estimate
+    if found.excess < rules.left_over * first_excess:
+        return True
+    test = lack_of_fit(fit, rules.response_error)
+    if np.isfinite(test.p_value):
+        return test.p_value > rules.lack_of_fit
+    return found.chi2 / found.dof <= rules.good
 
 
 def diagnose(
@@ -112,12 +105,14 @@ def diagnose_with(
         return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
     probes = absent_effects(fitted.model, search.scales, excluded)
     search.progress(f"score test of {len({probe.name for probe in probes})} absent effects")
+    first_excess = fitted.excess if first_excess is None else first_excess
     case = Case(
         fit,
         score_test(fitted, search, probes),
-        fitted.excess if first_excess is None else first_excess,
+        first_excess,
         search.rules.significance if significance is None else significance,
         search,
+        is_good(fit, first_excess, search.rules),
     )
     return _weigh_refits(case, refit_candidates(case))
 
@@ -126,7 +121,7 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     """Weigh the refits, and word the verdict."""
     fitted, rules, test = case.fitted, case.rules, case.test
     inflation = smallest_inflation(by_evidence(refits, rules))
-    good = is_good(case.chi2_per_dof, fitted.excess, case.first_excess, rules)
+    good = case.is_good
     reason = "no absent effect is both significant and physical"
     refits = list(refits)
     while usable := by_evidence(refits, rules):
@@ -148,7 +143,7 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
         place = next(index for index, one in enumerate(refits) if one is best)
         refits[place] = best._replace(violation="it does not carry over to data left out of its refit")
     ranking = rank_candidates(test, refits, by_evidence(refits, rules), inflation)
-    bounds = upper_bounds(test, fitted, None, rules)
+    bounds = upper_bounds(test, fitted, None, rules) if good else {}
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
@@ -159,7 +154,7 @@ def _too_little(best: Refit, gain: float, case: Case) -> str:
     fitted = case.fitted
     gained = (
         f"takes {gain / fitted.dof:.2g} off chi2/dof"
-        if case.chi2_per_dof <= case.rules.good
+        if case.is_good
         else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of the residual beyond the noise"
     )
     extra = len(best.estimate.places) - len(fitted.places)
@@ -173,7 +168,7 @@ def _needed_share(case: Case) -> float:
     Where the residual exceeds the noise every small error of the model is significant: there an effect must
     explain a good part of the excess.
     """
-    return 0.0 if case.chi2_per_dof <= case.rules.good else case.rules.smallest_share
+    return 0.0 if case.is_good else case.rules.smallest_share
 
 
 def _twins(best: Refit) -> tuple[AbstractElement, ...]:
@@ -227,17 +222,22 @@ def _verdict_of_finding(
         separating_experiment(name, together),
         rivals(test.scores, usable, twins, together),
     )
-    before, after = case.chi2_per_dof, best.estimate.chi2 / best.estimate.dof
-    good = is_good(after, best.estimate.excess, case.first_excess, rules)
-    if good and (is_clean(fitted, best.estimate, rules) or explained >= rules.most_of_it):
+    before, after = case.fit, complete(best.estimate, case.fit.model, case.fit.campaign, case.fit.noise)
+    if is_good(after, case.first_excess, rules):
         verdict = "found"
     elif explained >= rules.most_of_it:
         verdict = "partly_explained"
     else:
         verdict = "unexplained"
     left = best.estimate.excess / max(fitted.excess, 1.0)
-    reason = f"Adding {best.score.element.words} takes chi2/dof from {before:.4g} to {after:.4g}."
-    bounds = upper_bounds(test, fitted, name, rules)
-    return Verdict(
-        verdict, finding, ranking, together, float(max(left, 0.0)), test.hidden, bounds, best.estimate, reason
+    reason = (
+        f"Adding {best.score.element.words} takes chi2/dof from {_ratio(before):.4g} to {_ratio(after):.4g}."
     )
+    bounds = upper_bounds(test, fitted, name, rules) if case.is_good else {}
+    return Verdict(
+        verdict, finding, ranking, together, float(max(left, 0.0)), test.hidden, bounds, after, reason
+    )
+
+
+def _ratio(fit: Fit) -> float:
+    return fit.stats.chi2 / fit.stats.dof

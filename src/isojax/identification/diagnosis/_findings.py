@@ -82,7 +82,7 @@ class Verdict(NamedTuple):
         hidden: catalogue names that these data cannot show beside the fitted coefficients.
         bounds: for each effect that was not found, how large its strength could still be, with its unit;
             empty where the fit is not good, because a bound takes the rest of the residual for noise.
-        refit: the model with the effect, fitted; None where nothing was found.
+        after: the fit with the effect; None where nothing was found.
         reason: one sentence.
     """
 
@@ -93,8 +93,13 @@ class Verdict(NamedTuple):
     unexplained: float
     hidden: tuple[str, ...]
     bounds: dict[str, tuple[float, str]]
-    refit: Estimate | None
+    after: Fit | None
     reason: str
+
+    @property
+    def refit(self) -> Estimate | None:
+        """The equations of the fit with the effect; None where nothing was found."""
+        return None if self.after is None else self.after.estimate
 
 
 class Extension(NamedTuple):

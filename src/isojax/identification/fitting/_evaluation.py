@@ -10,7 +10,7 @@ from ._build_problem import build_problem
 from ._elimination import Nuisances
 from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise, without_values
 from ._estimate import Estimate
-from ._problem import Point
+from ._problem import Point, Problem
 from ._simulator import Simulator
 
 SAME_BRANCH = 1e-3
@@ -55,21 +55,32 @@ class Evaluation:
         self._campaign = campaign
 
     @cached_property
-    def _runs(self) -> tuple[tuple[Run, ...], Restarts]:
-        """Free runs and restarts of every record; NaN where the search failed."""
-        found, fitted = self._found, self._found.problem
-        everything = build_problem(
+    def _everything(self) -> Problem:
+        """Every record, fitted and held out, cut into segments."""
+        fitted = self._found.problem
+        return build_problem(
             self._campaign.records,
-            found.model,
+            self._found.model,
             quantity=fitted.quantity,
             hold=fitted.hold,
             noise=fitted.noise,
             share=fitted.share,
             integrator=fitted.integrator,
         )
+
+    @cached_property
+    def free_runs(self) -> tuple[Run, ...]:
+        """Every record simulated from its start to its end with nothing fed back; NaN if the search failed."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            runs = run_freely(self._everything, self._found.model)
+        return runs if is_successful(self._found.result) else tuple(map(without_values, runs))
+
+    @cached_property
+    def restarts(self) -> Restarts:
+        """Every record with each segment restarted from its own best initial state; NaN if the search failed."""
+        found, fitted, everything = self._found, self._found.problem, self._everything
         nuisances = found.point.nuisances
         with np.errstate(over="ignore", invalid="ignore"):
-            free_runs = run_freely(everything, found.model)
             if everything.records == fitted.records and everything.segments == fitted.segments:
                 restarts = restart_records(
                     found.simulator, found.model, nuisances.spread, nuisances, found.places
@@ -85,20 +96,9 @@ class Evaluation:
                     again = restart_records(simulator, found.model, nuisances.spread, known)
                     if _chi2_of(again.point, places) < lost + found.point.chi2:
                         restarts = again
-        if not is_successful(found.result):
-            free_runs = tuple(without_values(run) for run in free_runs)
-            restarts = restarts._replace(runs=tuple(without_values(run) for run in restarts.runs))
-        return free_runs, restarts
-
-    @property
-    def free_runs(self) -> tuple[Run, ...]:
-        """Every record simulated from its start to its end with nothing fed back."""
-        return self._runs[0]
-
-    @property
-    def restarts(self) -> Restarts:
-        """Every record with each segment restarted from its own best initial state."""
-        return self._runs[1]
+        if is_successful(found.result):
+            return restarts
+        return restarts._replace(runs=tuple(map(without_values, restarts.runs)))
 
     @cached_property
     def errors(self) -> dict[str, Errors | None]:

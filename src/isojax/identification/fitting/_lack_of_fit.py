@@ -10,15 +10,22 @@ from scipy import signal, stats
 
 from ...records import Record
 from ._errors import Run
+from ._fit_result import Fit
 
 HIGHEST_ORDER = 8
-"""Harmonics of the drive at which a model may be wrong."""
+"""Highest harmonic of a sine at which a model may be wrong."""
 
 LINES_BESIDE = (2, 3)
 """Lines beside a harmonic, on either side, that hold noise alone. The next one also holds what drifts."""
 
 SWEPT_CYCLES = 16
 """Cycles of a sweep over which its response hardly changes."""
+
+LINES_A_BAND = 32
+"""Lines of a periodic drive over which the noise has one level."""
+
+_HIGHEST = 0.4
+"""Highest frequency, over the sampling rate: above it anti-alias filters work."""
 
 
 class LackOfFit(NamedTuple):
@@ -36,16 +43,15 @@ class LackOfFit(NamedTuple):
     freedom: tuple[float, float]
 
 
-class _Piece(NamedTuple):
-    """Whole cycles of a drive: samples, phase of the drive [rad], cycles, and the orders to look at."""
+class _Lines(NamedTuple):
+    """Powers of lines at which the noise has one level: of the residual, of the response, of the noise."""
 
-    part: slice
-    phase: Float[np.ndarray, " time"]
-    cycles: int
-    orders: int
+    locked: Float[np.ndarray, " line"]
+    response: Float[np.ndarray, " line"]
+    noise: Float[np.ndarray, " beside"]
 
 
-def lack_of_fit(runs: tuple[Run, ...], coefficients: int, tolerance: float) -> LackOfFit:
+def lack_of_fit(fit: Fit, tolerance: float) -> LackOfFit:
     """Test whether what a model leaves is locked to the drive.
 
     Noise and everything else that does not repeat lies at all frequencies alike, model errors lie at the
@@ -53,8 +59,7 @@ def lack_of_fit(runs: tuple[Run, ...], coefficients: int, tolerance: float) -> L
     its colour.
 
     Args:
-        runs: records against their simulation, each segment restarted from its own best state.
-        coefficients: coefficients that were fitted to them.
+        fit: the fit; its fitted records count, each segment restarted from its own best state.
         tolerance: error that any channel may have, over the response at the same frequency [1].
 
     Returns:
@@ -63,70 +68,79 @@ def lack_of_fit(runs: tuple[Run, ...], coefficients: int, tolerance: float) -> L
     Source: Pintelon & Schoukens 2012, System Identification: A Frequency Domain Approach, sec. 11.3 (cost
     against the noise that periods show); Box & Draper 1987 (lack of fit).
     """
-    locked, lines, beside = 0.0, 0, 0
-    for run in runs:
-        powers = [_powers(run, piece) for piece in _pieces(run.record)]
-        for order in range(1, HIGHEST_ORDER + 1):
-            own = [rows[order - 1] for rows in powers if len(rows) >= order]
-            if not own:
-                continue
-            at, response, noise = (np.array(column) for column in zip(*own, strict=True))
-            # One over a mean of n powers of noise is too large by n / (n - 1) on average.
-            floor = np.mean(noise) * noise.size / (noise.size - 1)
-            locked += float(np.sum(at / (floor + tolerance**2 * response)))
-            lines += at.size
-            beside += noise.size
-    if not lines:
+    runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
+    power, count, beside = 0.0, 0, 0
+    for lines in itertools.chain.from_iterable(map(_lines, runs)):
+        # One over a mean of n powers of noise is too large by n / (n - 1) on average.
+        level = np.mean(lines.noise) * lines.noise.size / (lines.noise.size - 1)
+        power += float(np.sum(lines.locked / (level + tolerance**2 * lines.response)))
+        count += lines.locked.size
+        beside += lines.noise.size
+    if not count:
         return LackOfFit(float("nan"), float("nan"), (0.0, 0.0))
-    freedom = max(1.0, 2.0 * lines - coefficients), 2.0 * beside
-    ratio = 2.0 * locked / freedom[0]
+    freedom = max(1.0, 2.0 * count - len(fit.free)), 2.0 * beside
+    ratio = 2.0 * power / freedom[0]
     return LackOfFit(float(stats.f.sf(ratio, *freedom)), ratio, freedom)
 
 
-def _pieces(record: Record) -> Iterator[_Piece]:
-    """Cut a record into whole cycles of its drive; nothing where the drive has none."""
-    shortest = 2 * max(LINES_BESIDE) + 2
+def _lines(run: Run) -> Iterator[_Lines]:
+    """Give the powers of a record, line by line where the noise has one level."""
+    if run.record.period is not None and not run.record.dwells:
+        yield from _periodic_lines(run, run.record.period)
+        return
+    pieces = [_powers(run, *piece) for piece in _whole_cycles(run.record)]
+    for order in range(HIGHEST_ORDER):
+        own = [rows[order] for rows in pieces if len(rows) > order]
+        if own:
+            locked, response, noise = zip(*own, strict=True)
+            yield _Lines(np.array(locked), np.array(response), np.concatenate(noise))
+
+
+def _periodic_lines(run: Run, period: int) -> Iterator[_Lines]:
+    """Give the lines of whole periods; those between them hold what does not repeat."""
+    count = (run.record.output.size - run.record.settle) // period
+    if count < 2:
+        return
+    whole = slice(run.record.output.size - count * period, None)
+    powers = [np.abs(np.fft.rfft(each[whole])) ** 2 for each in (run.residual, run.record.output)]
+    places = np.arange(1, int(_HIGHEST * period)) * count
+    for band in np.array_split(places, max(1, places.size // LINES_A_BAND)):
+        between = band[:, None] + np.arange(1, count)
+        yield _Lines(powers[0][band], powers[1][band], powers[0][between].ravel())
+
+
+def _whole_cycles(record: Record) -> Iterator[tuple[slice, Float[np.ndarray, " time"], int]]:
+    """Cut a record into whole cycles of a sine: samples, phase of the drive [rad], cycles."""
     if record.dwells:
         for dwell in record.dwells:
-            first = max(dwell.start, record.settle)
-            cycles = int((dwell.stop - first) * dwell.frequency / record.rate + 1e-6)
-            start = dwell.stop - round(cycles * record.rate / dwell.frequency)
-            if cycles >= shortest:
-                phase = 2.0 * np.pi * dwell.frequency / record.rate * np.arange(dwell.stop - start)
-                yield _Piece(slice(start, dwell.stop), phase, cycles, _orders(record.rate, dwell.frequency))
+            turn = 2.0 * np.pi * dwell.frequency / record.rate
+            cycles = int((dwell.stop - max(dwell.start, record.settle)) * turn / (2.0 * np.pi) + 1e-6)
+            start = dwell.stop - round(2.0 * np.pi * cycles / turn)
+            if cycles > 2 * max(LINES_BESIDE):
+                yield slice(start, dwell.stop), turn * np.arange(dwell.stop - start), cycles
     elif record.kind == "swept":
         drive = record.input - np.mean(record.input)
-        turns = np.unwrap(np.angle(np.asarray(signal.hilbert(drive), dtype=complex)))
-        if turns[-1] < turns[0]:
-            turns = -turns
+        turns = np.abs(np.unwrap(np.angle(np.asarray(signal.hilbert(drive), dtype=complex))))
         edges = np.arange(turns[record.settle], turns[-1], 2.0 * np.pi * SWEPT_CYCLES)
         bounds = np.searchsorted(np.maximum.accumulate(turns), edges)
-        for start, stop in itertools.pairwise(bounds):
-            if stop - start > 4 * SWEPT_CYCLES:
-                frequency = SWEPT_CYCLES * record.rate / (stop - start)
-                part = slice(int(start), int(stop))
-                yield _Piece(part, turns[part], SWEPT_CYCLES, _orders(record.rate, frequency))
+        for start, stop in itertools.pairwise(bounds.tolist()):
+            yield slice(start, stop), turns[start:stop], SWEPT_CYCLES
 
 
-def _orders(rate: float, frequency: float) -> int:
-    return min(HIGHEST_ORDER, int(0.4 * rate / frequency))
-
-
-def _powers(run: Run, piece: _Piece) -> list[tuple[float, float, list[float]]]:
+def _powers(
+    run: Run, part: slice, phase: Float[np.ndarray, " time"], cycles: int
+) -> list[tuple[float, float, list[float]]]:
     """Give, for each harmonic, power of the residual, of the response, and of the residual beside it."""
-    residual, output = run.residual[piece.part], run.record.output[piece.part]
-    output = output - np.mean(output)
+    residual, output = run.residual[part], run.record.output[part]
+    sides = [
+        residual * np.exp(-1j * sign * line / cycles * phase) for line in LINES_BESIDE for sign in (-1, 1)
+    ]
+    values = np.stack([residual, output - np.mean(output), *sides])
+    turn = np.exp(-1j * phase)
+    line = np.ones_like(turn)
     rows = []
-    for order in range(1, piece.orders + 1):
-        at = np.exp(-1j * order * piece.phase)
-        sides = [
-            _power(residual, np.exp(-1j * (order + sign * line / piece.cycles) * piece.phase))
-            for line in LINES_BESIDE
-            for sign in (-1, 1)
-        ]
-        rows.append((_power(residual, at), _power(output, at), sides))
+    for _ in range(min(HIGHEST_ORDER, int(_HIGHEST * residual.size / cycles))):
+        line = line * turn
+        powers = (np.abs(values @ line) ** 2 / residual.size).tolist()
+        rows.append((powers[0], powers[1], powers[2:]))
     return rows
-
-
-def _power(values: Float[np.ndarray, " time"], line: np.ndarray) -> float:
-    return float(np.abs(values @ line) ** 2) / values.size
