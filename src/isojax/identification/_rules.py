@@ -23,7 +23,7 @@ class Rules:
     good."""
 
     response_error: float = 1e-3
-    """Error that a channel may have, over the response at the same frequency, before the model is blamed."""
+    """Error that a channel may have, over the response, before the model is blamed."""
 
     good: float = 1.05
     """chi2/dof up to which a fit is good where no drive repeats, so that nothing shows the noise itself."""

@@ -70,14 +70,14 @@ class Evaluation:
 
     @cached_property
     def free_runs(self) -> tuple[Run, ...]:
-        """Every record simulated from its start to its end with nothing fed back; NaN if the search failed."""
+        """Every record simulated from its start to its end with nothing fed back; NaN if the fit failed."""
         with np.errstate(over="ignore", invalid="ignore"):
             runs = run_freely(self._everything, self._found.model)
         return runs if is_successful(self._found.result) else tuple(map(without_values, runs))
 
     @cached_property
     def restarts(self) -> Restarts:
-        """Every record with each segment restarted from its own best initial state; NaN if the search failed."""
+        """Every record with each segment restarted from its own best initial state; NaN if the fit failed."""
         found, fitted, everything = self._found, self._found.problem, self._everything
         nuisances = found.point.nuisances
         with np.errstate(over="ignore", invalid="ignore"):

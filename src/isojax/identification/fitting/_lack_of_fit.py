@@ -1,7 +1,7 @@
 """Lack of fit against pure error: what of a residual comes back with every cycle of the drive."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +60,8 @@ def lack_of_fit(fit: Fit, tolerance: float) -> LackOfFit:
 
     Args:
         fit: the fit; its fitted records count, each segment restarted from its own best state.
-        tolerance: error that any channel may have, over the response at the same frequency [1].
+        tolerance: error that any channel may have at a line, over the response there or the rms of the
+            response over all lines, whichever is larger [1].
 
     Returns:
         The test.
@@ -68,7 +69,22 @@ def lack_of_fit(fit: Fit, tolerance: float) -> LackOfFit:
     Source: Pintelon & Schoukens 2012, System Identification: A Frequency Domain Approach, sec. 11.3 (cost
     against the noise that periods show); Box & Draper 1987 (lack of fit).
     """
-    runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
+    return locked_power(
+        [run for run in fit.restarts.runs if run.record.role == "fit"], len(fit.free), tolerance
+    )
+
+
+def locked_power(runs: Iterable[Run], coefficients: int, tolerance: float) -> LackOfFit:
+    """Test records against their simulation, as `lack_of_fit` does.
+
+    Args:
+        runs: the records, each segment restarted from its own best state.
+        coefficients: coefficients that were fitted to them.
+        tolerance: see `lack_of_fit`.
+
+    Returns:
+        The test.
+    """
     power, count, beside = 0.0, 0, 0
     for lines in itertools.chain.from_iterable(map(_lines, runs)):
         # One over a mean of n powers of noise is too large by n / (n - 1) on average.
@@ -78,7 +94,7 @@ def lack_of_fit(fit: Fit, tolerance: float) -> LackOfFit:
         beside += lines.noise.size
     if not count:
         return LackOfFit(float("nan"), float("nan"), (0.0, 0.0))
-    freedom = max(1.0, 2.0 * count - len(fit.free)), 2.0 * beside
+    freedom = max(1.0, 2.0 * count - coefficients), 2.0 * beside
     ratio = 2.0 * power / freedom[0]
     return LackOfFit(float(stats.f.sf(ratio, *freedom)), ratio, freedom)
 
@@ -104,9 +120,10 @@ def _periodic_lines(run: Run, period: int) -> Iterator[_Lines]:
     whole = slice(run.record.output.size - count * period, None)
     powers = [np.abs(np.fft.rfft(each[whole])) ** 2 for each in (run.residual, run.record.output)]
     places = np.arange(1, int(_HIGHEST * period)) * count
+    response = np.maximum(powers[1], np.mean(powers[1][places]))
     for band in np.array_split(places, max(1, places.size // LINES_A_BAND)):
         between = band[:, None] + np.arange(1, count)
-        yield _Lines(powers[0][band], powers[1][band], powers[0][between].ravel())
+        yield _Lines(powers[0][band], response[band], powers[0][between].ravel())
 
 
 def _whole_cycles(record: Record) -> Iterator[tuple[slice, Float[np.ndarray, " time"], int]]:
@@ -138,9 +155,9 @@ def _powers(
     values = np.stack([residual, output - np.mean(output), *sides])
     turn = np.exp(-1j * phase)
     line = np.ones_like(turn)
-    rows = []
+    rows: list[list[float]] = []
     for _ in range(min(HIGHEST_ORDER, int(_HIGHEST * residual.size / cycles))):
         line = line * turn
-        powers = (np.abs(values @ line) ** 2 / residual.size).tolist()
-        rows.append((powers[0], powers[1], powers[2:]))
-    return rows
+        rows.append((np.abs(values @ line) ** 2 / residual.size).tolist())
+    mean = float(np.mean([row[1] for row in rows])) if rows else 0.0
+    return [(row[0], max(row[1], mean), row[2:]) for row in rows]
