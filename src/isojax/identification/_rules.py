@@ -76,7 +76,7 @@ class Rules:
     parameters may make up a part of that."""
 
     far: float = 2.0
-    """chi2/dof from which the balance of measured forces proposes a candidate, too, and from which
+    """chi2/dof from which no fit is good, the balance of measured forces proposes a candidate, too, and
     correlated candidates are refitted: a score is a derivative at the fit."""
 
     # When a search ends.

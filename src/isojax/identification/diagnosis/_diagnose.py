@@ -29,16 +29,16 @@ def is_good(fit: Fit, first_excess: float, rules: Rules) -> bool:
 
     Returns:
         Where the drive of a record repeats: whether what is left is no more locked to it than noise and the
-        declared error of the response are. Elsewhere whether chi2/dof is near one. True also if hardly any of
-        the first excess is left.
+        declared error of the response are, and the fit is not far from the records. Elsewhere whether chi2/dof
+        is near one. True also if hardly any of the first excess is left.
     """
-    found = fit.estimate
+    found, ratio = fit.estimate, _ratio(fit)
     if found.excess < rules.left_over * first_excess:
         return True
     test = lack_of_fit(fit, rules.response_error)
     if np.isfinite(test.p_value):
-        return test.p_value > rules.lack_of_fit
-    return found.chi2 / found.dof <= rules.good
+        return test.p_value > rules.lack_of_fit and ratio <= rules.far
+    return ratio <= rules.good
 
 
 def diagnose(
@@ -146,6 +146,8 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     bounds = upper_bounds(test, fitted, None, rules) if good else {}
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
+    if good and case.chi2_per_dof > rules.good:
+        words = "The fit is good, what exceeds the noise does not repeat with the drive, and "
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
 
 
