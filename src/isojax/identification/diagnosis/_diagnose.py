@@ -29,8 +29,8 @@ def is_good(fit: Fit, first_excess: float, rules: Rules) -> bool:
 
     Returns:
         Where the drive of a record repeats: whether what is left is no more locked to it than noise and the
-        declared error of the response are, and the fit is not far from the records. Elsewhere whether chi2/dof
-        is near one. True also if hardly any of the first excess is left.
+        declared error of the response are, and the fit is not far from the records. Elsewhere whether
+        chi2/dof is near one. True also if hardly any of the first excess is left.
     """
     found, ratio = fit.estimate, _ratio(fit)
     if found.excess < rules.left_over * first_excess:
