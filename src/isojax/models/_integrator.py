@@ -7,6 +7,9 @@ from jaxtyping import Array, Float
 from ._isolator import Isolator
 from ._rk4 import RK4
 
+_FINE_STEPS = 4
+"""Steps a sample of a table that is interpolated: eight parts, as fine as that of a `Sampled` drive."""
+
 
 class Integrator(eqx.Module):
     """Solver, steps and tolerances; every derived tolerance follows from these.
@@ -70,6 +73,24 @@ class Integrator(eqx.Module):
         """
         return max(self.substeps, *(one.substeps for one in model.elements if not one.splits), 1)
 
+    @property
+    def is_locked(self) -> bool:
+        """Whether records are stepped by RK4 from sample to sample, under one scan without diffrax's loop."""
+        return isinstance(self.solver, RK4)
+
+    def table_steps(self, model: Isolator) -> int:
+        """Give the steps a sample, of two parts each, into which a record's drive is tabulated.
+
+        Args:
+            model: the isolator.
+
+        Returns:
+            Those of RK4; for any other solver enough to interpolate the table between them.
+        """
+        if self.is_locked:
+            return self.record_steps(model)
+        return max(_FINE_STEPS, self.steps_per_sample(model))
+
     def steps_a_period(self, model: Isolator) -> int:
         """Give the integration steps a drive period.
 
@@ -121,11 +142,14 @@ class Integrator(eqx.Module):
         """
         return 0.5 * self.map_error
 
-    def controller(self, times: Float[Array, " time"]) -> diffrax.AbstractStepSizeController:
+    def controller(
+        self, times: Float[Array, " time"], shortest: Float[Array, ""]
+    ) -> diffrax.AbstractStepSizeController:
         """Give diffrax's step size controller.
 
         Args:
-            times: ends of the fixed steps [s].
+            times: ends of the fixed steps.
+            shortest: adaptive step below which the integration gives up.
 
         Returns:
             A controller that steps from one of these times to the next, or an adaptive one where `rtol` is
@@ -133,4 +157,4 @@ class Integrator(eqx.Module):
         """
         if self.rtol is None:
             return diffrax.StepTo(ts=times)
-        return diffrax.PIDController(rtol=self.rtol, atol=self.atol)
+        return diffrax.PIDController(rtol=self.rtol, atol=self.atol, dtmin=shortest, force_dtmin=False)
