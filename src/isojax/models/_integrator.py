@@ -15,8 +15,9 @@ class Integrator(eqx.Module):
     """Solver, steps and tolerances; every derived tolerance follows from these.
 
     Attributes:
-        solver: a diffrax solver; `RK4` for sample-locked work.
-        substeps: steps a sample at least; elements with sharp laws raise it (see `steps_per_sample`).
+        solver: a diffrax solver. `RK4` steps records from sample to sample, without diffrax's own loop; any
+            other simulates them through `diffrax.diffeqsolve`.
+        substeps: fixed steps a sample at least; elements with sharp laws raise it (see `steps_per_sample`).
         rtol: relative tolerance of adaptive steps, or None for fixed steps.
         atol: absolute tolerance of adaptive steps on the state in SI units, used where `rtol` is given.
         max_steps: steps after which one simulation gives up.
@@ -77,6 +78,22 @@ class Integrator(eqx.Module):
     def is_locked(self) -> bool:
         """Whether records are stepped by RK4 from sample to sample, under one scan without diffrax's loop."""
         return isinstance(self.solver, RK4)
+
+    def words(self, model: Isolator) -> str:
+        """Say how records of a model are integrated.
+
+        Args:
+            model: the isolator.
+
+        Returns:
+            Such as "RK4, 1 a sample" or "Dopri8 of diffrax, rtol 1e-08, atol 1e-12".
+        """
+        name = type(self.solver).__name__
+        if self.is_locked:
+            return f"{name}, {self.record_steps(model)} a sample"
+        if self.rtol is None:
+            return f"{name} of diffrax, {self.steps_per_sample(model)} a sample"
+        return f"{name} of diffrax, rtol {self.rtol:g}, atol {self.atol:g}"
 
     def table_steps(self, model: Isolator) -> int:
         """Give the steps a sample, of two parts each, into which a record's drive is tabulated.
@@ -143,13 +160,18 @@ class Integrator(eqx.Module):
         return 0.5 * self.map_error
 
     def controller(
-        self, times: Float[Array, " time"], shortest: Float[Array, ""]
+        self,
+        times: Float[Array, " time"],
+        shortest: Float[Array, ""],
+        jumps: Float[Array, " jump"] | None = None,
     ) -> diffrax.AbstractStepSizeController:
         """Give diffrax's step size controller.
 
         Args:
             times: ends of the fixed steps.
             shortest: adaptive step below which the integration gives up.
+            jumps: times at which the equation of motion jumps: an adaptive step ends before and starts again
+                after.
 
         Returns:
             A controller that steps from one of these times to the next, or an adaptive one where `rtol` is
@@ -157,4 +179,5 @@ class Integrator(eqx.Module):
         """
         if self.rtol is None:
             return diffrax.StepTo(ts=times)
-        return diffrax.PIDController(rtol=self.rtol, atol=self.atol, dtmin=shortest, force_dtmin=False)
+        adaptive = diffrax.PIDController(rtol=self.rtol, atol=self.atol, dtmin=shortest, force_dtmin=False)
+        return adaptive if jumps is None else diffrax.ClipStepSizeController(adaptive, jump_ts=jumps)

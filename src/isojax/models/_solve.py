@@ -36,15 +36,12 @@ def solve_ode(
         state: at the first of `steps`.
         wanted: times whose states are given, ascending.
         steps: ends of the fixed steps, the first time among them.
-        jumps: times at which the field jumps, if any: an adaptive step ends before and starts again after.
+        jumps: times at which the field jumps, if any; see `Integrator.controller`.
 
     Returns:
         States at the times wanted; how the integration ended.
     """
     length = steps[1] - steps[0]
-    controller = integrator.controller(steps, _SHORTEST_STEP * length)
-    if jumps is not None and integrator.rtol is not None:
-        controller = diffrax.ClipStepSizeController(controller, jump_ts=jumps)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(lambda t, y, args: field(t, y)),  # pyright: ignore[reportArgumentType]
         integrator.solver,
@@ -53,7 +50,7 @@ def solve_ode(
         dt0=None if integrator.rtol is None else length,
         y0=state,
         saveat=diffrax.SaveAt(ts=wanted),
-        stepsize_controller=controller,
+        stepsize_controller=integrator.controller(steps, _SHORTEST_STEP * length, jumps),
         adjoint=diffrax.ForwardMode(),
         max_steps=integrator.max_steps,
         throw=False,
@@ -117,6 +114,38 @@ def solve_record(
     samples = jnp.arange(1, count, dtype=float)
     path, ended = solve_ode(field, integrator, state, wanted, ends, samples if jumps else None)
     return tuple(jnp.where(ended == diffrax.RESULTS.successful, values, jnp.nan) for values in path)
+
+
+def check_integrator(integrator: object) -> None:
+    """Refuse what cannot simulate records: its solver is traced, derivatives included, and nothing is run.
+
+    Args:
+        integrator: what a caller gave as argument `integrator`.
+
+    Raises:
+        ValueError: if it is no `Integrator`, or its solver does not solve ordinary differential equations
+            with the steps asked for.
+    """
+    if not isinstance(integrator, Integrator):
+        raise ValueError(
+            "Argument `integrator` must be an Integrator, such as "
+            f"isojax.Integrator(diffrax.Dopri8(), rtol=1e-8), but is {integrator!r}."
+        )
+    if integrator.is_locked:
+        return
+    times = jnp.arange(3.0)
+
+    def motion(start: Array) -> State:
+        return solve_ode(lambda t, y: (-y[0],), integrator, (start,), times, times, times[1:2])[0]
+
+    try:
+        jax.eval_shape(lambda start: jax.jvp(motion, (start,), (start,)), times[0])
+    # Whatever diffrax has against a solver, it says so while it is traced, each in an exception of its own.
+    except Exception as trouble:
+        raise ValueError(
+            "Argument `integrator` must hold a solver of ordinary differential equations that diffrax can "
+            f"step as asked, but holds {type(integrator.solver).__name__}: {str(trouble).splitlines()[0]}"
+        ) from trouble
 
 
 def _lagrange(place: Array) -> Float[Array, "4"]:

@@ -44,8 +44,10 @@ def find_stepping(prepared: Prepared) -> Stepping:
     """
     if prepared.integrator.is_locked:
         return Stepping(fixed_information, fixed_readings, fixed_path)
-    solved = solved_information, solved_readings, solved_path
-    return Stepping(*(partial(one, prepared.integrator, prepared.jumps) for one in solved))
+    how = prepared.integrator, prepared.jumps
+    return Stepping(
+        partial(solved_information, *how), partial(solved_readings, *how), partial(solved_path, *how)
+    )
 
 
 def share_lanes(values: np.ndarray, part: int, parts: int) -> tuple[Array, ...]:
