@@ -4,6 +4,7 @@
 
 A page has the law, the parameters, the look-alikes and the source of an effect, all from its class. What is
 written by hand, such as a signature or a picture, stands in `docs/effects/<name>.md` and is put in between.
+Look-alikes written there and those that the classes declare come into one table.
 An effect without such a file has a complete page all the same. Pages are made when the site is built and are
 not kept in the repository, so that none can be out of date.
 """
@@ -19,6 +20,11 @@ from isojax._parameters import ParameterSpec, own_parameters
 from isojax.elements import CATALOGUE, AbstractElement, Group
 
 NOTES = Path(__file__).parent / "effects"
+
+_ROWS = r"\| it could be [^\n]*\n\|[-|]+\n((?:\|[^\n]*\n)*)"
+_BY_HAND = re.compile(rf"^## Look-alikes\n\n(?:{_ROWS})?", re.MULTILINE)
+_CELLS = re.compile(r"(?<!\\)\|")
+_NAME = re.compile(r"^`(\w+)`$")
 
 
 def sections(kind: type[AbstractElement]) -> tuple[str, dict[str, str], str]:
@@ -38,15 +44,34 @@ def bounds(spec: ParameterSpec) -> str:
     return f"{low} to {high}" if low and high else f">= {low}" if low else f"<= {high}" if high else "none"
 
 
-def look_alikes(name: str) -> list[str]:
-    """Give a row of a table for each effect that records can confuse with one."""
-    return [
-        f"| [`{other}`]({other}.md) | {likeness(alike.exact, alike.beside)} | {alike.test} |"
-        for other in CATALOGUE
-        for declarer, kind in CATALOGUE.items()
-        for alike in kind.look_alikes
-        if other != name and alike.separates(declarer, {name, other})
-    ]
+def look_alikes(name: str, by_hand: str = "") -> str:
+    """Give the table of the effects that records can confuse with one: the declared, and those by hand.
+
+    Args:
+        name: catalogue name.
+        by_hand: rows of two cells, what it could be and what separates the two.
+    """
+    own = [[cell.strip() for cell in _CELLS.split(row)[1:-1]] for row in by_hand.splitlines()]
+    # What is said of an effect alone, with no condition beside its name, goes into the row of that effect.
+    cells = [(row, cell) for row in own for cell in row[0].split(", ")]
+    words = {other: (row, cell) for row, cell in cells for other in _NAME.findall(cell)}
+    placed, rows = [f"`{name}`"], []
+    for other in CATALOGUE:
+        for declarer, kind in CATALOGUE.items():
+            for alike in kind.look_alikes:
+                if other != name and alike.separates(declarer, {name, other}):
+                    (_, said), cell = words.get(other, (("", ""), ""))
+                    placed.append(cell)
+                    likely = likeness(alike.exact, alike.beside)
+                    rows.append(f"| [`{other}`]({other}.md) | {likely} | {said} | {alike.test} |")
+    for cell, said in own:
+        others = ", ".join(one for one in cell.split(", ") if one not in placed)
+        if others:
+            rows.append(f"| {others} | not declared | {said} | |")
+    if not rows:
+        return "None is declared: one level lower and one higher separate most laws."
+    head = ["| it could be | alike | what separates the two | the test for it |", "|---|---|---|---|"]
+    return "\n".join([*head, *rows])
 
 
 def likeness(exact: bool, beside: tuple[str, ...]) -> str:
@@ -88,16 +113,9 @@ def page(name: str, notes: str = "") -> str:
         "|---|---|---|---|---|---|",
         *rows,
     ]
-    alike = look_alikes(name)
-    tests = ["| it could be | alike | the test that separates them |", "|---|---|---|", *alike]
-    body = [
-        *head,
-        "\n".join(table),
-        notes.strip(),
-        "## Look-alikes that the diagnosis knows",
-        "\n".join(tests) if alike else "None is declared: one level lower and one higher separate most laws.",
-        f"Source: {source}",
-    ]
+    before, by_hand, after = [*_BY_HAND.split(notes, maxsplit=1), "", ""][:3]
+    alike = f"## Look-alikes\n\n{look_alikes(name, by_hand or '')}"
+    body = [*head, "\n".join(table), before.strip(), alike, after.strip(), f"Source: {source}"]
     return "\n\n".join(part for part in body if part) + "\n"
 
 

@@ -50,11 +50,28 @@ _MOST_MAPPINGS = 40_000
 """Memory mappings of the process from which compiled code is let go; Linux allows 65530, and every compiled
 function takes several. Beyond that limit the compiler does not raise, it crashes."""
 
+_compiled_since: list[str] = []
+"""An entry for each function compiled, or read from the folder, since the mappings were last counted."""
+
+
+def _note_compiled(event: str, _: float, **__: object) -> None:
+    if event == "/jax/core/compile/backend_compile_duration":
+        _compiled_since.append(event)
+
+
+jax.monitoring.register_event_duration_secs_listener(_note_compiled)
+
 
 @pytest.fixture(autouse=True)
 def _let_compiled_code_go() -> Iterator[None]:
-    """Forget compiled functions after a test, once they crowd the address space."""
+    """Forget compiled functions after a test, once they crowd the address space.
+
+    To count the mappings takes up to a tenth of a second, too long for a test that compiled next to nothing.
+    """
     yield
+    if len(_compiled_since) < 300:
+        return
+    _compiled_since.clear()
     mappings = Path("/proc/self/maps")
     if mappings.exists() and len(mappings.read_bytes().splitlines()) > _MOST_MAPPINGS:
         jax.clear_caches()
@@ -77,6 +94,7 @@ _WORTH_OPTIMISING = (
     "test_fold_curve.py",
     "test_paper.py",
     "test_blind_sample.py",
+    "02_the_papers_map",
 )
 """Tests that run longer than they compile: maps, attractors, many curves or campaigns of one shape."""
 
@@ -85,23 +103,25 @@ _WORTH_OPTIMISING = (
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Optimise compiled code where that is worth its time; before any fixture is made.
 
-    Elsewhere small records run no slower than they would compile.
+    Elsewhere small records run no slower than they would compile. Processes that the test starts do alike, so
+    that they find what was compiled here.
     """
     optimise = any(part in item.nodeid for part in _WORTH_OPTIMISING)
     jax.config.update("jax_disable_most_optimizations", not optimise)
+    os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = str(not optimise).lower()
 
 
 _LONGEST = (
     "test_blind_sample.py",
-    "test_cli.py",
+    "test_examples.py",
     "test_fold_curve.py",
+    "test_notebooks.py",
     "test_special_points.py",
     "test_orbit.py",
-    "test_notebooks.py",
     "test_transients.py",
 )
-"""Files that take minutes, the longest first; the demo before the notebook that runs the same loop again, so
-that the latter finds it compiled."""
+"""Files that take minutes, the longest first; the notebooks after the files that compile the same loop and
+curves, so that they find these compiled."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

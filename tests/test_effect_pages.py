@@ -66,6 +66,29 @@ def test_notes_become_part_of_the_page_of_their_effect():
     )
 
 
+def test_look_alikes_of_notes_and_of_the_classes_make_one_table():
+    notes = "## Look-alikes\n\n| it could be | what separates the two |\n|---|---|\n"
+    notes += (
+        "| `dahl_friction`, `linear_damping` | the level |\n| `bouc_wen` far away | the place |\n\nMeasure.\n"
+    )
+    page = build_catalogue.page("coulomb_friction", notes)
+    assert page.count("## Look-alikes") == 1
+    assert page.index("the place") < page.index("Measure.") < page.index("Source:")
+    rows = [line for line in page.splitlines() if line.startswith("|") and "friction" in line]
+    assert ["| the level |" in row for row in rows if "](dahl_friction.md)" in row] == [True]
+    assert "| `linear_damping` | not declared | the level | |" in page
+    assert "| `bouc_wen` far away | not declared | the place | |" in page
+
+
+def test_no_row_by_hand_is_lost_from_a_page():
+    for name in CATALOGUE:
+        notes = FOLDER / f"{name}.md"
+        for row in re.findall(r"^\| .*\|$", notes.read_text("utf-8") if notes.exists() else "", re.MULTILINE):
+            names, said = (cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:3])
+            assert said in PAGES[f"{name}.md"] or names == "it could be"
+            assert all(word in PAGES[f"{name}.md"] for word in re.findall(r"`\w+`", names))
+
+
 def test_every_picture_is_on_a_page_and_of_a_size_that_loads():
     shown = {picture for page in PAGES.values() for picture in re.findall(PICTURE, page)}
     assert shown == {path.name for path in FOLDER.glob("*.png")}

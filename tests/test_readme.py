@@ -1,18 +1,14 @@
-"""README.md stays short, its links lead somewhere, and everything in it that can run does run."""
+"""README.md stays short, its links lead somewhere, and its campaign is read; test_examples.py runs it."""
 
 import re
 import tomllib
 from pathlib import Path
-
-import matplotlib as mpl
-import pytest
 
 from isojax.records.reading._declaration import read_declaration
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PROSE = re.sub(r"^```.*?^```$", "", README, flags=re.MULTILINE | re.DOTALL)
-SCRIPTS = re.findall(r"^## ([^\n]+)\n+```python\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 
 
 def test_it_is_read_in_five_minutes():
@@ -36,16 +32,3 @@ def test_the_campaign_is_read_without_complaint(tmp_path):
     declared = read_declaration(tmp_path)
     assert {record["role"] for record in declared.records} == {"fit", "holdout"}
     assert set(tomllib.loads(text)) == {"campaign", "input", "output", "sampling", "model", "record"}
-
-
-def test_there_is_a_script_for_a_fit_a_map_and_a_sensitivity():
-    assert [title for title, _ in SCRIPTS] == ["A fit", "A map", "A sensitivity"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("title", "script"), SCRIPTS, ids=[title for title, _ in SCRIPTS])
-def test_a_script_runs_by_itself(title, script, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    mpl.use("agg")
-    exec(compile(script, f"README.md, {title}", "exec"), {"__name__": "__main__"})
-    assert capsys.readouterr().out

@@ -1,12 +1,22 @@
-"""The examples in the docstrings of the public functions run and print what they say."""
+"""The scripts of README.md run, and the examples of the docstrings print what they say.
+
+They are in one file, so that one process runs them: both go from the demo campaign to a diagnosis, and from a
+branch to its sensitivity, and what the one has compiled serves the other.
+"""
 
 import doctest
 import inspect
+import re
+from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 
 import isojax as ij
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+SCRIPTS = re.findall(r"^## ([^\n]+)\n+```python\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 
 JOURNEY = """
     read_campaign classical_guess fit residual explain_remainder diagnose extend
@@ -15,6 +25,19 @@ JOURNEY = """
 """Examples that go on with what the one before has made, so that one test runs them in a row."""
 
 QUICK = {"Harmonic", "Integrator", "Isolator", "compile_quickly", "is_successful", "load_model", "save_model"}
+
+
+def test_readme_has_a_script_for_a_fit_a_map_and_a_sensitivity():
+    assert [title for title, _ in SCRIPTS] == ["A fit", "A map", "A sensitivity"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("title", "script"), SCRIPTS, ids=[title for title, _ in SCRIPTS])
+def test_a_script_of_readme_runs_by_itself(title, script, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    mpl.use("agg")
+    exec(compile(script, f"README.md, {title}", "exec"), {"__name__": "__main__"})
+    assert capsys.readouterr().out
 
 
 def documented():
