@@ -26,7 +26,7 @@ class Rules:
     """Error that a channel may have, over the response, before the model is blamed."""
 
     good: float = 1.05
-    """chi2/dof up to which a fit is good where no drive repeats, so that nothing shows the noise itself."""
+    """chi2/dof up to which a fit is good."""
 
     left_over: float = 0.03
     """Share of the first excess that a good fit may leave where the noise is far below every model
@@ -76,8 +76,8 @@ class Rules:
     parameters may make up a part of that."""
 
     far: float = 2.0
-    """chi2/dof from which no fit is good, the balance of measured forces proposes a candidate, too, and
-    correlated candidates are refitted: a score is a derivative at the fit."""
+    """chi2/dof from which the balance of measured forces proposes a candidate, too, and correlated candidates
+    are refitted: a score is a derivative at the fit."""
 
     # When a search ends.
 

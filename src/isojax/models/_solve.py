@@ -13,7 +13,7 @@ from ._integrator import Integrator
 from ._isolator import Isolator, Quantity
 from ._laws import State
 
-_SHORTEST_STEP = 1e-9
+_LEAST_STEP = 1e-9
 """Adaptive step, over a fixed one, below which a simulation gives up: it has diverged."""
 
 _NODES = 4
@@ -50,7 +50,7 @@ def solve_ode(
         dt0=None if integrator.rtol is None else length,
         y0=state,
         saveat=diffrax.SaveAt(ts=wanted),
-        stepsize_controller=integrator.controller(steps, _SHORTEST_STEP * length, jumps),
+        stepsize_controller=integrator.controller(steps, _LEAST_STEP * length, jumps),
         adjoint=diffrax.ForwardMode(),
         max_steps=integrator.max_steps,
         throw=False,

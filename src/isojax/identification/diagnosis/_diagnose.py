@@ -28,17 +28,17 @@ def is_good(fit: Fit, first_excess: float, rules: Rules) -> bool:
         rules: when that is so.
 
     Returns:
-        Where the drive of a record repeats: whether what is left is no more locked to it than noise and the
-        declared error of the response are, and the fit is not far from the records. Elsewhere whether
-        chi2/dof is near one. True also if hardly any of the first excess is left.
+        True if chi2/dof is near one and what is left is no more locked to the drive than noise and the
+        declared error of the response are; or if hardly any of the first excess is left.
     """
-    found, ratio = fit.estimate, _ratio(fit)
-    if found.excess < rules.left_over * first_excess:
+    if fit.estimate.excess < rules.left_over * first_excess:
         return True
-    test = lack_of_fit(fit, rules.response_error)
-    if np.isfinite(test.p_value):
-        return test.p_value > rules.lack_of_fit and ratio <= rules.far
-    return ratio <= rules.good
+    return _ratio(fit) <= rules.good and not is_locked(fit, rules)
+
+
+def is_locked(fit: Fit, rules: Rules) -> bool:
+    """Say whether what a fit leaves comes back with every cycle of the drive."""
+    return lack_of_fit(fit, rules.response_error).p_value < rules.lack_of_fit
 
 
 def diagnose(
@@ -146,8 +146,11 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     bounds = upper_bounds(test, fitted, None, rules) if good else {}
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
-    if good and case.chi2_per_dof > rules.good:
-        words = "The fit is good, what exceeds the noise does not repeat with the drive, and "
+    if not good and not is_locked(case.fit, rules):
+        words = (
+            "What exceeds the noise is not locked to the drive: the noise is larger than it was measured, or "
+            "something drifts, modulates or disturbs; "
+        )
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
 
 
