@@ -13,7 +13,7 @@ from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, smallest_inflation
 from ._findings import Candidate, Finding, Verdict
-from ._refit import Refit, bic, least_difference, refit_to_convergence, rivals
+from ._refit import Refit, bic, least_difference, refit_to_convergence, rivals, with_own_shape
 from ._score import absent_effects, score_test
 from ._separating_words import is_exact, separating_experiment
 from ._transfer import transferred_share
@@ -136,7 +136,9 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
         share = transferred_share(fitted, best.estimate, case.search)
         if share > 0.0:
             ranking = rank_candidates(test, refits, usable, inflation)
-            usable[0] = best._replace(estimate=refit_to_convergence(best.estimate, case.search))
+            name = best.score.element.name
+            converged = refit_to_convergence(best.estimate, case.search)
+            usable[0] = best._replace(estimate=with_own_shape(converged, name, case.search))
             return _verdict_of_finding(case, usable, ranking, share)
         # What imitates the missing effect on the records of its refit alone must not hide that effect.
         reason = f"{too_little}, but it does not carry over to data left out of its refit"

@@ -176,6 +176,39 @@ def refit_to_convergence(found: Estimate, search: Search) -> Estimate:
     return again if again.result == RESULTS.successful and better else found
 
 
+def with_own_shape(found: Estimate, name: str, search: Search) -> Estimate:
+    """Free what a finding holds of its own shape, such as the exponent of a loop, where the data ask for it.
+
+    Else the next search would name an effect that makes up for a shape which was never fitted. Numbers of a
+    computation, such as the width of a rounded corner, have no admissible interval and stay.
+
+    Args:
+        found: the finding, fitted to the end.
+        name: its catalogue name.
+        search: how to search.
+
+    Returns:
+        The fit with the shape free where Schwarz's criterion is clearly lower, else `found`.
+    """
+    listed = list_parameters(found.model)
+    held = [
+        place
+        for place, entry in enumerate(listed)
+        if entry.name.startswith(f"{name}.")
+        and place not in found.places
+        and np.isfinite(entry.spec.lower)
+        and np.isfinite(entry.spec.upper)
+    ]
+    if not held:
+        return found
+    search.progress(f"is the shape of {name} as it was taken?")
+    places = tuple(sorted((*found.places, *held)))
+    freed = estimate(found.simulator, found.model, places, search, found.point.nuisances)
+    inflation = max(1.0, freed.chi2 / freed.dof)
+    clear = bic(found, inflation) - bic(freed, inflation) > search.rules.close_bic
+    return freed if freed.result == RESULTS.successful and clear else found
+
+
 def is_determined(found: Estimate, score: Score, errors: float) -> bool:
     """Say whether a refitted strength is clearly not zero.
 
