@@ -5,10 +5,11 @@ import pytest
 
 from isojax.elements import StribeckFriction
 from isojax.identification import DriftBudget, Errors, Fit
+from isojax.identification._close_loop import overall_verdict
 from isojax.records import NoisePeak, data_health
 from isojax.reporting import render_text, verdict_summary
 from isojax.reporting.words._health_words import budget_words
-from isojax.reporting.words._sentences import caveats, doubt_words, finding_words, headline, health_words
+from isojax.reporting.words._sentences import caveats, finding_words, headline, health_words
 
 
 @pytest.mark.parametrize(
@@ -30,46 +31,39 @@ def test_headline_says_what_the_verdict_says(found, verdict, start):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "samples", "verdict", "said"),
+    ("before", "after", "samples", "said"),
     [
-        (1.16, 1.32, 9e3, "found", "contradict it: they are predicted worse than without it."),
-        (1.16, 1.32, 9e3, "partly_explained", "contradict it: they are predicted worse than without it."),
-        (1.16, 1.12, 9e3, "found", "down to their noise: another law may act there."),
-        (1.16, 1.12, 9e3, "partly_explained", ""),
-        (1.16, 1.04, 9e3, "found", ""),
-        (0.98, 1.03, 9e3, "found", ""),
+        (1.16, 1.32, 9e3, "contradict it: they are predicted worse than without it."),
+        (1.16, 1.12, 9e3, "down to their noise: another law may act there."),
+        (1.16, 1.04, 9e3, ""),
+        (0.98, 1.03, 9e3, ""),
         # Of few samples chi2/dof scatters by itself: sqrt(2 / 300) is 0.08.
-        (1.16, 1.12, 300.0, "found", ""),
-        (1.16, 1.30, 100.0, "partly_explained", ""),
-        (1.22, 1.30, 300.0, "found", "down to their noise: another law may act there."),
-        (3.00, math.nan, 9e3, "found", "contradict it: the model diverges on them."),
+        (1.16, 1.12, 300.0, ""),
+        (1.16, 1.30, 100.0, ""),
+        (1.22, 1.30, 300.0, "down to their noise: another law may act there."),
+        (3.00, math.nan, 9e3, "contradict it: the model diverges on them."),
     ],
 )
-def test_what_held_out_records_say_against_a_finding_is_told(
-    before, after, samples, verdict, said, found, monkeypatch
+def test_what_held_out_records_say_against_a_finding_is_told_and_it_is_not_called_found(
+    before, after, samples, said, found, monkeypatch
 ):
     def errors(held):
         return {"holdout": Errors(0.01, 0.04, 0.04, before if held is found.before else after, samples)}
 
+    plain = headline(dataclasses.replace(found))
     monkeypatch.setattr(Fit, "errors", property(errors))
-    told = doubt_words(dataclasses.replace(found, verdict=verdict))
-    assert told.endswith(said)
-    assert bool(told) == bool(said)
-    assert doubt_words(dataclasses.replace(found, verdict="none", extensions=())) == ""
+    loop = dataclasses.replace(found)
+    assert headline(loop).endswith(said)
+    assert ("held-out records" in headline(loop).removeprefix(plain)) == bool(said)
+    expected = "partly_explained" if said else "found"
+    assert overall_verdict(found.before, found.after, 1, found.last, found.rules) == expected
+    assert dataclasses.replace(found, extensions=()).doubt == ""
 
 
 def test_of_what_is_below_the_noise_no_share_is_told(found):
     finding = found.findings[0]
     assert "it leaves no excess." in finding_words(finding._replace(transfer=1014.4))[1]
     assert "it removes 62.0 % of the excess." in finding_words(finding._replace(transfer=0.62))[1]
-
-
-def test_a_doubt_stands_in_the_headline(found, monkeypatch):
-    doubt = "isojax.reporting.words._sentences.doubt_words"
-    monkeypatch.setattr(doubt, lambda loop: "")
-    plain = headline(found)
-    monkeypatch.setattr(doubt, lambda loop: "But they do not agree.")
-    assert headline(found) == f"{plain} But they do not agree."
 
 
 def test_headline_without_findings_names_nothing(found):

@@ -1,10 +1,13 @@
 """The closed loop: fit, find what is missing, add it, and again until nothing significant is missing."""
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
+
+import scipy.stats
 
 from .._progress import KeyFigure, Stage
 from .._results import RESULTS, is_successful
@@ -26,6 +29,11 @@ from .experiment import with_separating_experiment
 from .fitting import DEFAULT_SOLVER, Fit, Search, fit, search_of, silent
 from .guess import ClassicalGuess, classical_guess
 from .remainder import Remainder, explain_remainder
+
+Doubt = Literal["", "diverges", "worse", "not down to noise"]
+
+LEAST_RISE = 0.01
+"""Rise of the held-out chi2/dof that matters, where chance does not explain it."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -61,6 +69,13 @@ class Loop:
     def findings(self) -> tuple[Finding, ...]:
         """The effects found, in the order of discovery; not those that a later one contains."""
         return findings_in(self.after.model, self.extensions)
+
+    @cached_property
+    def doubt(self) -> Doubt:
+        """What held-out records say against the findings; "" where there is nothing."""
+        if not self.findings or not is_successful(self.after.result):
+            return ""
+        return held_out_doubt(self.before, self.after, self.rules)
 
     @cached_property
     def remainder(self) -> Remainder | None:
@@ -110,7 +125,8 @@ def close_loop(
 ) -> Loop:
     """Fit the declared model, add the effect that it lacks, and repeat until nothing significant is missing.
 
-    Held-out records are never used to fit a coefficient, to choose an effect or to stop.
+    Held-out records are never used to fit a coefficient, to choose an effect or to stop. What they speak
+    against is not called "found".
 
     Args:
         campaign: the measurements.
@@ -218,12 +234,38 @@ def _grow(
         current = extensions[-1].after
 
 
+def held_out_doubt(before: Fit, final: Fit, rules: Rules) -> Doubt:
+    """Say what held-out records say against the findings.
+
+    Args:
+        before: the declared model, fitted.
+        final: the model with the findings, fitted.
+        rules: when a fit is good, and what chance does not explain.
+
+    Returns:
+        Whether the final model diverges on them, predicts them worse than without the findings, or not down
+        to their noise; "" where nothing speaks against it or no record was held out.
+    """
+    first, last = before.errors["holdout"], final.errors["holdout"]
+    if first is None or last is None:
+        return ""
+    if not math.isfinite(last.chi2_per_dof):
+        return "diverges"
+    chance = scipy.stats.chi2.sf(last.chi2_per_dof * last.dof, last.dof)
+    if last.chi2_per_dof <= rules.good or chance > rules.significance:
+        return ""
+    # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
+    rise = last.chi2_per_dof - first.chi2_per_dof
+    is_worse = rise > LEAST_RISE and rise > 3.0 * 2.0 * math.sqrt(rise / last.dof)
+    return "worse" if is_worse else "not down to noise"
+
+
 def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules: Rules) -> VerdictWord:
     """Give the verdict over all iterations."""
     first, found = before.estimate, final.estimate
     if not findings or not is_successful(final.result):
         return last.verdict
     if findings <= rules.most_at_once and is_good(final, first.excess, rules):
-        return "found"
+        return "partly_explained" if held_out_doubt(before, final, rules) else "found"
     explained = 1.0 - found.excess / max(first.excess, 1.0)
     return "partly_explained" if explained >= rules.most_of_it else "unexplained"

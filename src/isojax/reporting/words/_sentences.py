@@ -2,8 +2,6 @@
 
 import math
 
-import scipy.stats
-
 from ..._parameters import Parameter, list_parameters
 from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE
@@ -81,8 +79,14 @@ def error_words(before: Fit, after: Fit) -> str:
     return f"{place} {typeset_goodness(first.chi2_per_dof, 2)} → {typeset_goodness(last.chi2_per_dof, 2)}"
 
 
-LEAST_RISE = 0.01
-"""Rise of the held-out chi2/dof that matters, where chance does not explain it."""
+_DOUBTS = {
+    "": "",
+    "diverges": "The held-out records contradict it: the model diverges on them.",
+    "worse": "The held-out records contradict it: they are predicted worse than without it.",
+    "not down to noise": (
+        "The model does not explain the held-out records down to their noise: another law may act there."
+    ),
+}
 
 
 def headline(loop: Loop) -> str:
@@ -94,30 +98,7 @@ def headline(loop: Loop) -> str:
     Returns:
         The sentences.
     """
-    return " ".join(part for part in (_verdict_words(loop), doubt_words(loop)) if part)
-
-
-def doubt_words(loop: Loop) -> str:
-    """Give what held-out records say against the finding.
-
-    They never change a verdict, or they would not be held out; but the reader must know.
-    """
-    before, after = loop.before.errors["holdout"], loop.after.errors["holdout"]
-    if before is None or after is None or not loop.findings or not is_successful(loop.after.result):
-        return ""
-    last, rise = after.chi2_per_dof, after.chi2_per_dof - before.chi2_per_dof
-    if not math.isfinite(last):
-        return "The held-out records contradict it: the model diverges on them."
-    if last <= loop.rules.good or scipy.stats.chi2.sf(last * after.dof, after.dof) > loop.rules.significance:
-        return ""
-    # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
-    if rise > LEAST_RISE and rise > 3.0 * 2.0 * math.sqrt(rise / after.dof):
-        return "The held-out records contradict it: they are predicted worse than without it."
-    if loop.verdict == "found":
-        return (
-            "The model does not explain the held-out records down to their noise: another law may act there."
-        )
-    return ""
+    return " ".join(part for part in (_verdict_words(loop), _DOUBTS[loop.doubt]) if part)
 
 
 def _verdict_words(loop: Loop) -> str:
@@ -135,6 +116,8 @@ def _verdict_words(loop: Loop) -> str:
             f"{_capital(effects)}, explain the records together; so many may together imitate one law "
             f"which is not known here; {error} (noise alone: 1)."
         )
+    if loop.verdict == "partly_explained" and found and loop.doubt:
+        return f"{_capital(effects)}, would explain the records; {error}."
     if loop.verdict == "partly_explained" and found:
         return f"{_capital(effects)}, {verb} missing, but something else is too; {error} (noise alone: 1)."
     pending = loop.last.finding
