@@ -94,12 +94,13 @@ def remembered(function: Callable[..., Any], known: list) -> Callable[..., Any]:
 
     def call(*arguments: Any, **named: Any) -> Any:
         everything = (*arguments, *named.values())
-        rules = next(
+        rules = (
             one.rules if isinstance(one, Search) else one
             for one in everything
             if isinstance(one, Search | Rules)
         )
-        values = vars(rules)
+        # What is given no rules reads none.
+        values = vars(next(rules, Rules()))
         key = function.__name__, *map(_key, everything)
         entry = next(
             (
