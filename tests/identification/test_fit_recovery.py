@@ -73,6 +73,7 @@ ELSEWHERE = {
         "lugre_friction",
         "second_mode",
     ),
+    "test_clock_skew.py": ("clock_skew",),
     "test_channels.py": ("drive_harmonics", "input_hold", "mains_hum", "stiffness_drift"),
     "test_moving_floor.py": ("floor_motion",),
 }

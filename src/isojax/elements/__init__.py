@@ -18,6 +18,7 @@ from ._base import LookAlike as LookAlike
 from ._base import Scales as Scales
 from ._bouc_wen import BoucWen as BoucWen
 from ._clipping import Clipping as Clipping
+from ._clock_skew import ClockSkew as ClockSkew
 from ._coulomb_friction import CoulombFriction as CoulombFriction
 from ._cubic_damping import CubicDamping as CubicDamping
 from ._cubic_stiffness import CubicStiffness as CubicStiffness

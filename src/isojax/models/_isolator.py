@@ -152,9 +152,18 @@ class Isolator(eqx.Module):
         """List the elements that follow signals of the record, where there is one."""
         return tuple(element for element in self.elements if element.channels) if channels else ()
 
-    def shift(self) -> Lanes | float:
-        """Give the time by which the recorded drive leads the one that acted [s]."""
-        return sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
+    def shift(self, elapsed: Lanes | float | None = None) -> Lanes | float:
+        """Give the time by which the recorded drive leads the one that acted [s].
+
+        Args:
+            elapsed: time since the start of the record [s]; none where there is no record.
+        """
+        shift = sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
+        return shift if elapsed is None else shift + self.skew() * elapsed
+
+    def skew(self) -> Lanes | float:
+        """Give the rate at which `shift` grows with the time since the start of the record [1]."""
+        return sum((element.skew() for element in self.elements), start=cast("Lanes | float", 0.0))
 
     def drive(self, at: Instant) -> tuple[Lanes, Lanes]:
         """Give the drive that acted, and its rate.

@@ -160,3 +160,23 @@ class Clipping(Instrument):
     ) -> Float[np.ndarray, " time"]:
         """The output within the level."""
         return np.minimum(np.maximum(output, -self.level), self.level)
+
+
+@dataclass(frozen=True)
+class ClockSkew(Instrument):
+    """The clock of the output channel runs fast: what it files under t it saw at t / (1 + skew).
+
+    Both start with the record. The output between the instants of the fine grid is that of a spline.
+
+    Args:
+        skew: 1; 1e-6 is one ppm.
+    """
+
+    name: ClassVar[str] = "clock_skew"
+    skew: float
+
+    def recorded_output(
+        self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The output as the other clock files it; a slow one reads a little past the end of the spline."""
+        return CubicSpline(times, output)(times / (1 + self.skew))

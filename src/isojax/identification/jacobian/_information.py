@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from ..._parameters import find_parameter, list_parameters, replace_parameters
 from ...models import RK4, Instant, Isolator, Quantity, State, advance_record, read_record, split_stages
 from ._batch import Batch, Prepared, workers
+from ._channels import elapsed
 
 
 class Unknowns(NamedTuple):
@@ -60,6 +61,20 @@ def scaled_model(model: Isolator, values: Sequence[Array], scale: Array) -> Isol
     return replace_parameters(model, numbers)
 
 
+def with_delay_slope(model: Isolator, at: Instant) -> Instant:
+    """Give an instant of a table of the delayed drive the derivative with respect to the delay, too.
+
+    Args:
+        model: the isolator, whose delay the table has.
+        at: what acts.
+
+    Returns:
+        The instant, its numbers unchanged.
+    """
+    delay = model.shift(elapsed(at.channels))
+    return at.delayed(delay - jax.lax.stop_gradient(delay))
+
+
 def has_stiffness_scale(model: Isolator) -> bool:
     """Say whether the model has a linear spring, whose stiffness may differ from record to record.
 
@@ -85,10 +100,7 @@ def _sampler(
         values: tuple[Array, ...], scale: Array, state: State, stages: tuple[Instant, ...]
     ) -> tuple[Array, State, Array | None]:
         current = scaled_model(model, values, scale)
-        # The table already holds the delayed drive; only the derivative with respect to the delay is still to
-        # come.
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        stages = tuple(at.delayed(late) for at in stages)
+        stages = tuple(with_delay_slope(current, at) for at in stages)
         reading = read_record(current, state, stages[0], quantity)
         ahead, ringing = advance_record(current, solver, quantity, sample_time, state, stages)
         return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)

@@ -32,7 +32,7 @@ from ...models import (
 )
 from ._batch import Batch
 from ._effect_inputs import EFFECT_INPUTS, PathMotion, Perturbation
-from ._information import has_stiffness_scale, scaled_model
+from ._information import has_stiffness_scale, scaled_model, with_delay_slope
 
 
 def sample_stages(table: Float[Array, "time stage lanes"]) -> Float[Array, "time 3 lanes"]:
@@ -170,8 +170,7 @@ def slopes_along(
 
     def along(values: tuple[Array, ...], scale: Array, state: State, inlet: dict[str, Array]) -> Change:
         current = scaled_model(model, values, scale)
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        now = at.delayed(late)
+        now = with_delay_slope(current, at)
         if inlet:
             small = Perturbation(inlet["acted"], inlet["force"], inlet["mass"], inlet["base"], inlet["read"])
             current = Isolator(current.mass, (*current.elements, small), current.excitation)
