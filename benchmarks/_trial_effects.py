@@ -269,9 +269,11 @@ EFFECTS: dict[str, Hidden] = {
     ),
     "ac_coupling": Hidden(lambda size, shape: rig.AcCoupling(size), lambda motion: 0.3),
     "clipping": Hidden(
-        lambda size, shape: rig.Clipping(shape["level"]),
+        lambda size, shape: rig.Clipping(shape["upper"]),
         lambda motion: 1.0,
-        lambda draw, motion: {"level": motion.acceleration * float(draw.uniform(0.8, 1.3))},
+        lambda draw, motion: dict.fromkeys(
+            ("upper", "lower"), motion.acceleration * float(draw.uniform(0.8, 1.3))
+        ),
         fixed=1.0,
     ),
     "stiffness_drift": Hidden(

@@ -150,16 +150,17 @@ class AcCoupling(Instrument):
 
 @dataclass(frozen=True)
 class Clipping(Instrument):
-    """The output channel saturates at +-level, in the SI unit of the output."""
+    """The output channel saturates at +-level, or at -lower and +level, in the SI unit of the output."""
 
     name: ClassVar[str] = "clipping"
     level: float
+    lower: float | None = None
 
     def recorded_output(
         self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
     ) -> Float[np.ndarray, " time"]:
-        """The output within the level."""
-        return np.minimum(np.maximum(output, -self.level), self.level)
+        """The output within the range."""
+        return np.clip(output, -(self.level if self.lower is None else self.lower), self.level)
 
 
 @dataclass(frozen=True)
