@@ -23,6 +23,7 @@ from ._coulomb_friction import CoulombFriction as CoulombFriction
 from ._cubic_damping import CubicDamping as CubicDamping
 from ._cubic_stiffness import CubicStiffness as CubicStiffness
 from ._dahl_friction import DahlFriction as DahlFriction
+from ._damping_drift import DampingDrift as DampingDrift
 from ._drive_harmonics import DriveHarmonics as DriveHarmonics
 from ._dual_chamber import DualChamber as DualChamber
 from ._end_stop import EndStop as EndStop
