@@ -298,6 +298,9 @@ to be so in every campaign, and the scatter between cycles would then measure th
 So is a drive held between its samples: behind the anti-alias filter of the bench a reading of acceleration
 sees the mean of both sides of each step. What is left at 4 to 7 Hz of 250 Hz is half a sample of delay, to
 1e-3 of the drive: seed 6, so held, comes out as 2.004 ms of input_delay and nothing beside.
+
+So are a skew of the clocks, which `clock_skew.py` beside this file judges, and a drift of the damping: a
+further line would change what some seeds hide.
 """
 
 COMMONEST = (

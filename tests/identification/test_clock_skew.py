@@ -34,17 +34,10 @@ def skewed(name: str, quantity: str, skew: float, delay: float = 0.0, start: flo
     seen = time / (1.0 + skew) - delay
     output = (np.exp(1j * np.multiply.outer(seen, omega)) @ response).real
     output = output + 1e-3 * np.std(output) * draw.standard_normal(output.size)
-    return Record(
-        name,
-        Path(f"{name}.npz"),
-        number / RATE,
-        RATE,
-        drive,
-        output,
-        drive,
-        output,
-        start=round(start * RATE),
-    )
+    channels = drive, output, drive, output
+    record = Record(name, Path(f"{name}.npz"), number / RATE, RATE, *channels, start=round(start * RATE))
+    # The force that acts first was recorded before a record that is cut from the middle of a file.
+    return dataclasses.replace(record, settle=20 if start else 0)
 
 
 def filed(campaign_of, quantity: str, skew: float, **more):

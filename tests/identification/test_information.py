@@ -76,7 +76,7 @@ CASES = {
     "hysteresis": Case(Isolator(800.0, (*SPRING, BoucWen(1e5, 800.0, -300.0, 1.0), DahlFriction(5.0, 2e-4)))),
     "delay": Case(Isolator(800.0, (*SPRING, InputDelay(7e-4)))),
     "skew": Case(Isolator(800.0, (*SPRING, InputDelay(-4e-4), ClockSkew(5e3)))),
-    "straight skew": Case(Isolator(800.0, (*SPRING, ClockSkew(-5e3))), hold="linear"),
+    "straight skew": Case(Isolator(800.0, (*SPRING, ClockSkew(-5.3e3))), hold="linear"),
     "instruments": Case(
         Isolator(800.0, (*SPRING, InputGain(0.1), InputOffset(9.0), SensorGain(-0.05), SensorOffset(0.02))),
         quantity="displacement",

@@ -10,9 +10,9 @@ from ._base import AbstractElement, Group, LookAlike, Scales
 class ClockSkew(AbstractElement):
     """The clock of the response channel runs faster than that of the force: a delay that grows with time.
 
-    The force that acts at t is the one recorded at t - s t, with t the time since the start of the file on
-    the clock of the response channel. Which of the two clocks is right no record says: by that of the force
-    the coefficients differ by shares of 2 s at most.
+    The force that acts at t is the one recorded at t / (1 + s), with t the time since the start of the file
+    on the clock of the response channel. No record says which of the two clocks is right: by that of the
+    force the coefficients differ by shares of 2 s at most.
 
     Attributes:
         rate: s [ppm].
@@ -47,4 +47,4 @@ class ClockSkew(AbstractElement):
         return 1e6 / (60.0 * scales.angular_frequency)
 
     def skew(self) -> Lanes | float:
-        return 1e-6 * self.rate
+        return 1e-6 * self.rate / (1.0 + 1e-6 * self.rate)
