@@ -278,7 +278,7 @@ def clipping() -> Figure:
     rng = np.random.default_rng(5)
     for size, colour in zip((1.0, 1.6, 2.4), LEVELS, strict=False):
         motion = size * np.sin(2.0 * np.pi * 4.3 * time) + 0.15 * size * np.sin(6.0 * np.pi * 4.3 * time)
-        reading = np.asarray(elements.Clipping(1.0, 1.8).reading(jnp.asarray(motion), ()))
+        reading = np.asarray(elements.Clipping(1.0, 1.8, 1.8).reading(jnp.asarray(motion), ()))
         left.plot(time, reading, color=colour, label=f"drive x {size:g}")
         noisy = reading + 0.01 * rng.standard_normal(reading.size)
         right.hist(noisy, bins=80, range=(-2.2, 2.2), histtype="step", color=colour)

@@ -75,6 +75,24 @@ def test_an_offset_of_the_drive_moves_the_static_equilibrium():
     np.testing.assert_allclose(record.drive, 5.0)
 
 
+@pytest.mark.parametrize("excitation", ["force", "base_acceleration"])
+def test_a_tilt_of_the_bench_is_an_offset_of_the_drive(excitation):
+    along = 9.81 * np.sin(np.radians(0.3))
+    based = excitation == "base_acceleration"
+    drive, offset = (Harmonic(0.2, 4.3), -along) if based else (DRIVE, M * along)
+    plant = linear(CubicStiffness(2e11), InputOffset(offset), excitation=excitation)
+    record = simulate(plant, drive, duration=1.0)
+
+    def tilted(t, y):
+        push = drive.amplitude * np.sin(2 * np.pi * 4.3 * t)
+        force = -M * push if based else push
+        return [y[1], (force - K * y[0] - C * y[1] - 2e11 * y[0] ** 3) / M + along]
+
+    times = np.arange(1001) / 1000.0
+    expected = solve_ivp(tilted, (0.0, 1.0), [0.0, 0.0], "DOP853", times, rtol=1e-12, atol=1e-15).y[0]
+    np.testing.assert_allclose(record.displacement, expected, atol=1e-7 * np.max(np.abs(expected)))
+
+
 def test_gain_and_offset_of_the_sensor_change_the_reading_only():
     record = simulate(linear(SensorGain(-0.04), SensorOffset(0.3)), DRIVE, duration=1.0, quantity="velocity")
     plain = simulate(linear(), DRIVE, duration=1.0)

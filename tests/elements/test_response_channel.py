@@ -56,11 +56,16 @@ def test_instruments_before_the_coupling_act_on_what_it_follows():
 def test_clipping_loses_its_share_beyond_the_level_of_either_sign(share):
     y = jnp.asarray([-3.0, -2.0, -0.5, 0.0, 1.9, 2.1, 5.0])
     beyond = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 3.0])
-    np.testing.assert_allclose(Clipping(share, 2.0).reading(y, ()), y - share * beyond, rtol=1e-13)
+    np.testing.assert_allclose(Clipping(share, 2.0, 2.0).reading(y, ()), y - share * beyond, rtol=1e-13)
+
+
+def test_the_ends_of_a_clipped_range_need_not_be_alike():
+    y = jnp.asarray([-3.0, -0.6, -0.5, 0.0, 1.9, 2.1, 5.0])
+    np.testing.assert_allclose(Clipping(1.0, 2.0, 0.5).reading(y, ()), [-0.5, -0.5, -0.5, 0.0, 1.9, 2.0, 2.0])
 
 
 def test_a_clipped_record_is_the_clip_of_the_plain_one():
-    clipped = simulate(Isolator(800.0, (*PLANT, Clipping(1.0, 0.15))), DRIVE, duration=1.0)
+    clipped = simulate(Isolator(800.0, (*PLANT, Clipping(1.0, 0.15, 0.1))), DRIVE, duration=1.0)
     plain = simulate(LAG, DRIVE, duration=1.0)
     assert float(jnp.max(plain.reading)) > 0.2
-    np.testing.assert_allclose(clipped.reading, np.clip(plain.reading, -0.15, 0.15), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(clipped.reading, np.clip(plain.reading, -0.1, 0.15), rtol=1e-12, atol=1e-15)

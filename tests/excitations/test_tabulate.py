@@ -96,6 +96,32 @@ def test_band_limited_is_delayed_by_any_time(samples, size, shift):
     np.testing.assert_allclose(slopes[inner], signal(stages() - shift, 1)[inner], atol=1e-7 * size * RATE)
 
 
+@pytest.mark.parametrize(("shift", "skew"), [(0.0, 3e-3), (2.7e-3, -2e-3)])
+def test_band_limited_is_delayed_by_a_time_that_grows(samples, size, shift, skew):
+    values, slopes = tabulate(samples, RATE, "band_limited", SUBSTEPS, shift, skew)
+    inner, acted = slice(500, -500), stages() * (1.0 - skew) - shift
+    np.testing.assert_allclose(values[inner], signal(acted)[inner], atol=1e-7 * size)
+    np.testing.assert_allclose(slopes[inner], signal(acted, 1)[inner], atol=1e-6 * size * RATE)
+
+
+def test_a_delay_that_grows_is_the_growing_of_a_delay_at_the_ends_of_the_record_too(samples, size):
+    for skew in (4e-3, -4e-3):
+        values, slopes = tabulate(samples, RATE, "band_limited", SUBSTEPS, 0.0, skew)
+        for place in (0, COUNT - 1):
+            constant = tabulate(samples, RATE, "band_limited", SUBSTEPS, skew * place / RATE)
+            for found, wanted, unit in ((values, constant[0], 1.0), (slopes, constant[1], RATE)):
+                np.testing.assert_allclose(found[place, 0], wanted[place, 0], atol=1e-6 * size * unit)
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero_order"])
+def test_a_drive_that_is_not_band_limited_is_delayed_by_a_time_that_grows(samples, hold):
+    values, _ = tabulate(samples, RATE, hold, SUBSTEPS, 1e-3, 2e-3)
+    place = (stages() * (1.0 - 2e-3) - 1e-3)[:, 1:-1] * RATE
+    held = samples[np.clip(np.floor(place).astype(int), 0, COUNT - 1)]
+    wanted = held if hold == "zero_order" else np.interp(place, np.arange(COUNT), samples)
+    np.testing.assert_allclose(values[:, 1:-1], wanted, atol=1e-9)
+
+
 @pytest.mark.parametrize("shift", [0.0, 0.4e-3, -2.1e-3])
 def test_linear_is_straight_between_the_samples(samples, size, shift):
     values, slopes = tabulate(samples, RATE, "linear", SUBSTEPS, shift)

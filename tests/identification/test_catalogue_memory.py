@@ -69,7 +69,8 @@ CASES = (
         {"mass": 15.0, "angular_frequency": 2 * np.pi * 6.5, "damping_ratio": 0.03},
     ),
     Case(rig.AcCoupling(0.06), {"corner": 0.06}),
-    Case(rig.Clipping(0.45), {"share": 1.0, "level": 0.45}),
+    Case(rig.Clipping(0.45), {"share": 1.0, "upper": 0.45, "lower": 0.45}),
+    Case(rig.Clipping(0.45, 0.6), {"share": 1.0, "upper": 0.45, "lower": 0.6}),
 )
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.effect.name)

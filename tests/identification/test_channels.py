@@ -127,8 +127,8 @@ def test_an_unknown_signal_is_refused():
         channel_table("tide", record(np.arange(9.0), np.arange(9.0)), "linear", 1, 0.0)
 
 
-def driven(seed: int, noise: float, *, change=0.0, hum=0.0, begin=0.0, share=0.5) -> np.ndarray:
-    """Displacement of the oscillator with a drifting stiffness and hum, by SciPy."""
+def driven(seed: int, noise: float, *, stiffer=0.0, damper=0.0, begin=0.0, share=0.5) -> np.ndarray:
+    """Displacement of the oscillator with a drifting stiffness or damping, by SciPy."""
     drive = multisine(seed)
     size = drive.size
     lines = np.fft.rfft(drive) / size
@@ -139,21 +139,23 @@ def driven(seed: int, noise: float, *, change=0.0, hum=0.0, begin=0.0, share=0.5
         return 2.0 * np.sum((lines[places] * np.exp(1j * omega * t)).real)
 
     def field(t, z):
-        stiffness = STIFFNESS + change * (begin + share * max(t, 0.0) * RATE / size)
-        return z[1], (force(t) - stiffness * z[0] - DAMPING * z[1]) / MASS
+        clock = begin + share * max(t, 0.0) * RATE / size
+        stiffness, damping = STIFFNESS + stiffer * clock, DAMPING + damper * clock
+        return z[1], (force(t) - stiffness * z[0] - damping * z[1]) / MASS
 
-    times = np.arange(size) / RATE
     rng = np.random.default_rng(100 + seed)
-    output = solve(field, size) + noise * rng.standard_normal(size)
-    return output + hum * np.cos(2 * np.pi * 20.0 * times + 2 * math.pi * rng.random())
+    return solve(field, size) + noise * rng.standard_normal(size)
 
 
-def test_a_stiffness_that_drifts_over_two_records_is_named(campaign_of):
+@pytest.mark.parametrize(
+    ("name", "drift"), [("stiffness_drift", {"stiffer": 1.2e4}), ("damping_drift", {"damper": -900.0})]
+)
+def test_what_drifts_over_two_records_is_named(campaign_of, name, drift):
     noise = 2e-7
     records = tuple(
         record(
             multisine(seed),
-            driven(seed, noise, change=1.2e4, begin=begin),
+            driven(seed, noise, begin=begin, **drift),
             f"r{seed}",
             clock=(begin, begin + 0.5),
         )
@@ -162,12 +164,11 @@ def test_a_stiffness_that_drifts_over_two_records_is_named(campaign_of):
     campaign = campaign_of(records, output=displacements(noise))
     verdict = diagnose(fit(BASE, campaign))
     assert verdict.finding is not None
-    assert verdict.finding.effect == "stiffness_drift"
-    change = float(verdict.refit.model["stiffness_drift.change"])
-    error = float(
-        verdict.refit.uncertainty.standard_error[verdict.refit.names.index("stiffness_drift.change")]
-    )
-    assert abs(change - 1.2e4) < 4.0 * error
+    assert verdict.finding.effect == name
+    change = float(verdict.refit.model[f"{name}.change"])
+    error = float(verdict.refit.uncertainty.standard_error[verdict.refit.names.index(f"{name}.change")])
+    (truth,) = drift.values()
+    assert abs(change - truth) < 4.0 * error
 
 
 def test_the_score_of_a_chosen_phase_is_normal_where_there_is_only_noise():

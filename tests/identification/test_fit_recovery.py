@@ -73,7 +73,8 @@ ELSEWHERE = {
         "lugre_friction",
         "second_mode",
     ),
-    "test_channels.py": ("drive_harmonics", "input_hold", "mains_hum", "stiffness_drift"),
+    "test_clock_skew.py": ("clock_skew",),
+    "test_channels.py": ("damping_drift", "drive_harmonics", "input_hold", "mains_hum", "stiffness_drift"),
     "test_moving_floor.py": ("floor_motion",),
 }
 """Effects whose recovery has a file of its own."""

@@ -15,6 +15,7 @@ from isojax.elements import (
     AbstractElement,
     AddedMass,
     BoucWen,
+    ClockSkew,
     CoulombFriction,
     CubicDamping,
     CubicStiffness,
@@ -75,6 +76,8 @@ CASES = {
     "maxwell": Case(Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))), hold="linear"),
     "hysteresis": Case(Isolator(800.0, (*SPRING, BoucWen(1e5, 800.0, -300.0, 1.0), DahlFriction(5.0, 2e-4)))),
     "delay": Case(Isolator(800.0, (*SPRING, InputDelay(7e-4)))),
+    "skew": Case(Isolator(800.0, (*SPRING, InputDelay(-4e-4), ClockSkew(5e3)))),
+    "straight skew": Case(Isolator(800.0, (*SPRING, ClockSkew(-5.3e3))), hold="linear"),
     "instruments": Case(
         Isolator(800.0, (*SPRING, InputGain(0.1), InputOffset(9.0), SensorGain(-0.05), SensorOffset(0.02))),
         quantity="displacement",
@@ -97,7 +100,9 @@ def _setting(case: Case, substeps: int | None = None) -> tuple[Prepared, Unknown
         hold=case.hold,
         substeps=Integrator().record_steps(model) if substeps is None else substeps,
         shift=float(model.shift()),
+        skew=float(model.skew()),
         based=model.excitation == "base_acceleration",
+        channels=("elapsed",),
     )
     listed = list_parameters(model)
     places = tuple(place for place, entry in enumerate(listed) if entry.spec.fitted or entry.name == "mass")
@@ -221,7 +226,7 @@ def test_information_is_that_of_a_dense_jacobian(name):
         assert _deviation(found[lane], wanted) < {"friction": 6e-5, "sticking": 1e-3}.get(name, 3e-6)
 
 
-@pytest.mark.parametrize("name", ["friction", "delay", "base excitation"])
+@pytest.mark.parametrize("name", ["friction", "delay", "skew", "base excitation"])
 def test_information_follows_central_differences(name):
     case = CASES[name]
     prepared, unknowns, places = _setting(case)
@@ -242,6 +247,8 @@ def test_information_follows_central_differences(name):
                 hold=case.hold,
                 substeps=Integrator().record_steps(base),
                 shift=float(model.shift()),
+                skew=float(model.skew()),
+                channels=("elapsed",),
                 based=model.excitation == "base_acceleration",
             )
             sides.append(readings(model, unknowns.stiffness_scale, unknowns.states, again)[40:300, 0])
@@ -297,6 +304,7 @@ PROBES = (
     MaxwellBranch(0.0, 0.1),
     BoucWen(0.0, 2e3, -1e3, 1.0),
     AddedMass(0.0),
+    ClockSkew(0.0),
     InputDelay(0.0),
     InputGain(0.0),
     InputOffset(0.0),
@@ -324,7 +332,7 @@ def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
     prepared, unknowns, _ = _setting(Case(model, amplitude=amplitude))
     names = [entry.name for entry in list_parameters(full)]
     wanted = [name for name in names if name.split(".")[-1] in ("coefficient", "stiffness", "force_level")]
-    wanted += [name for name in names if name.split(".")[-1] in ("delay", "deviation", "offset")]
+    wanted += [name for name in names if name.split(".")[-1] in ("delay", "rate", "deviation", "offset")]
     places = [names.index(name) for name in wanted]
     sizes = [1e-3 * max(1.0, float(list_parameters(full)[place].value)) for place in places]
     lanes, own, states = prepared.record.size, 2 + model.internal_states, 2 + full.internal_states

@@ -6,7 +6,7 @@ import pytest
 from isojax.elements import StribeckFriction
 from isojax.identification import DriftBudget, Errors, Fit
 from isojax.identification._close_loop import overall_verdict
-from isojax.records import NoisePeak, data_health
+from isojax.records import NoisePeak, Spikes, data_health
 from isojax.reporting import render_text, verdict_summary
 from isojax.reporting.words._health_words import budget_words
 from isojax.reporting.words._sentences import caveats, finding_words, headline, health_words
@@ -113,6 +113,16 @@ def test_health_counts_dwells_and_gives_the_noise(found):
     dwells = sum(len(record.dwells) for record in found.campaign.records)
     assert f"of {dwells} dwells never settled" in text
     assert f"{found.after.noise.sigma:#.3g} m/s² rms" in text
+
+
+def test_spikes_are_counted_with_their_share(found):
+    clean = data_health(found.campaign)
+    assert "Spikes" not in " ".join(health_words(clean, found.after))
+    few = (Spikes("up", "output", 7, 3e-4, 0.012), Spikes("down", "output", 2, 1e-4, 0.004))
+    text = " ".join(health_words(dataclasses.replace(clean, spikes=few), found.after))
+    assert "on the output of 2 records: 9 samples. In up they are 300 ppm of the samples" in text
+    assert "hold 1.20 % of the rms" in text
+    assert "on the input" not in text
 
 
 def test_scatter_within_records_is_told_where_repeats_show_it(found):

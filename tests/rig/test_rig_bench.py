@@ -73,6 +73,18 @@ def test_input_delay_lets_the_force_act_later():
     assert np.std(late.output[10:] - shifted["acceleration"]) < 1e-7 * np.std(plain.output)
 
 
+@pytest.mark.parametrize("skew", [2e-4, -2e-4])
+def test_a_fast_clock_files_the_output_later_and_later(skew):
+    plain = rig.run(rig.y_plant(), SHORT, 1, BARE)[0]
+    seen = rig.run(rig.y_plant().plus(rig.ClockSkew(skew)), SHORT, 1, BARE)[0]
+    np.testing.assert_array_equal(seen.force, plain.force)
+    trial = SHORT.trials(rig.IDEAL_SHAKER, 1)[0]
+    inner = slice(1, -2)
+    wanted = rig.response(rig.y_plant(), trial.pieces, plain.time[inner] / (1 + skew))["acceleration"]
+    assert np.std(seen.output[inner] - wanted) < 1e-5 * np.std(wanted)
+    assert np.std(plain.output[inner] - wanted) > 1e-4 * np.std(wanted)
+
+
 @pytest.mark.parametrize(
     ("instrument", "force", "output"),
     [

@@ -18,10 +18,12 @@ from ._base import LookAlike as LookAlike
 from ._base import Scales as Scales
 from ._bouc_wen import BoucWen as BoucWen
 from ._clipping import Clipping as Clipping
+from ._clock_skew import ClockSkew as ClockSkew
 from ._coulomb_friction import CoulombFriction as CoulombFriction
 from ._cubic_damping import CubicDamping as CubicDamping
 from ._cubic_stiffness import CubicStiffness as CubicStiffness
 from ._dahl_friction import DahlFriction as DahlFriction
+from ._damping_drift import DampingDrift as DampingDrift
 from ._drive_harmonics import DriveHarmonics as DriveHarmonics
 from ._dual_chamber import DualChamber as DualChamber
 from ._end_stop import EndStop as EndStop

@@ -17,6 +17,13 @@ class AbstractFollower(AbstractEffect):
     channels: ClassVar[tuple[str, ...]] = ()
     phased: ClassVar[bool] = False
 
+    def skew(self) -> Lanes | float:
+        """Give the share of the time since the start of the file by which the recorded drive leads [1].
+
+        An element that gives one follows "elapsed".
+        """
+        return 0.0
+
     def channel_drive(self, channels: Channels) -> Lanes | float:
         """Give what signals of the record add to the drive that acted.
 

@@ -8,9 +8,9 @@ from ._base import AbstractElement, Group, Scales
 
 
 class InputOffset(AbstractElement):
-    """A constant adds to the recorded drive.
+    """A constant adds to the recorded drive: preload, zero of the load cell, weight along a tilted motion.
 
-    `F -> F + F0`.
+    `F -> F + F0`; a tilt by the angle a gives `F0 = m g sin(a)`.
 
     Attributes:
         offset: F0 [N, or m/s^2 for base excitation].

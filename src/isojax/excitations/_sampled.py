@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from scipy.fft import next_fast_len
+from scipy.interpolate import CubicHermiteSpline
 
 from .._types import Lanes
 from ._base import AbstractExcitation
@@ -17,12 +18,20 @@ Hold = Literal["band_limited", "linear", "zero_order"]
 _JUST_INSIDE = 1e-9
 """Distance from the ends of a sample, as a share of it, at which they are read: a jump there lies outside."""
 
+_FINE = 8
+"""Points a sample of the grid between which a drive is a cubic where its delay grows."""
+
 _CONTINUATION = 256
 """Samples of continuation on either side of a record that is interpolated by its spectrum."""
 
 
 def tabulate(
-    values: Float[np.ndarray, " time"], rate: float, hold: Hold, substeps: int, shift: float = 0.0
+    values: Float[np.ndarray, " time"],
+    rate: float,
+    hold: Hold,
+    substeps: int,
+    shift: float = 0.0,
+    skew: float = 0.0,
 ) -> tuple[Float[np.ndarray, "time stage"], Float[np.ndarray, "time stage"]]:
     """Give a sampled drive and its derivative at the stages of the integration steps.
 
@@ -40,8 +49,10 @@ def tabulate(
         rate: samples a second [Hz].
         hold: how the drive runs between samples.
         substeps: integration steps a sample.
-        shift: time by which the drive is delayed [s]. Beyond either end of the record a band-limited drive
-            keeps its odd continuation, any other the nearest sample.
+        shift: time by which the drive is delayed at the first sample [s]. Beyond either end of the record a
+            band-limited drive keeps its odd continuation, any other the nearest sample.
+        skew: rate at which this delay grows [1]. A band-limited drive is then a cubic between the points of
+            a grid eight times as fine as the samples, whose slopes it has.
 
     Returns:
         Values and time derivatives; stage runs over `2 substeps + 1` equidistant times from one sample to
@@ -64,6 +75,15 @@ def tabulate(
         if not number > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {number}.")
     parts = 2 * substeps
+    number = np.arange(values.size)[:, None]
+    late = shift * rate + skew * (number + np.arange(parts + 1) / parts)
+    if hold == "band_limited" and skew != 0.0:
+        reach = int(np.ceil(np.max(np.abs(late)))) + 1
+        fine, slope = _band_limited(values, rate, _FINE, 0.0, reach)
+        grid = np.arange(fine.size) / _FINE - reach
+        curve = CubicHermiteSpline(grid, fine, slope / rate)
+        place = number + (np.arange(parts + 1) / parts - late)
+        return curve(place), curve(place, 1) * rate
     if hold == "band_limited":
         fine, slope = _band_limited(values, rate, parts, shift)
         windows = np.lib.stride_tricks.sliding_window_view
@@ -71,7 +91,7 @@ def tabulate(
     stages = np.arange(parts + 1) / parts
     stages[[0, -1]] += _JUST_INSIDE, -_JUST_INSIDE
     # Sample and share of the sample, kept apart until the shift is known: a long record rounds the sum.
-    position = np.arange(values.size)[:, None] + (stages - shift * rate)
+    position = number + (stages - late)
     last = values.size - 1
     if hold == "zero_order":
         held = values[np.clip(np.floor(position).astype(int), 0, last)]
@@ -79,16 +99,17 @@ def tabulate(
     place = np.clip(np.floor(position).astype(int), 0, last - 1)
     within = (position > 0) & (position < last)
     slope = np.where(within, (values[place + 1] - values[place]) * rate, 0.0)
-    exact = np.arange(values.size)[:, None] + (np.arange(parts + 1) / parts - shift * rate)
+    exact = number + (np.arange(parts + 1) / parts - late)
     return np.interp(exact, np.arange(values.size), values), slope
 
 
 def _band_limited(
-    values: Float[np.ndarray, " time"], rate: float, parts: int, shift: float
+    values: Float[np.ndarray, " time"], rate: float, parts: int, shift: float, reach: int = 0
 ) -> tuple[Float[np.ndarray, " fine"], Float[np.ndarray, " fine"]]:
-    """Interpolate by zero-padding the spectrum of the oddly continued record."""
+    """Interpolate by zero-padding the spectrum of the oddly continued record, and `reach` samples beyond."""
     count = values.size
-    margin = min(count - 1, _CONTINUATION + int(abs(shift) * rate))
+    margin = min(count - 1, _CONTINUATION + reach + int(abs(shift) * rate))
+    reach = min(reach, margin)
     length = cast(int, next_fast_len(count + 2 * margin, real=True))
     after = min(length - count - margin, count - 1)
     head = 2.0 * values[0] - values[margin:0:-1]
@@ -109,7 +130,7 @@ def _band_limited(
     turned = spectrum * np.exp(-2j * np.pi * cycles * shift * rate)
     fine = np.fft.irfft(turned, length * parts) * parts
     rates = np.fft.irfft(turned * 2j * np.pi * cycles, length * parts) * parts
-    window = slice(margin * parts, (margin + count) * parts + 1)
+    window = slice((margin - reach) * parts, (margin + count + reach) * parts + 1)
     line = extended[0] + slope * (np.arange(length * parts)[window] / parts - shift * rate)
     return fine[window] + line, (rates[window] + slope) * rate
 

@@ -3,6 +3,7 @@
 from typing import Literal, cast
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -152,9 +153,30 @@ class Isolator(eqx.Module):
         """List the elements that follow signals of the record, where there is one."""
         return tuple(element for element in self.elements if element.channels) if channels else ()
 
-    def shift(self) -> Lanes | float:
-        """Give the time by which the recorded drive leads the one that acted [s]."""
-        return sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
+    def shift(self, elapsed: Lanes | float | None = None) -> Lanes | float:
+        """Give the time by which the recorded drive leads the one that acted [s].
+
+        Args:
+            elapsed: time since the start of the record [s]; none where there is no record.
+        """
+        shift = sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
+        return shift if elapsed is None else shift + self.skew() * elapsed
+
+    def with_delay_slope(self, at: Instant) -> Instant:
+        """Give what acted at an instant its derivative with respect to the delay.
+
+        Args:
+            at: from a table that already holds the drive at the delayed times.
+
+        Returns:
+            The same numbers, with the derivative.
+        """
+        delay = self.shift(at.channels.get("elapsed", 0.0))
+        return at.delayed(delay - jax.lax.stop_gradient(delay))
+
+    def skew(self) -> Lanes | float:
+        """Give the rate at which `shift` grows with the time since the start of the record [1]."""
+        return sum((element.skew() for element in self.elements), start=cast("Lanes | float", 0.0))
 
     def drive(self, at: Instant) -> tuple[Lanes, Lanes]:
         """Give the drive that acted, and its rate.

@@ -54,13 +54,13 @@ def _solve_ode(
     quantity: Quantity,
     rate: float,
 ) -> tuple[State, diffrax.RESULTS]:
-    shift = model.shift()
     substeps = integrator.steps_per_sample(model)
     # Counted, not summed up: the steps of a zero-order hold must not drift against its samples.
     steps = jnp.arange((time.size - 1) * substeps + 1, dtype=float) / (rate * substeps)
 
     def field(t: Lanes, y: State) -> State:
-        return model.rates(y, Instant(excitation(t - shift), excitation.rate(t - shift)), quantity)
+        acted = t - model.shift(t)
+        return model.rates(y, Instant(excitation(acted), excitation.rate(acted)), quantity)
 
     return solve_ode(field, integrator, state, time, steps)
 
@@ -121,8 +121,8 @@ def simulate(
     state = tuple(as_float64(value) for value in start)
     time = jnp.arange(count + 1, dtype=float) / rate
     states, ended = _solve_ode(model, excitation, time, state, integrator, quantity, rate)
-    shift = model.shift()
-    at = Instant(jax.vmap(excitation)(time - shift), jax.vmap(excitation.rate)(time - shift))
+    acted = time - model.shift(time)
+    at = Instant(jax.vmap(excitation)(acted), jax.vmap(excitation.rate)(acted))
     ran = ended == diffrax.RESULTS.successful
     finite = jnp.all(jnp.isfinite(jnp.stack(states)))
     result = RESULTS.where(ran & ~finite, RESULTS.not_finite, RESULTS.promote(ended))

@@ -88,7 +88,6 @@ def solve_record(
         States, `observed` a sample; NaN where the integration failed.
     """
     count, stages = record.drive.shape
-    late = model.shift() - jax.lax.stop_gradient(model.shift())
 
     # Time is counted in samples: a whole number is then exact, however long the record.
     def field(t: Lanes, y: State) -> State:
@@ -100,7 +99,7 @@ def solve_record(
         def between(table: Array) -> Array:
             return jax.lax.dynamic_slice(table, (sample, first), (1, _NODES))[0] @ shares
 
-        at = jax.tree_util.tree_map(between, record).delayed(late)
+        at = model.with_delay_slope(jax.tree_util.tree_map(between, record))
         return tuple(sample_time * rate for rate in model.rates(y, at, quantity))
 
     steps = integrator.steps_per_sample(model)

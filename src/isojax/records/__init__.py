@@ -16,6 +16,7 @@ from ._record import Record as Record
 from .noise import DataHealth as DataHealth
 from .noise import NoiseEstimate as NoiseEstimate
 from .noise import NoisePeak as NoisePeak
+from .noise import Spikes as Spikes
 from .noise import brief_blows as brief_blows
 from .noise import data_health as data_health
 from .noise import estimate_noise as estimate_noise

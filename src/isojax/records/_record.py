@@ -56,6 +56,7 @@ class Record:
         dwells: Dwells of a stepped sine, else empty.
         kind: What the excitation is.
         clock: Start and end of the record as shares of the whole test, 0 to 1.
+        start: Sample of its file with which the record starts; the clocks of the channels ran from sample 0.
         floor: Measured acceleration of the floor about its mean [m/s^2], or None.
     """
 
@@ -76,6 +77,7 @@ class Record:
     dwells: tuple[Dwell, ...] = ()
     kind: ExcitationKind = "broadband"
     clock: tuple[float, float] = (0.0, 1.0)
+    start: int = 0
     floor: Float[np.ndarray, " time"] | None = None
     _kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 

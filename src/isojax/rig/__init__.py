@@ -48,6 +48,7 @@ from ._inertia import AddedMass as AddedMass
 from ._inertia import SecondMode as SecondMode
 from ._instruments import AcCoupling as AcCoupling
 from ._instruments import Clipping as Clipping
+from ._instruments import ClockSkew as ClockSkew
 from ._instruments import InputDelay as InputDelay
 from ._instruments import InputGain as InputGain
 from ._instruments import InputOffset as InputOffset

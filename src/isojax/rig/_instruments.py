@@ -150,13 +150,34 @@ class AcCoupling(Instrument):
 
 @dataclass(frozen=True)
 class Clipping(Instrument):
-    """The output channel saturates at +-level, in the SI unit of the output."""
+    """The output channel saturates at +-level, or at -lower and +level, in the SI unit of the output."""
 
     name: ClassVar[str] = "clipping"
     level: float
+    lower: float | None = None
 
     def recorded_output(
         self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
     ) -> Float[np.ndarray, " time"]:
-        """The output within the level."""
-        return np.minimum(np.maximum(output, -self.level), self.level)
+        """The output within the range."""
+        return np.clip(output, -(self.level if self.lower is None else self.lower), self.level)
+
+
+@dataclass(frozen=True)
+class ClockSkew(Instrument):
+    """The clock of the output channel runs fast: what it files under t it saw at t / (1 + skew).
+
+    Both start with the record. The output between the instants of the fine grid is that of a spline.
+
+    Args:
+        skew: 1; 1e-6 is one ppm.
+    """
+
+    name: ClassVar[str] = "clock_skew"
+    skew: float
+
+    def recorded_output(
+        self, times: Float[np.ndarray, " time"], output: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, " time"]:
+        """The output as the other clock files it; a slow one reads a little past the end of the spline."""
+        return CubicSpline(times, output)(times / (1 + self.skew))

@@ -10,11 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...excitations import tabulate
 from ...models import RK4, Instant, Isolator, Quantity, State, add_ringing, read_record, scan_records
 from ...records import Dwell, Record
 from ..fitting import Problem
-from ..jacobian import carries, channel_table
+from ..jacobian import carries, channel_table, drive_table
 from ._candidate_experiments import DWELLS, Experiment
 
 
@@ -108,7 +107,8 @@ def trial_run(
         The records; not finite where the motion diverges.
     """
     rows, total = experiment.drive.shape
-    length, shift, hold = total // DWELLS, float(model.shift()), problem.hold
+    length, hold = total // DWELLS, problem.hold
+    clock = float(model.shift()), float(model.skew())
     substeps = problem.integrator.record_steps(model)
     window = (np.arange(2 * length)[:, None] + (np.arange(DWELLS) - 1) * length) % total
 
@@ -116,9 +116,9 @@ def trial_run(
         lanes = [np.moveaxis(table[window], 2, 1) for table in tables]
         return jnp.asarray(np.concatenate(lanes, axis=2))
 
-    tables = [tabulate(record.input, record.rate, hold, substeps, shift) for record in blank]
+    tables = [drive_table(record, record.input, hold, substeps, *clock) for record in blank]
     channels = {
-        name: side_by_side([channel_table(name, record, hold, substeps, shift) for record in blank])
+        name: side_by_side([channel_table(name, record, hold, substeps, *clock) for record in blank])
         for name in model.channels
     }
     lanes = rows * DWELLS

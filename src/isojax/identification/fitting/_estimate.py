@@ -193,7 +193,7 @@ def _check_delay(model: Isolator, places: tuple[int, ...], hold: Hold) -> None:
     listed = list_parameters(model)
 
     def shift(values: list[Array]) -> Array:
-        return jnp.asarray(replace_parameters(model, values).shift(), dtype=float)
+        return jnp.asarray(replace_parameters(model, values).shift(1.0), dtype=float)
 
     slopes = jax.jacfwd(shift)([jnp.asarray(entry.value, dtype=float) for entry in listed])
     for place in places:

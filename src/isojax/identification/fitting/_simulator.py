@@ -16,8 +16,8 @@ HUGE = 1e150
 class Simulator:
     """Simulates a model against a problem; keeps the batches and start states that do not change.
 
-    The batches depend on the delay and on the steps a sample only, the start states on the internal states of
-    the model only; both are remade when those change and at no other time.
+    The batches depend on the delay, on its growth and on the steps a sample only, the start states on the
+    internal states of the model only; both are remade when those change and at no other time.
     """
 
     def __init__(self, problem: Problem, at_rest: bool = False, like: "Simulator | None" = None):
@@ -33,7 +33,7 @@ class Simulator:
         self.problem = problem
         self.at_rest = at_rest
         self._heads = Simulator(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
-        self._prepared: dict[tuple[int, float], Prepared] = {}
+        self._prepared: dict[tuple[int, float, float], Prepared] = {}
         self._internal: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
         self._last: tuple[tuple[np.ndarray, ...], Float[np.ndarray, "lanes column column"]] | None = None
 
@@ -51,7 +51,7 @@ class Simulator:
         steps = problem.integrator.table_steps(
             Isolator(model.mass, model.elements[:carried], model.excitation)
         )
-        key = (steps, float(model.shift()))
+        key = (steps, float(model.shift()), float(model.skew()))
         channels = set(model.channels)
         known = set(self._prepared[key].batches[0].channels) if key in self._prepared else set()
         if key not in self._prepared or not channels <= known:
@@ -64,6 +64,7 @@ class Simulator:
                 hold=problem.hold,
                 substeps=steps,
                 shift=key[1],
+                skew=key[2],
                 based=model.excitation == "base_acceleration",
                 channels=tuple(sorted(channels | known)),
                 room=self._segments,

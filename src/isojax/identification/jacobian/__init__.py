@@ -14,6 +14,7 @@ from ._batch import prepare as prepare
 from ._batch import workers as workers
 from ._channels import carries as carries
 from ._channels import channel_table as channel_table
+from ._channels import drive_table as drive_table
 from ._channels import effects_without_signal as effects_without_signal
 from ._channels import line_coherence as line_coherence
 from ._families import follow_motion as follow_motion

@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._cores import usable_cores
-from ...excitations import Hold, tabulate
+from ...excitations import Hold
 from ...models import Instant, Integrator, Isolator, Quantity
 from ...records import Record, measured_state
-from ._channels import channel_table
+from ._channels import channel_table, drive_table
 from ._segments import Segment
 
 
@@ -116,6 +116,7 @@ def prepare(
     hold: Hold,
     substeps: int,
     shift: float = 0.0,
+    skew: float = 0.0,
     based: bool = False,
     channels: tuple[str, ...] = (),
     room: tuple[Segment, ...] = (),
@@ -129,7 +130,8 @@ def prepare(
         quantity: what the sensor measures.
         hold: what the drive does between samples.
         substeps: integration steps a sample.
-        shift: time by which the drive acts later than it was recorded [s].
+        shift: time by which the drive acts later than it was recorded [s], at the start of a file.
+        skew: rate at which this time grows in the course of a file [1].
         based: whether the drive is the acceleration of the base.
         channels: names of the signals of the records that are wanted beside the drive.
         room: segments for which there shall be room, too: tables of one shape share their compiled code.
@@ -152,12 +154,12 @@ def prepare(
 
     def known(place: int) -> tuple[_Table, tuple[np.ndarray, ...], dict[str, np.ndarray]]:
         record = records[place]
-        extra = {name: channel_table(name, record, hold, substeps, shift) for name in channels}
+        extra = {name: channel_table(name, record, hold, substeps, shift, skew) for name in channels}
         # The last table is kept: it is large, and the next fit to these records mostly asks for it again.
-        tables, key = record.once("drive table", dict), (hold, substeps, shift)
+        tables, key = record.once("drive table", dict), (hold, substeps, shift, skew)
         if key not in tables:
             tables.clear()
-            tables[key] = tabulate(record.input, record.rate, hold, substeps, shift)
+            tables[key] = drive_table(record, record.input, hold, substeps, shift, skew)
         return tables[key], coordinate_motion(record, quantity, based), extra
 
     with ThreadPoolExecutor(workers()) as pool:

@@ -7,9 +7,15 @@ from jaxtyping import Float
 from scipy.signal import hilbert
 from scipy.signal.windows import blackmanharris
 
-from ...elements import CATALOGUE
+from ..._types import Lanes
+from ...elements import CATALOGUE, Channels
 from ...excitations import Hold, tabulate
 from ...records import Record
+
+
+def elapsed(channels: Channels) -> Lanes | float:
+    """Give the time since the start of the record [s], where it is among the signals that are carried."""
+    return channels.get("elapsed", 0.0)
 
 
 def effects_without_signal(records: tuple[Record, ...]) -> tuple[str, ...]:
@@ -48,14 +54,14 @@ def carries(record: Record, name: str) -> bool:
 
 
 def channel_table(
-    name: str, record: Record, hold: Hold, substeps: int, shift: float
+    name: str, record: Record, hold: Hold, substeps: int, shift: float, skew: float = 0.0
 ) -> Float[np.ndarray, "time stage"]:
     """Give a signal of a record at the stages of the integration steps.
 
     Args:
-        name: "clock": time of the test, 0 at its start and 1 at its end. "hold_zero_order",
-            "hold_linear", "hold_band_limited": the drive as another hold would give it, less the declared
-            one's.
+        name: "clock": time of the test, 0 at its start and 1 at its end. "elapsed": time since the start of
+            the record's file [s]. "hold_zero_order", "hold_linear", "hold_band_limited": the drive as another
+            hold would give it, less the declared one's.
             "drive_cosine_2", "drive_sine_2" and so on: the drive's amplitude times the cosine and sine of so
             many times its phase. "hum_50", "hum_60": a cosine of that frequency [Hz] and of amplitude one,
             with the phase that the record's output has there. "floor": measured acceleration of the floor
@@ -63,7 +69,8 @@ def channel_table(
         record: the record.
         hold: what its drive does between samples.
         substeps: integration steps a sample.
-        shift: time by which the drive acts later than it was recorded [s].
+        shift: time by which the drive acts later than it was recorded [s], at the start of the file.
+        skew: rate at which this time grows in the course of the file [1].
 
     Returns:
         The signal; `2 substeps + 1` equidistant times from one sample to the next.
@@ -79,14 +86,16 @@ def channel_table(
         return tabulate(record.floor, record.rate, "band_limited", substeps)[0]
     kind, _, rest = name.partition("_")
     if kind == "hold" and rest in get_args(Hold):
-        other, _ = tabulate(record.input, record.rate, cast(Hold, rest), substeps, shift)
-        return other - tabulate(record.input, record.rate, hold, substeps, shift)[0]
+        other, _ = drive_table(record, record.input, cast(Hold, rest), substeps, shift, skew)
+        return other - drive_table(record, record.input, hold, substeps, shift, skew)[0]
     if kind == "drive":
         part, _, order = rest.partition("_")
         harmonic = drive_harmonic(record, int(order), part)
-        return tabulate(harmonic, record.rate, "linear", substeps, shift)[0]
+        return drive_table(record, harmonic, "linear", substeps, shift, skew)[0]
     stages = np.arange(2 * substeps + 1) / (2.0 * substeps)
     time = (np.arange(record.input.size)[:, None] + stages) / record.rate
+    if name == "elapsed":
+        return time + record.start / record.rate
     if name == "clock":
         begin, end = record.clock
         return begin + (end - begin) * time * record.rate / record.input.size
@@ -94,6 +103,25 @@ def channel_table(
         line = output_line(record, float(rest))
         return np.cos(2.0 * np.pi * float(rest) * time + np.angle(line))
     raise ValueError(f"Argument `name` must name a signal of a record, but is {name!r}.")
+
+
+def drive_table(
+    record: Record, values: Float[np.ndarray, " time"], hold: Hold, substeps: int, shift: float, skew: float
+) -> tuple[Float[np.ndarray, "time stage"], Float[np.ndarray, "time stage"]]:
+    """Give a signal on the clock of the drive, and its derivative, at the stages of the integration steps.
+
+    Args:
+        record: the record.
+        values: its drive, or a signal made from it.
+        hold: what the signal does between samples.
+        substeps: integration steps a sample.
+        shift: time by which the drive acts later than it was recorded [s], at the start of the file.
+        skew: rate at which this time grows in the course of the file [1].
+
+    Returns:
+        See `tabulate`.
+    """
+    return tabulate(values, record.rate, hold, substeps, shift + skew * record.start / record.rate, skew)
 
 
 def drive_harmonic(record: Record, order: int, part: str) -> Float[np.ndarray, " time"]:

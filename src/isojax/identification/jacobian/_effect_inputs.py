@@ -16,10 +16,11 @@ from jaxtyping import Array, Float
 from ..._types import Internal, Lanes, Scalar
 from ...elements import AbstractElement, Channels, Scales
 from ...models import RK4, State
+from ._channels import elapsed
 from ._families import ElementFamily, follow_motion
 
 _HOOKS: dict[str, tuple[str, ...]] = {
-    "recorded": ("shift", "channel_drive"),
+    "recorded": ("shift", "skew", "channel_drive"),
     "acted": ("drive",),
     "force": ("force", "channel_force"),
     "mass": ("inertia",),
@@ -186,9 +187,10 @@ def _input_columns(
 
     def at_inputs(element: AbstractElement, s: State) -> dict[str, Lanes]:
         does: dict[str, Callable[[], Lanes | float]] = {
-            # The drive as recorded, shifted: a delay takes its rate from it.
+            # The drive as recorded, shifted: a delay and a skew take their rates from it.
             "recorded": lambda: (
-                element.channel_drive(motion.channels) - element.shift() * motion.recorded_rate
+                element.channel_drive(motion.channels)
+                - (element.shift() + element.skew() * elapsed(motion.channels)) * motion.recorded_rate
             ),
             "acted": lambda: element.drive(motion.acted, motion.acted_rate)[0],
             "force": lambda: (

@@ -41,10 +41,7 @@ def _sampler(
         values: tuple[Array, ...], scale: Array, state: State, stages: tuple[Instant, ...]
     ) -> tuple[Array, State, Array | None]:
         current = scaled_model(model, values, scale)
-        # The table already holds the delayed drive; only the derivative with respect to the delay is still to
-        # come.
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        stages = tuple(at.delayed(late) for at in stages)
+        stages = tuple(current.with_delay_slope(at) for at in stages)
         reading = read_record(current, state, stages[0], quantity)
         ahead, ringing = advance_record(current, solver, quantity, sample_time, state, stages)
         return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)

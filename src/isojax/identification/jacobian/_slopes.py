@@ -140,8 +140,7 @@ def slopes_along(
 
     def along(values: tuple[Array, ...], scale: Array, state: State, inlet: dict[str, Array]) -> Change:
         current = scaled_model(model, values, scale)
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        now = at.delayed(late)
+        now = current.with_delay_slope(at)
         if inlet:
             small = Perturbation(inlet["acted"], inlet["force"], inlet["mass"], inlet["base"], inlet["read"])
             current = Isolator(current.mass, (*current.elements, small), current.excitation)

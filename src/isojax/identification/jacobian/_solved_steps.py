@@ -29,8 +29,7 @@ def _solve_lanes(
     def lane(scale: Array, state: State, record: Instant) -> tuple[State, Array]:
         current = scaled_model(model, values, scale)
         path = solve_record(current, integrator, quantity, sample_time, state, record, observed, jumps)
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        at = record.pick(np.s_[:, 0]).delayed(late)
+        at = current.with_delay_slope(record.pick(np.s_[:, 0]))
         return path, current.reading(tuple(one[::observed] for one in path), at, quantity)
 
     return jax.vmap(lane, in_axes=-1, out_axes=-1)(scale, states, batch.acting)

@@ -72,12 +72,11 @@ def transitions_along(
         for place, number in zip(moving, moved, strict=True):
             numbers[place] = number
         current = scaled_model(model, numbers, scale)
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
         pushes = tuple(
             (jnp.zeros_like(like), *(push[stage, row] + 0.0 * like for row in range(size - 1)))
             for stage in range(3)
         )
-        pushed = Step(step_time, tuple(at.delayed(late) for at in stages), pushes)
+        pushed = Step(step_time, tuple(current.with_delay_slope(at) for at in stages), pushes)
         ahead, jump = split_step(current, quantity, state, pushed)
         return jnp.stack([*ahead, *find_ringing(jump, step_of_sample, steps)])
 

@@ -13,13 +13,13 @@ from scipy.signal import butter, sosfiltfilt
 
 from ..._parameters import list_parameters
 from ...elements import Channels
-from ...excitations import Hold, tabulate
+from ...excitations import Hold
 from ...models import RK4, Instant, Isolator, State, share_internal
 from ...records import Band, Campaign, Record, measured_state
 from ...records.spectrum import shift_order
 from ..fitting import Fit, Run
 from ..guess import Motion, is_absolute, measured_motion
-from ..jacobian import channel_table, follow_motion, scaled_model
+from ..jacobian import channel_table, drive_table, follow_motion, scaled_model
 
 _STEPS_A_SAMPLE = 2
 """Integration steps per sample for internal states that follow the measured motion."""
@@ -165,11 +165,11 @@ def _force_residual(
 ) -> ForceResidual:
     model, campaign, record = fit.model, fit.campaign, run.record
     hold: Hold = campaign.input.hold
-    shift = float(model.shift())
-    table, slopes = tabulate(record.input, record.rate, hold, 1, shift)
+    shift, skew = float(model.shift()), float(model.skew())
+    table, slopes = drive_table(record, record.input, hold, 1, shift, skew)
     u, du = jnp.asarray(table[:, 0]), jnp.asarray(slopes[:, 0])
     channels = {
-        name: jnp.asarray(channel_table(name, record, hold, 1, shift)[:, 0]) for name in model.channels
+        name: jnp.asarray(channel_table(name, record, hold, 1, shift, skew)[:, 0]) for name in model.channels
     }
     seen = _undo_instruments(model, record, channels)
     motion = measured_motion(campaign, seen)

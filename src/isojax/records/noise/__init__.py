@@ -1,8 +1,8 @@
 """The noise of the output channel, and the health of the data.
 
 In: a `Campaign`. Out: the rms of its output noise, and what the reader must know of the data: dwells that
-never settled, brief blows, differences between repeats, a resonance peak in the scatter.
-Read `_noise.py` first, then `_repeats.py`; `_noise_peak.py` and `_health.py` after them.
+never settled, brief blows, differences between repeats, a resonance peak in the scatter, spikes.
+Read `_noise.py` first, then `_repeats.py`; `_noise_peak.py`, `_spikes.py` and `_health.py` after them.
 """
 
 from ._health import DataHealth as DataHealth
@@ -12,3 +12,4 @@ from ._noise import NoiseEstimate as NoiseEstimate
 from ._noise import estimate_noise as estimate_noise
 from ._noise_peak import NoisePeak as NoisePeak
 from ._noise_peak import noise_peak as noise_peak
+from ._spikes import Spikes as Spikes

@@ -1,4 +1,4 @@
-"""Data health: dwells that never settled, blows too brief for the rate, and differences between repeats."""
+"""Data health: dwells that never settled, blows too brief for the rate, differences of repeats, spikes."""
 
 from dataclasses import dataclass
 
@@ -11,6 +11,7 @@ from .._record import Dwell, Record
 from ..spectrum import dwell_harmonics, harmonic_basis
 from ._noise_peak import NoisePeak, noise_peak
 from ._repeats import repeat_groups
+from ._spikes import Spikes, spikes
 
 _LAST_CYCLES = 6
 """Cycles at the end of a dwell that are compared with each other."""
@@ -85,6 +86,7 @@ class DataHealth:
         repeats: Pairs of repeats.
         brief_blows: Records whose blow lasts fewer than four samples.
         noise_peak: Resonance peak in the scatter, or None; not sought where a floor is measured.
+        spikes: Channels in which single samples stand alone.
     """
 
     dwells: int
@@ -92,6 +94,7 @@ class DataHealth:
     repeats: tuple[RepeatDifference, ...]
     brief_blows: tuple[BriefBlow, ...] = ()
     noise_peak: NoisePeak | None = None
+    spikes: tuple[Spikes, ...] = ()
 
     @property
     def repeatability(self) -> float:
@@ -100,7 +103,7 @@ class DataHealth:
 
 
 def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth:
-    """Gives unsettled dwells, blows that are too brief, differences of repeats, a resonance in the scatter.
+    """Gives unsettled dwells, too brief blows, differences of repeats, a resonance in the scatter, spikes.
 
     A dwell is unsettled if the F-test on the scatter between its last six cycles is significant at 0.001 over
     all dwells, and if the change exceeds `smallest_change` of the output's rms.
@@ -121,7 +124,14 @@ def data_health(campaign: Campaign, smallest_change: float = 0.01) -> DataHealth
     limit = _FALSE_REPORT / max(len(tested), 1)
     unsettled = tuple(one for one in tested if one.p_value < limit and one.change > smallest_change)
     peak = noise_peak(campaign) if campaign.floor is None else None
-    return DataHealth(len(tested), unsettled, _repeat_differences(campaign), brief_blows(campaign), peak)
+    return DataHealth(
+        len(tested),
+        unsettled,
+        _repeat_differences(campaign),
+        brief_blows(campaign),
+        peak,
+        spikes(campaign),
+    )
 
 
 def brief_blows(campaign: Campaign) -> tuple[BriefBlow, ...]:

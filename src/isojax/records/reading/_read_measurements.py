@@ -144,6 +144,7 @@ def _read_record(
         settle=channels.settle,
         dwells=dwells,
         kind=kind,
+        start=channels.start,
         floor=channels.floor_acceleration(declared),
     )
 

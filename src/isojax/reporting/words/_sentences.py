@@ -230,6 +230,17 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
             "Blows of fewer than four samples, whose shape between samples, and so whose momentum, is "
             f"uncertain: {names}."
         )
+    for channel in ("input", "output"):
+        own = [one for one in health.spikes if one.channel == channel]
+        if own:
+            worst = max(own, key=lambda one: one.rms_share)
+            lines.append(
+                f"Spikes, single samples that their neighbours do not explain, on the {channel} of "
+                f"{len(own)} records: {sum(one.count for one in own)} samples. In {worst.record} they are "
+                f"{typeset_number(1e6 * worst.share, 2)} ppm of the samples and hold "
+                f"{typeset_share(worst.rms_share)} of the rms. They all count in the fit. A bad contact "
+                "makes such samples, and so does a rattle."
+            )
     if health.repeats:
         lines.append(
             f"Repeats agree to {typeset_share(health.repeatability)} (median of {len(health.repeats)})."
