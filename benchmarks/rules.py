@@ -34,7 +34,7 @@ from isojax.models import Isolator
 from isojax.records import Campaign
 
 KEPT = Path(__file__).parent / "results" / "rules.jsonl"
-FROM_ONE = ("good", "most_of_it", "close_likeness", "visited_quantile")
+FROM_ONE = ("good", "most_of_it", "close_likeness")
 DEFAULTS = {field.name: field.default for field in dataclasses.fields(Rules)}
 REPEATED = (
     (_diagnose, "score_test"),

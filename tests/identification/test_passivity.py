@@ -18,7 +18,6 @@ from isojax.elements import (
     Scales,
     SecondMode,
 )
-from isojax.identification import Rules
 from isojax.identification.diagnosis._admissibility import find_violation, visited_range
 from isojax.identification.diagnosis._passivity import find_activity, work_per_cycle
 from isojax.identification.guess._force_balance import with_strength
@@ -120,8 +119,8 @@ def test_damping_must_take_energy_away_from_the_middle_too(coefficient, physical
         800.0,
         (ij.LinearStiffness(1e6), ij.LinearDamping(1e4), ij.PositionDamping(coefficient)),
     )
-    largest = visited_range(model, campaign.fit_records, "acceleration", Rules())[0]
+    largest = visited_range(model, campaign.fit_records, "acceleration")[0]
     scaled = model.replace(position_damping__coefficient=coefficient * (3e-3 / largest) ** 2)
-    violation = find_violation(scaled, campaign.fit_records, "acceleration", Rules())
+    violation = find_violation(scaled, campaign.fit_records, "acceleration")
     assert (violation is None) == physical
     assert physical or "feeds energy in" in violation

@@ -226,7 +226,7 @@ def _grow(
         # Halved after each addition: the levels of all searches sum up to twice the first.
         significance = search.rules.significance / 2 ** len(extensions)
         search.progress(Stage(f"diagnosis {len(extensions) + 1}: which effect is missing"))
-        verdict = diagnose_with(search, current, before.estimate.excess, significance, excluded)
+        verdict = diagnose_with(search, current, significance, excluded)
         search.progress(KeyFigure(verdict.reason))
         if verdict.after is None or len(extensions) == max_iterations:
             return extensions, verdict
@@ -265,7 +265,7 @@ def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules
     first, found = before.estimate, final.estimate
     if not findings or not is_successful(final.result):
         return last.verdict
-    if findings <= rules.most_at_once and is_good(final, first.excess, rules):
+    if findings <= rules.most_at_once and is_good(final, rules):
         return "partly_explained" if held_out_doubt(before, final, rules) else "found"
     explained = 1.0 - found.excess / max(first.excess, 1.0)
     return "partly_explained" if explained >= rules.most_of_it else "unexplained"

@@ -28,10 +28,6 @@ class Rules:
     good: float = 1.05
     """chi2/dof up to which a fit is good."""
 
-    left_over: float = 0.03
-    """Share of the first excess that a good fit may leave where the noise is far below every model
-    error."""
-
     most_of_it: float = 0.8
     """Share of the excess that an effect, or all effects together, must explain to be the explanation."""
 
@@ -99,11 +95,7 @@ class Rules:
     """Evaluations over which the pace of a refit is taken: one that is behind and at its pace would not catch
     up within all its evaluations is given up."""
 
-    # Whether an effect is physical and carries over.
-
-    visited_quantile: float = 0.995
-    """Quantile of the measured motion up to which a law must be physical: integrals are rough at a record's
-    ends."""
+    # Whether an effect carries over.
 
     transfer_visible: float = 0.03
     """Share of its gain that an effect must make at a level for that level to be left out and predicted. An

@@ -7,30 +7,26 @@ from jaxtyping import Float
 
 from ...models import Isolator, Quantity
 from ...records import Record
-from .._rules import Rules
 from ..jacobian import coordinate_motion
 from ._passivity import find_activity
 
 
-def visited_range(
-    model: Isolator, records: tuple[Record, ...], quantity: Quantity, rules: Rules
-) -> tuple[float, float]:
+def visited_range(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> tuple[float, float]:
     """Give the largest displacement [m] and velocity [m/s] that dwells and windows reached.
 
     Args:
         model: the isolator, for what its coordinate is.
         records: the records.
         quantity: what the sensor measures.
-        rules: the quantile to take.
 
     Returns:
-        Both, as quantiles: integrals of a measured acceleration are rough at the ends of a record.
+        Both.
     """
     based = model.excitation == "base_acceleration"
     states = [coordinate_motion(record, quantity, based) for record in records]
     return (
-        float(max(np.quantile(np.abs(x), rules.visited_quantile) for x, _ in states)),
-        float(max(np.quantile(np.abs(v), rules.visited_quantile) for _, v in states)),
+        float(max(np.max(np.abs(x)) for x, _ in states)),
+        float(max(np.max(np.abs(v)) for _, v in states)),
     )
 
 
@@ -39,9 +35,7 @@ def _static_force(model: Isolator, x: Float[jax.Array, ""], v: Float[jax.Array, 
     return model.restoring_force((x, v, *(jnp.zeros(()),) * model.internal_states))
 
 
-def find_violation(
-    model: Isolator, records: tuple[Record, ...], quantity: Quantity, rules: Rules
-) -> str | None:
+def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
     """Find what is unphysical in a model over the visited motion, if anything.
 
     The static tangent stiffness must be positive wherever the model has a linear spring. The static damping
@@ -52,12 +46,11 @@ def find_violation(
         model: the isolator.
         records: the records.
         quantity: what the sensor measures.
-        rules: which motion counts, and when a loop gives energy.
 
     Returns:
         A sentence, or None.
     """
-    largest_x, largest_v = visited_range(model, records, quantity, rules)
+    largest_x, largest_v = visited_range(model, records, quantity)
     passive, still = (
         Isolator(model.mass, tuple(one for one in model.elements if not one.active)),
         jnp.zeros(()),

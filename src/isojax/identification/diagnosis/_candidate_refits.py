@@ -22,7 +22,6 @@ class Case(NamedTuple):
     Attributes:
         fit: the fit.
         test: scores of the absent effects.
-        first_excess: chi2 - dof of the first fit of the loop.
         significance: family-wise level of the score test.
         search: how to search.
         is_good: whether the fit leaves nothing worth explaining.
@@ -30,7 +29,6 @@ class Case(NamedTuple):
 
     fit: Fit
     test: ScoreTest
-    first_excess: float
     significance: float
     search: Search
     is_good: bool
@@ -139,7 +137,7 @@ def _violation(case: Case, found: Estimate, score: Score) -> str | None:
         return "its refit ends at a strength below zero"
     if not follows_freely(fitted, found):
         return "its free run is worse than without it"
-    return find_violation(found.model, fitted.problem.records, fitted.problem.quantity, case.rules)
+    return find_violation(found.model, fitted.problem.records, fitted.problem.quantity)
 
 
 def _explains(refit: Refit, case: Case) -> bool:

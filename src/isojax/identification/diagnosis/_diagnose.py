@@ -19,20 +19,17 @@ from ._separating_words import is_exact, separating_experiment
 from ._transfer import transferred_share
 
 
-def is_good(fit: Fit, first_excess: float, rules: Rules) -> bool:
+def is_good(fit: Fit, rules: Rules) -> bool:
     """Say whether a fit leaves nothing worth explaining.
 
     Args:
         fit: the fit.
-        first_excess: chi2 - dof of the first fit of the loop.
         rules: when that is so.
 
     Returns:
-        True if chi2/dof is near one and what is left is no more locked to the drive than noise and the
-        declared error of the response are; or if hardly any of the first excess is left.
+        Whether chi2/dof is near one and what is left is no more locked to the drive than noise and the
+        declared error of the response are.
     """
-    if fit.estimate.excess < rules.left_over * first_excess:
-        return True
     return _ratio(fit) <= rules.good and not is_locked(fit, rules)
 
 
@@ -44,7 +41,6 @@ def is_locked(fit: Fit, rules: Rules) -> bool:
 def diagnose(
     fit: Fit,
     *,
-    first_excess: float | None = None,
     significance: float | None = None,
     excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
@@ -58,7 +54,6 @@ def diagnose(
 
     Args:
         fit: the fit to diagnose.
-        first_excess: chi2 - dof of the first fit of the loop; of this one if omitted.
         significance: family-wise level of the score test; `rules.significance` if omitted.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver for the refits.
@@ -77,13 +72,12 @@ def diagnose(
         ('found', 'coulomb_friction')
     """
     search = search_of(fit.campaign, rules, solver, progress, max_steps)
-    return diagnose_with(search, fit, first_excess, significance, excluded)
+    return diagnose_with(search, fit, significance, excluded)
 
 
 def diagnose_with(
     search: Search,
     fit: Fit,
-    first_excess: float | None = None,
     significance: float | None = None,
     excluded: tuple[str, ...] = (),
 ) -> Verdict:
@@ -92,7 +86,6 @@ def diagnose_with(
     Args:
         search: how to search.
         fit: see `diagnose`.
-        first_excess: see `diagnose`.
         significance: see `diagnose`.
         excluded: see `diagnose`.
 
@@ -105,14 +98,12 @@ def diagnose_with(
         return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
     probes = absent_effects(fitted.model, search.scales, excluded)
     search.progress(f"score test of {len({probe.name for probe in probes})} absent effects")
-    first_excess = fitted.excess if first_excess is None else first_excess
     case = Case(
         fit,
         score_test(fitted, search, probes),
-        first_excess,
         search.rules.significance if significance is None else significance,
         search,
-        is_good(fit, first_excess, search.rules),
+        is_good(fit, search.rules),
     )
     return _weigh_refits(case, refit_candidates(case))
 
@@ -230,7 +221,7 @@ def _verdict_of_finding(
         rivals(test.scores, usable, twins, together),
     )
     before, after = case.fit, complete(best.estimate, case.fit.model, case.fit.campaign, case.fit.noise)
-    if is_good(after, case.first_excess, rules):
+    if is_good(after, rules):
         verdict = "found"
     elif explained >= rules.most_of_it:
         verdict = "partly_explained"

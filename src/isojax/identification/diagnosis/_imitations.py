@@ -41,7 +41,7 @@ def _best_addition(found: Estimate, excluded: str, opponent: _Opponent, search: 
             and len(pair.places) <= len(other.places)
             and opponent.gained(pair) > rules.close_bic
             and is_determined(pair, score, rules.determined)
-            and find_violation(pair.model, pair.problem.records, pair.problem.quantity, rules) is None
+            and find_violation(pair.model, pair.problem.records, pair.problem.quantity) is None
             and follows_freely(found, pair)
         ):
             return pair
