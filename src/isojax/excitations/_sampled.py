@@ -18,7 +18,7 @@ Hold = Literal["band_limited", "linear", "zero_order"]
 _JUST_INSIDE = 1e-9
 """Distance from the ends of a sample, as a share of it, at which they are read: a jump there lies outside."""
 
-_FINE = 8
+_GRID_A_SAMPLE = 8
 """Points a sample of the grid between which a drive is a cubic where its delay grows."""
 
 _CONTINUATION = 256
@@ -79,8 +79,8 @@ def tabulate(
     late = shift * rate + skew * (number + np.arange(parts + 1) / parts)
     if hold == "band_limited" and skew != 0.0:
         reach = int(np.ceil(np.max(np.abs(late)))) + 1
-        fine, slope = _band_limited(values, rate, _FINE, 0.0, reach)
-        grid = np.arange(fine.size) / _FINE - reach
+        fine, slope = _band_limited(values, rate, _GRID_A_SAMPLE, 0.0, reach)
+        grid = np.arange(fine.size) / _GRID_A_SAMPLE - reach
         curve = CubicHermiteSpline(grid, fine, slope / rate)
         place = number + (np.arange(parts + 1) / parts - late)
         return curve(place), curve(place, 1) * rate

@@ -32,9 +32,6 @@ from .remainder import Remainder, explain_remainder
 
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 
-LEAST_RISE = 0.01
-"""Rise of the held-out chi2/dof that matters, where chance does not explain it."""
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Loop:
@@ -256,8 +253,7 @@ def held_out_doubt(before: Fit, final: Fit, rules: Rules) -> Doubt:
         return ""
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
     rise = last.chi2_per_dof - first.chi2_per_dof
-    is_worse = rise > LEAST_RISE and rise > 3.0 * 2.0 * math.sqrt(rise / last.dof)
-    return "worse" if is_worse else "not down to noise"
+    return "worse" if rise > 3.0 * 2.0 * math.sqrt(max(rise, 0.0) / last.dof) else "not down to noise"
 
 
 def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules: Rules) -> VerdictWord:
