@@ -26,12 +26,12 @@ KIND, BASE = ij.elements.CATALOGUE[NAME], (ij.LinearStiffness(1.08e6), ij.Linear
 
 
 def truth():
-    """The effect at three tenths of its typical strength."""
+    """The effect at a strength that leaves the sum of both dampers positive at rest."""
     magnitudes = scales(solved(BASE, levels=(80.0,)))
     return eqx.tree_at(
         lambda element: getattr(element, KIND.strength),
         KIND.guess(magnitudes),
-        jax.numpy.asarray(0.3 * KIND.typical_strength(magnitudes)),
+        jax.numpy.asarray(0.03 * KIND.typical_strength(magnitudes)),
     )
 
 
