@@ -37,9 +37,9 @@ def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem,
     else:
         seen = unseen = ()
         for part in problem.segments:
-            middle = (part.start + part.stop) // 2
+            middle = (part.counted + part.stop) // 2
             seen += (part._replace(stop=middle),)
-            unseen += (part._replace(start=middle, counted=max(middle, part.counted)),)
+            unseen += (part._replace(start=middle, counted=middle),)
     return problem._replace(segments=seen, heads=()), problem._replace(segments=unseen, heads=())
 
 
