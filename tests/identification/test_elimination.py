@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate, step_nuisances
-from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT
+from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT
 
 NOISE, SPREAD, WITHIN = 0.3, 2e-3, 1e-3
 COLUMNS, STATES, SAMPLES = 3, 2, 40

@@ -35,9 +35,10 @@ from isojax.excitations import Sampled
 from isojax.identification.fitting._problem import one_hot
 from isojax.identification.jacobian import _batch
 from isojax.identification.jacobian._batch import Prepared, prepare
-from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT, Unknowns, information, readings
+from isojax.identification.jacobian._information import information, readings
 from isojax.identification.jacobian._score_columns import score_information
 from isojax.identification.jacobian._segments import Segment
+from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT, Unknowns
 from isojax.models import Integrator, Isolator, simulate
 from isojax.records import Record
 from isojax.rig._balance import Balance

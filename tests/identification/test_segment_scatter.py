@@ -24,8 +24,8 @@ from isojax.identification.fitting._elimination import Nuisances, Reduced, Sprea
 from isojax.identification.fitting._problem import Point
 from isojax.identification.fitting._search import Search
 from isojax.identification.fitting._segment_scatter import segment_scatter
-from isojax.identification.jacobian._information import STIFFNESS_SCALE_UNIT
 from isojax.identification.jacobian._segments import Segment
+from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT
 from isojax.identification.remainder._dwell_remainder import dwell_remainders
 from isojax.identification.remainder._force_residual import force_residuals
 from isojax.models import Isolator

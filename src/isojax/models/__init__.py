@@ -2,8 +2,8 @@
 
 In: a mass, elements and a drive. Out: an `Isolator`, its simulated motion and readings, its JSON file.
 Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at one time), then `_rk4.py` and
-`_integrator.py` (the step), `_scan.py` (many records) and `_simulate.py` (one drive). `_laws.py` and
-`_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file.
+`_integrator.py` (the step), `_scan.py` (many records), `_solve.py` (diffrax) and `_simulate.py` (one drive).
+`_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file.
 """
 
 from ._event_step import Ringing as Ringing
@@ -29,6 +29,8 @@ from ._scan import read_record as read_record
 from ._scan import scan_records as scan_records
 from ._simulate import Simulation as Simulation
 from ._simulate import simulate as simulate
+from ._solve import check_integrator as check_integrator
+from ._solve import solve_record as solve_record
 from ._storage import load_model as load_model
 from ._storage import model_to_dict as model_to_dict
 from ._storage import save_model as save_model

@@ -7,13 +7,17 @@ from jaxtyping import Array, Float
 from ._isolator import Isolator
 from ._rk4 import RK4
 
+_FINE_STEPS = 4
+"""Steps a sample of a table that is interpolated: eight parts, as fine as that of a `Sampled` drive."""
+
 
 class Integrator(eqx.Module):
     """Solver, steps and tolerances; every derived tolerance follows from these.
 
     Attributes:
-        solver: a diffrax solver; `RK4` for sample-locked work.
-        substeps: steps a sample at least; elements with sharp laws raise it (see `steps_per_sample`).
+        solver: a diffrax solver. `RK4` steps records from sample to sample, without diffrax's own loop; any
+            other simulates them through `diffrax.diffeqsolve`.
+        substeps: fixed steps a sample at least; elements with sharp laws raise it (see `steps_per_sample`).
         rtol: relative tolerance of adaptive steps, or None for fixed steps.
         atol: absolute tolerance of adaptive steps on the state in SI units, used where `rtol` is given.
         max_steps: steps after which one simulation gives up.
@@ -70,6 +74,40 @@ class Integrator(eqx.Module):
         """
         return max(self.substeps, *(one.substeps for one in model.elements if not one.splits), 1)
 
+    @property
+    def is_locked(self) -> bool:
+        """Whether records are stepped by RK4 from sample to sample, under one scan without diffrax's loop."""
+        return isinstance(self.solver, RK4)
+
+    def words(self, model: Isolator) -> str:
+        """Say how records of a model are integrated.
+
+        Args:
+            model: the isolator.
+
+        Returns:
+            Such as "RK4, 1 a sample" or "Dopri8 of diffrax, rtol 1e-08, atol 1e-12".
+        """
+        name = type(self.solver).__name__
+        if self.is_locked:
+            return f"{name}, {self.record_steps(model)} a sample"
+        if self.rtol is None:
+            return f"{name} of diffrax, {self.steps_per_sample(model)} a sample"
+        return f"{name} of diffrax, rtol {self.rtol:g}, atol {self.atol:g}"
+
+    def table_steps(self, model: Isolator) -> int:
+        """Give the steps a sample, of two parts each, into which a record's drive is tabulated.
+
+        Args:
+            model: the isolator.
+
+        Returns:
+            Those of RK4; for any other solver enough to interpolate the table between them.
+        """
+        if self.is_locked:
+            return self.record_steps(model)
+        return max(_FINE_STEPS, self.steps_per_sample(model))
+
     def steps_a_period(self, model: Isolator) -> int:
         """Give the integration steps a drive period.
 
@@ -121,11 +159,19 @@ class Integrator(eqx.Module):
         """
         return 0.5 * self.map_error
 
-    def controller(self, times: Float[Array, " time"]) -> diffrax.AbstractStepSizeController:
+    def controller(
+        self,
+        times: Float[Array, " time"],
+        shortest: Float[Array, ""],
+        jumps: Float[Array, " jump"] | None = None,
+    ) -> diffrax.AbstractStepSizeController:
         """Give diffrax's step size controller.
 
         Args:
-            times: ends of the fixed steps [s].
+            times: ends of the fixed steps.
+            shortest: adaptive step below which the integration gives up.
+            jumps: times at which the equation of motion jumps: an adaptive step ends before and starts again
+                after.
 
         Returns:
             A controller that steps from one of these times to the next, or an adaptive one where `rtol` is
@@ -133,4 +179,5 @@ class Integrator(eqx.Module):
         """
         if self.rtol is None:
             return diffrax.StepTo(ts=times)
-        return diffrax.PIDController(rtol=self.rtol, atol=self.atol)
+        adaptive = diffrax.PIDController(rtol=self.rtol, atol=self.atol, dtmin=shortest, force_dtmin=False)
+        return adaptive if jumps is None else diffrax.ClipStepSizeController(adaptive, jump_ts=jumps)

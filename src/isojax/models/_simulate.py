@@ -17,6 +17,7 @@ from ._instant import Instant
 from ._integrator import Integrator
 from ._isolator import Isolator, Quantity
 from ._laws import State
+from ._solve import solve_ode
 
 
 class Simulation(eqx.Module):
@@ -58,24 +59,10 @@ def _solve_ode(
     # Counted, not summed up: the steps of a zero-order hold must not drift against its samples.
     steps = jnp.arange((time.size - 1) * substeps + 1, dtype=float) / (rate * substeps)
 
-    def field(t: Lanes, y: State, args: None) -> State:
+    def field(t: Lanes, y: State) -> State:
         return model.rates(y, Instant(excitation(t - shift), excitation.rate(t - shift)), quantity)
 
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(field),  # pyright: ignore[reportArgumentType]
-        integrator.solver,
-        t0=steps[0],
-        t1=steps[-1],
-        dt0=None if integrator.rtol is None else 1.0 / (rate * substeps),
-        y0=state,
-        saveat=diffrax.SaveAt(ts=time),
-        stepsize_controller=integrator.controller(steps),
-        adjoint=diffrax.ForwardMode(),
-        max_steps=integrator.max_steps,
-        throw=False,
-    )
-    assert solution.ys is not None
-    return solution.ys, solution.result
+    return solve_ode(field, integrator, state, time, steps)
 
 
 def simulate(

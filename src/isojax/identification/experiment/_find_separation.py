@@ -264,7 +264,8 @@ def _of_trial(
         for row in range(len(made.records))
         for piece in range(DWELLS)
     )
-    integrator = Integrator(old.integrator.solver, old.integrator.substeps)
+    # The step of `trial_run`, which made the records: another solver's error would pass for information.
+    integrator = Integrator(substeps=old.integrator.substeps)
     simulator = Simulator(
         old._replace(
             records=made.records,

@@ -105,6 +105,11 @@ class Fit(NamedTuple):
         """Standard error of each fitted coefficient [its unit]; NaN where the data do not determine it."""
         return dict(zip(self.free, (float(e) for e in self.estimate.uncertainty.standard_error), strict=True))
 
+    @property
+    def integration(self) -> str:
+        """What integrated the records: the solver with its steps or tolerances."""
+        return self.estimate.problem.integrator.words(self.model)
+
     def __str__(self) -> str:
         """Give the fit report."""
         return fit_report(self)
@@ -147,7 +152,6 @@ def _statistics(fit: Fit) -> list[str]:
     if not is_successful(fit.result):
         nothing = dict.fromkeys(("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter"), math.nan)
         stats = stats._replace(**nothing)
-    integrator = fit.estimate.problem.integrator
     scatter = f"{100 * stats.stiffness_scatter:.2g} % between records"
     if stats.segment_scatter > 0.0:
         scatter += f", {100 * stats.segment_scatter:.2g} % within them"
@@ -162,7 +166,7 @@ def _statistics(fit: Fit) -> list[str]:
         ("BIC", f"{stats.bic:.8g}"),
         ("noise", f"{fit.noise.sigma:.4g} {unit} rms, from {fit.noise.method.replace('_', ' ')}"),
         ("stiffness scatter", scatter),
-        ("integration", f"{type(integrator.solver).__name__}, {integrator.record_steps(fit.model)} a sample"),
+        ("integration", fit.integration),
     ]
     if math.isfinite(stats.integration_error):
         rows.append(("integration error", f"{stats.integration_error:.2g} of the noise when halved"))

@@ -48,7 +48,7 @@ class Simulator:
             The batches.
         """
         problem = self.problem
-        steps = problem.integrator.record_steps(
+        steps = problem.integrator.table_steps(
             Isolator(model.mass, model.elements[:carried], model.excitation)
         )
         key = (steps, float(model.shift()))
@@ -67,6 +67,7 @@ class Simulator:
                 based=model.excitation == "base_acceleration",
                 channels=tuple(sorted(channels | known)),
                 room=self._segments,
+                integrator=problem.integrator,
             )
         return self._prepared[key]
 

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from ..._cores import usable_cores
 from ...excitations import Hold, tabulate
-from ...models import Instant, Isolator, Quantity
+from ...models import Instant, Integrator, Isolator, Quantity
 from ...records import Record, measured_state
 from ._channels import channel_table
 from ._segments import Segment
@@ -65,6 +65,8 @@ class Prepared(NamedTuple):
         quantity: what the sensor measures.
         sample_time: time between samples [s].
         samples: samples that count in each record.
+        integrator: what simulates the segments.
+        jumps: whether the drive jumps at the samples.
     """
 
     batches: tuple[Batch, ...]
@@ -75,6 +77,8 @@ class Prepared(NamedTuple):
     quantity: Quantity
     sample_time: float
     samples: Float[np.ndarray, " record"]
+    integrator: Integrator
+    jumps: bool
 
 
 def coordinate_motion(
@@ -115,6 +119,7 @@ def prepare(
     based: bool = False,
     channels: tuple[str, ...] = (),
     room: tuple[Segment, ...] = (),
+    integrator: Integrator | None = None,
 ) -> Prepared:
     """Lay segments side by side.
 
@@ -128,6 +133,7 @@ def prepare(
         based: whether the drive is the acceleration of the base.
         channels: names of the signals of the records that are wanted beside the drive.
         room: segments for which there shall be room, too: tables of one shape share their compiled code.
+        integrator: what simulates the segments; RK4, which takes the steps given above, if omitted.
 
     Returns:
         The batches and what belongs to their lanes.
@@ -186,4 +192,15 @@ def prepare(
         for first in range(0, lanes, share)
     )
     count = np.bincount(owner, weights=weight.sum(axis=1), minlength=len(records))
-    return Prepared(batches, segments, owner, starts, spread, quantity, 1.0 / records[0].rate, count)
+    return Prepared(
+        batches,
+        segments,
+        owner,
+        starts,
+        spread,
+        quantity,
+        1.0 / records[0].rate,
+        count,
+        Integrator() if integrator is None else integrator,
+        hold == "zero_order",
+    )

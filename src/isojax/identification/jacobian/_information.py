@@ -1,162 +1,53 @@
 """The information that segments hold: products of residuals and of derivatives of their simulation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..._parameters import find_parameter, list_parameters, replace_parameters
-from ...models import RK4, Instant, Isolator, Quantity, State, advance_record, read_record, split_stages
-from ._batch import Batch, Prepared, workers
+from ...models import Isolator
+from ._batch import Prepared, workers
+from ._fixed_steps import fixed_information, fixed_path, fixed_readings
+from ._solved_steps import solved_information, solved_path, solved_readings
+from ._unknowns import Unknowns
 
 
-class Unknowns(NamedTuple):
-    """Where the simulation stands and along which directions it is differentiated.
+class Stepping(NamedTuple):
+    """How segments are simulated: functions of the same arguments, whatever the integrator.
 
     Attributes:
-        model: the isolator.
-        directions: changes of the model's parameters, one column each, in the order of `list_parameters`.
-        stiffness_scale: factor on the linear stiffness, a lane each.
-        states: state at each lane's first sample.
-        state_scales: size of one unit of change of each state.
+        information: A^T W A of each lane; A holds the columns and, last, the residual.
+        readings: what the sensor chain records.
+        path: states at the start of each step of the tables, and the ringing of jumps where laws are split.
     """
 
-    model: Isolator
-    directions: Float[np.ndarray, "parameter column"]
-    stiffness_scale: Float[np.ndarray, " lanes"]
-    states: Float[np.ndarray, "state lanes"]
-    state_scales: Float[np.ndarray, "state lanes"]
+    information: Callable[..., Array]
+    readings: Callable[..., Array]
+    path: Callable[..., tuple]
 
 
-STIFFNESS_SCALE_UNIT = 1e-3
-"""One unit of the column of the stiffness scale: a tenth of a percent."""
+def find_stepping(prepared: Prepared) -> Stepping:
+    """Give the way in which segments are simulated: by RK4 under a scan, or by diffrax as asked.
 
-
-def _stiffness_place(model: Isolator) -> int | None:
-    spring = next((one for one in model.elements if one.proportional_to == "displacement"), None)
-    return None if spring is None else find_parameter(model, f"{spring.name}.{spring.strength}")
-
-
-def scaled_model(model: Isolator, values: Sequence[Array], scale: Array) -> Isolator:
-    """Give a model with other numbers, its linear stiffness scaled lane by lane.
+    All that depends on it is chosen here: residuals, exact derivatives, and the motion along which the
+    columns of absent effects are worked out. Those columns themselves are a linear solve, the same for both.
 
     Args:
-        model: the isolator.
-        values: one value a parameter, in the order of `list_parameters`.
-        scale: factor on the linear stiffness.
+        prepared: the segments, with their integrator.
 
     Returns:
-        The isolator.
+        The functions.
     """
-    numbers = list(values)
-    place = _stiffness_place(model)
-    if place is not None:
-        numbers[place] = numbers[place] * scale
-    return replace_parameters(model, numbers)
-
-
-def has_stiffness_scale(model: Isolator) -> bool:
-    """Say whether the model has a linear spring, whose stiffness may differ from record to record.
-
-    Args:
-        model: the isolator.
-
-    Returns:
-        True if it has.
-    """
-    return _stiffness_place(model) is not None
-
-
-def _sampler(
-    model: Isolator, quantity: Quantity, sample_time: float
-) -> Callable[..., tuple[Array, State, Array | None]]:
-    """Give the function that reads one sample and steps to the next, the model's numbers as arguments.
-
-    Last it gives what jumps on the way leave in the next reading.
-    """
-    solver = RK4()
-
-    def sample(
-        values: tuple[Array, ...], scale: Array, state: State, stages: tuple[Instant, ...]
-    ) -> tuple[Array, State, Array | None]:
-        current = scaled_model(model, values, scale)
-        # The table already holds the delayed drive; only the derivative with respect to the delay is still to
-        # come.
-        late = current.shift() - jax.lax.stop_gradient(current.shift())
-        stages = tuple(at.delayed(late) for at in stages)
-        reading = read_record(current, state, stages[0], quantity)
-        ahead, ringing = advance_record(current, solver, quantity, sample_time, state, stages)
-        return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)
-
-    return sample
-
-
-@eqx.filter_jit
-def _lane_information(
-    model: Isolator,
-    moving: tuple[int, ...],
-    directions: tuple[Array, ...],
-    columns: int,
-    scale: Array,
-    states: State,
-    state_scales: State,
-    batch: Batch,
-    quantity: Quantity,
-    sample_time: float,
-) -> Float[Array, "column column lanes"]:
-    """Accumulate A^T W A over the samples of each lane; A holds the columns and, last, the residual."""
-    values = tuple(entry.value for entry in list_parameters(model))
-    sample = _sampler(model, quantity, sample_time)
-    lanes = scale.shape[0]
-    has_scale = _stiffness_place(model) is not None
-    total = columns + int(has_scale) + len(states)
-
-    seeds = tuple(jnp.concatenate([seed, jnp.zeros(total - columns)]) for seed in directions)
-    scale_seed = jnp.zeros((total, lanes))
-    if has_scale:
-        scale_seed = scale_seed.at[columns].set(STIFFNESS_SCALE_UNIT)
-    tangents = tuple(
-        jnp.zeros((total, lanes)).at[total - len(states) + index].set(unit)
-        for index, unit in enumerate(state_scales)
+    if prepared.integrator.is_locked:
+        return Stepping(fixed_information, fixed_readings, fixed_path)
+    how = prepared.integrator, prepared.jumps
+    return Stepping(
+        partial(solved_information, *how), partial(solved_readings, *how), partial(solved_path, *how)
     )
-
-    def with_moved(moved: tuple[Array, ...]) -> tuple[Array, ...]:
-        # Only what moves is differentiated: the rest would cost as much and give zeros.
-        numbers = list(values)
-        for place, number in zip(moving, moved, strict=True):
-            numbers[place] = number
-        return tuple(numbers)
-
-    def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
-        state, tangent, gram, pending = carry
-        acting, measured, weight = table
-        stages = split_stages(acting)
-
-        def along(seed: tuple[Array, ...], scale_seed: Array, tangent: State) -> tuple:
-            primal, change = jax.jvp(
-                lambda moved, scale, state: sample(with_moved(moved), scale, state, stages),
-                (tuple(values[place] for place in moving), scale, state),
-                (seed, scale_seed, tangent),
-            )
-            return primal, change
-
-        (reading, state, after), change = jax.vmap(along, out_axes=(None, 0))(seeds, scale_seed, tangent)
-        rows = jnp.concatenate([change[0], (measured - reading)[None]])
-        if pending is not None:
-            rows, pending = rows + pending, jnp.concatenate([change[2], -after[None]])
-        rows = rows * weight[None]
-        return (state, change[1], gram + rows[:, None] * rows[None], pending), None
-
-    silent = jnp.zeros((total + 1, lanes)) if model.splits else None
-    start = (states, tangents, jnp.zeros((total + 1, total + 1, lanes)), silent)
-    tables = (batch.acting, batch.measured, batch.weight)
-    carry, _ = jax.lax.scan(body, start, tables)
-    return carry[2]
 
 
 def share_lanes(values: np.ndarray, part: int, parts: int) -> tuple[Array, ...]:
@@ -179,13 +70,13 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
     Returns:
         A^T A of each lane, lanes first; not finite where a simulation diverged.
     """
-    parts = len(prepared.batches)
+    parts, stepping = len(prepared.batches), find_stepping(prepared)
     model = unknowns.model
     moving = tuple(int(place) for place in np.flatnonzero(unknowns.directions.any(axis=1)))
     directions = tuple(jnp.asarray(unknowns.directions[place]) for place in moving)
 
     def one(part: int) -> np.ndarray:
-        result = _lane_information(
+        result = stepping.information(
             model,
             moving,
             directions,
@@ -202,22 +93,6 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
     # JAX releases the interpreter while it computes, so that plain threads use every core on one device.
     with ThreadPoolExecutor(workers()) as pool:
         return np.concatenate(list(pool.map(one, range(parts))))
-
-
-@eqx.filter_jit
-def _lane_readings(
-    model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> Float[Array, "time lanes"]:
-    values = tuple(entry.value for entry in list_parameters(model))
-    sample = _sampler(model, quantity, sample_time)
-
-    def body(carry: tuple[State, Array | None], table: Instant) -> tuple[tuple[State, Array | None], Array]:
-        state, pending = carry
-        reading, state, after = sample(values, scale, state, split_stages(table))
-        return (state, after), reading if pending is None else reading + pending
-
-    start = (states, jnp.zeros_like(scale) if model.splits else None)
-    return jax.lax.scan(body, start, batch.acting)[1]
 
 
 def readings(
@@ -237,13 +112,15 @@ def readings(
     Returns:
         What the sensor chain records [SI unit of the output]; meaningless where the lane is padded.
     """
-    parts = len(prepared.batches)
+    parts, stepping = len(prepared.batches), find_stepping(prepared)
 
     def one(part: int) -> np.ndarray:
         scale = share_lanes(stiffness_scale[None], part, parts)[0]
         batch = prepared.batches[part].following(model)
         own = share_lanes(states, part, parts)
-        return np.asarray(_lane_readings(model, scale, own, batch, prepared.quantity, prepared.sample_time))
+        return np.asarray(
+            stepping.readings(model, scale, own, batch, prepared.quantity, prepared.sample_time)
+        )
 
     with ThreadPoolExecutor(workers()) as pool:
         return np.concatenate(list(pool.map(one, range(parts))), axis=1)

@@ -2,8 +2,10 @@
 
 The derivatives of `information` cost a full step of the model a column. For dozens of absent effects the
 motion is simulated once; what each effect would add is worked out along it, all samples at once; and one
-linear, time-varying solve, which knows nothing of the effects, carries all columns. Compiled code depends on
-the model, on the kind of an effect, or on neither, and never on which effects ride along with which model.
+linear, time-varying solve, which knows nothing of the effects, carries all columns. The motion is that of
+the fit's own solver; the solve along it takes one step a sample, whatever simulated the motion. Compiled code
+depends on the model, on the kind of an effect, or on neither, and never on which effects ride along with
+which model.
 """
 
 import itertools
@@ -21,10 +23,11 @@ from ...models import Isolator, State
 from ._batch import Batch, Prepared, workers
 from ._effect_inputs import input_columns
 from ._families import ElementFamily, find_families, in_turn, stack_states
-from ._information import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale, share_lanes
+from ._information import find_stepping, share_lanes
 from ._propagation import propagate, respond
-from ._slopes import Change, Slopes, follow_path, impulse_at_samples, slopes_along
+from ._slopes import Change, Slopes, impulse_at_samples, slopes_along
 from ._transitions import Transitions, transitions_along
+from ._unknowns import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale
 
 _ENTRIES = 2e7
 """Numbers that one table of columns along the motion may hold."""
@@ -131,6 +134,7 @@ def _block(
     """Work out the columns of a few lanes, and multiply them out."""
     model, size = layout.model, 2 + layout.model.internal_states
     own = batch.following(model)
+    follow_path = find_stepping(prepared).path
     path, ringing = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
     slopes = slopes_along(model, layout.moving, scale, path, ringing, own, prepared.quantity)
     lanes, time, step = scale.shape[0], batch.measured.shape[0], prepared.sample_time
@@ -140,7 +144,7 @@ def _block(
     table[:, -1] = error.T
 
     exact = None
-    if model.splits:
+    if ringing is not None:
         exact = transitions_along(model, layout.moving, scale, path, own.acting, prepared.quantity, step)
     group = _Group(slopes.states, exact, batch.weight, step)
     for source in _sources(layout, prepared, batch, slopes, exact, states[size:], columns, part):

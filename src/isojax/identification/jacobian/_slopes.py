@@ -14,25 +14,18 @@ from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
 from ...models import (
-    RK4,
     ROUNDED,
     Instant,
     Isolator,
     Quantity,
     Ringing,
     State,
-    Step,
     add_ringing,
-    advance,
     find_regime,
-    find_ringing,
-    read_record,
-    split_stages,
-    split_step,
 )
 from ._batch import Batch
 from ._effect_inputs import EFFECT_INPUTS, PathMotion, Perturbation
-from ._information import has_stiffness_scale, scaled_model
+from ._unknowns import has_stiffness_scale, scaled_model
 
 
 def sample_stages(table: Float[Array, "time stage lanes"]) -> Float[Array, "time 3 lanes"]:
@@ -94,31 +87,6 @@ def _without_bend(mean: Float[Array, "time lanes"]) -> Float[Array, "time lanes"
     return mean - (around[2:] - 2.0 * mean + around[:-2]) / 12.0
 
 
-@eqx.filter_jit
-def follow_path(
-    model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> tuple[State, Ringing | None]:
-    """Simulate; give the states at the start of each integration step, and the ringing of jumps."""
-    values = tuple(entry.value for entry in list_parameters(model))
-    current = scaled_model(model, values, scale)
-    acting = jax.tree_util.tree_map(steps_of, batch.acting)
-    time = batch.drive.shape[0]
-    steps = acting.drive.shape[0] // time
-    step_time = sample_time / steps
-    solver = RK4()
-
-    def body(state: State, table: tuple) -> tuple[State, tuple[State, Ringing | None]]:
-        number, stages = table[0], split_stages(table[1])
-        if not model.splits:
-            return advance(current, solver, quantity, step_time, state, stages), (state, None)
-        ahead, jump = split_step(current, quantity, state, Step(step_time, stages))
-        return ahead, (state, find_ringing(jump, number, steps))
-
-    numbers = jnp.tile(jnp.arange(steps), time)
-    path, ringing = jax.lax.scan(body, states, (numbers, acting))[1]
-    return path, jax.tree_util.tree_map(lambda one: one.reshape(time, steps, -1).sum(axis=1), ringing)
-
-
 class Change(NamedTuple):
     """Change of the reading, and of the rates of the carried states but the first (the velocity)."""
 
@@ -158,15 +126,17 @@ def slopes_along(
 ) -> Slopes:
     """Differentiate rates and reading along the path.
 
-    A law that jumps has no slope: its rates are those of the rounded law, used by effect inputs alone; what
-    it does to changes of states and parameters is in `transitions_along`.
+    A law that jumps has no slope. Where the path was split at its jumps, the rates are those of the rounded
+    law, used by effect inputs alone; what the jumps do to changes of states and parameters is in
+    `transitions_along`. Elsewhere the rounded law is the law.
     """
     values = tuple(entry.value for entry in list_parameters(model))
     at = jax.tree_util.tree_map(steps_of, batch.acting).pick(np.s_[:, 0])
     scale = jnp.broadcast_to(scale, at.drive.shape)
     steps = at.drive.shape[0] // batch.measured.shape[0]
     present = scaled_model(model, values, scale)
-    law = find_regime(present, path, at) if model.splits else ROUNDED
+    split = ringing is not None
+    law = find_regime(present, path, at) if split else ROUNDED
 
     def along(values: tuple[Array, ...], scale: Array, state: State, inlet: dict[str, Array]) -> Change:
         current = scaled_model(model, values, scale)
@@ -218,12 +188,12 @@ def slopes_along(
     for stage, state in enumerate((own, middles, ends)):
         now = coarse.pick(np.s_[:, stage])
         base = present.base(now)
-        y = read_record(present, state, now, quantity)
+        y = present.reading(state, now, quantity, find_regime(present, state, now) if split else ROUNDED)
         if stage == 0:
             y = add_ringing(y, ringing)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
     now = coarse.pick(np.s_[:, 0])
-    sharp = find_regime(present, own, now) if model.splits else ROUNDED
+    sharp = find_regime(present, own, now) if split else ROUNDED
     acted, acted_rate = present.drive(now)
     sensed = present.sensed(own, now, quantity, sharp)
     motion = PathMotion(

@@ -14,9 +14,9 @@ from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
 from ...models import Instant, Isolator, Quantity, State, Step, find_ringing, split_step
-from ._information import scaled_model
 from ._propagation import Matrix, Propagation, product
 from ._slopes import steps_of
+from ._unknowns import scaled_model
 
 
 class Transitions(NamedTuple):

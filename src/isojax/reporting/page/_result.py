@@ -15,7 +15,8 @@ SCHEMA = 1
 def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, Any]:
     """Give a closed loop as schema 1 of result.json.
 
-    "remainder" is there only where the verdict is "unexplained" or "partly_explained".
+    "remainder" is there only where the verdict is "unexplained" or "partly_explained"; "integration", beside
+    the coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records.
 
     Args:
         loop: the closed loop.
@@ -56,6 +57,7 @@ def _fit_dict(fit: Fit) -> dict[str, Any]:
             for entry in list_parameters(fit.model)
         },
         "error": {role: _error_dict(fit.errors[role]) for role in ("fit", "holdout")},
+        **({} if fit.estimate.problem.integrator.is_locked else {"integration": fit.integration}),
     }
 
 

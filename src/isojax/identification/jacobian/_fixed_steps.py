@@ -1,0 +1,142 @@
+"""Segments simulated by RK4 from sample to sample, under one scan, and split where a law jumps."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..._parameters import list_parameters
+from ...models import (
+    RK4,
+    Instant,
+    Isolator,
+    Quantity,
+    Ringing,
+    State,
+    Step,
+    advance,
+    advance_record,
+    find_ringing,
+    read_record,
+    split_stages,
+    split_step,
+)
+from ._batch import Batch
+from ._slopes import steps_of
+from ._unknowns import movable, scaled_model, unit_changes
+
+
+def _sampler(
+    model: Isolator, quantity: Quantity, sample_time: float
+) -> Callable[..., tuple[Array, State, Array | None]]:
+    """Give the function that reads one sample and steps to the next, the model's numbers as arguments.
+
+    Last it gives what jumps on the way leave in the next reading.
+    """
+    solver = RK4()
+
+    def sample(
+        values: tuple[Array, ...], scale: Array, state: State, stages: tuple[Instant, ...]
+    ) -> tuple[Array, State, Array | None]:
+        current = scaled_model(model, values, scale)
+        # The table already holds the delayed drive; only the derivative with respect to the delay is still to
+        # come.
+        late = current.shift() - jax.lax.stop_gradient(current.shift())
+        stages = tuple(at.delayed(late) for at in stages)
+        reading = read_record(current, state, stages[0], quantity)
+        ahead, ringing = advance_record(current, solver, quantity, sample_time, state, stages)
+        return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)
+
+    return sample
+
+
+@eqx.filter_jit
+def fixed_information(
+    model: Isolator,
+    moving: tuple[int, ...],
+    directions: tuple[Array, ...],
+    columns: int,
+    scale: Array,
+    states: State,
+    state_scales: State,
+    batch: Batch,
+    quantity: Quantity,
+    sample_time: float,
+) -> Float[Array, "column column lanes"]:
+    """Accumulate A^T W A over the samples of each lane; A holds the columns and, last, the residual."""
+    known, with_moved = movable(model, moving)
+    sample = _sampler(model, quantity, sample_time)
+    changes = unit_changes(model, directions, columns, state_scales)
+    total, lanes = changes.scale.shape
+
+    def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
+        state, tangent, gram, pending = carry
+        acting, measured, weight = table
+        stages = split_stages(acting)
+
+        def along(seed: tuple[Array, ...], scale_seed: Array, tangent: State) -> tuple:
+            primal, change = jax.jvp(
+                lambda moved, scale, state: sample(with_moved(moved), scale, state, stages),
+                (known, scale, state),
+                (seed, scale_seed, tangent),
+            )
+            return primal, change
+
+        (reading, state, after), change = jax.vmap(along, out_axes=(None, 0))(
+            changes.parameters, changes.scale, tangent
+        )
+        rows = jnp.concatenate([change[0], (measured - reading)[None]])
+        if pending is not None:
+            rows, pending = rows + pending, jnp.concatenate([change[2], -after[None]])
+        rows = rows * weight[None]
+        return (state, change[1], gram + rows[:, None] * rows[None], pending), None
+
+    silent = jnp.zeros((total + 1, lanes)) if model.splits else None
+    start = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
+    tables = (batch.acting, batch.measured, batch.weight)
+    carry, _ = jax.lax.scan(body, start, tables)
+    return carry[2]
+
+
+@eqx.filter_jit
+def fixed_readings(
+    model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
+) -> Float[Array, "time lanes"]:
+    """Simulate; give what the sensor chain records."""
+    values = tuple(entry.value for entry in list_parameters(model))
+    sample = _sampler(model, quantity, sample_time)
+
+    def body(carry: tuple[State, Array | None], table: Instant) -> tuple[tuple[State, Array | None], Array]:
+        state, pending = carry
+        reading, state, after = sample(values, scale, state, split_stages(table))
+        return (state, after), reading if pending is None else reading + pending
+
+    start = (states, jnp.zeros_like(scale) if model.splits else None)
+    return jax.lax.scan(body, start, batch.acting)[1]
+
+
+@eqx.filter_jit
+def fixed_path(
+    model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
+) -> tuple[State, Ringing | None]:
+    """Simulate; give the states at the start of each integration step, and the ringing of jumps."""
+    values = tuple(entry.value for entry in list_parameters(model))
+    current = scaled_model(model, values, scale)
+    acting = jax.tree_util.tree_map(steps_of, batch.acting)
+    time = batch.drive.shape[0]
+    steps = acting.drive.shape[0] // time
+    step_time = sample_time / steps
+    solver = RK4()
+
+    def body(state: State, table: tuple) -> tuple[State, tuple[State, Ringing | None]]:
+        number, stages = table[0], split_stages(table[1])
+        if not model.splits:
+            return advance(current, solver, quantity, step_time, state, stages), (state, None)
+        ahead, jump = split_step(current, quantity, state, Step(step_time, stages))
+        return ahead, (state, find_ringing(jump, number, steps))
+
+    numbers = jnp.tile(jnp.arange(steps), time)
+    path, ringing = jax.lax.scan(body, states, (numbers, acting))[1]
+    return path, jax.tree_util.tree_map(lambda one: one.reshape(time, steps, -1).sum(axis=1), ringing)
