@@ -94,8 +94,8 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     repeats move the harmonics, and not the scatter about them.
 
     Settled dwells and periods also show the spectrum of the noise. Where it is significantly coloured, the
-    estimate holds the filter that whitens it. Declared noise and noise behind a [filter] count as white inside
-    their band; repeats and the floor of a spectrum show no colour.
+    estimate holds the filter that whitens it. Declared noise and noise behind a [filter] count as white
+    inside their band; repeats and the floor of a spectrum show no colour.
 
     Args:
         campaign: The campaign.
@@ -145,7 +145,7 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
 
 
 def _common_colour(records: list[Record], method: NoiseMethod, band: NoiseBand) -> Colour | None:
-    """Gives the autoregressive law of the noise of records that show it; None where it is white or unknown."""
+    """Gives the autoregressive law of the noise that records show; None where it is white or unknown."""
     if method == "periods":
         periods = [_settled_periods(record) for record in records]
         return noise_colour(
