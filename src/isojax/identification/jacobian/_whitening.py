@@ -68,11 +68,13 @@ def whiten(
     lag = np.arange(size)[:, None] + size - np.arange(2 * size)
     taps = jnp.where((lag >= 0) & (lag <= order), whitening.law[np.clip(lag, 0, order)], 0.0)
     past = jnp.concatenate([jnp.zeros_like(cut[:1]), cut[:-1]])
-    filtered = (taps[:, :size] @ past + taps[:, size:] @ cut).reshape(-1, columns, lanes)[:time]
-    first = jnp.argmax(weight > 0.0, axis=0) + jnp.arange(min(order, time))[:, None]
-    begun = rows.at[first, :, jnp.arange(lanes)].get(mode="fill", fill_value=0.0)
+    filtered = jnp.einsum("ij,bjr->bir", taps, jnp.concatenate([past, cut], axis=1))
+    filtered = filtered.reshape(-1, columns, lanes)[:time]
+    first = jnp.argmax(weight > 0.0, axis=0)[None] + jnp.arange(min(order, time))[:, None]
+    lane = jnp.arange(lanes)[None]
+    begun = rows.at[first, :, lane].get(mode="fill", fill_value=0.0)
     begun = jnp.einsum("ij,jlc->ilc", whitening.start[: first.shape[0], : first.shape[0]], begun)
-    filtered = filtered.at[first, :, jnp.arange(lanes)].set(begun, mode="drop")
+    filtered = filtered.at[first, :, lane].set(begun, mode="drop")
     return filtered * weight[:, None]
 
 

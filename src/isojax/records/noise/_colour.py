@@ -62,8 +62,9 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
 
     The autocorrelations are those of the pooled windows. What the harmonics took with them is put back with
     the density that the law itself has there, and the law is estimated again until both agree (expectation
-    and maximisation); else every harmonic would leave a notch in the spectrum. The order is that of least
-    BIC, and the law counts where its likelihood ratio against white noise is significant at 0.001.
+    and maximisation); else every harmonic would leave a notch in the spectrum. The law counts where that of
+    least BIC, which takes no order by chance, has a likelihood ratio against white noise that is significant
+    at 0.001. Its order is then that of least AICc, because 1/f noise has no finite one.
 
     Args:
         pieces: windows that hold noise alone.
@@ -72,7 +73,8 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     Returns:
         The law; its whitening filter has minimum phase.
 
-    Source: Dempster, Laird & Rubin 1977 (EM); Durbin 1960 (recursion over the order); Schwarz 1978 (BIC).
+    Source: Dempster, Laird & Rubin 1977 (EM); Durbin 1960 (recursion over the order); Schwarz 1978 (BIC);
+        Shibata 1980, Ann. Stat. 8:147 (AIC predicts best where the order is not finite).
     """
     freedom = sum(piece.freedom for piece in pieces)
     shortest = min((piece.rest.signal.size for piece in pieces), default=0)
@@ -96,11 +98,11 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
         density = errors[-1] / np.abs(1.0 + turns[:, 1 : laws[-1].size + 1] @ laws[-1]) ** 2
         if np.all(np.abs(density - known) <= _SETTLED * known):
             break
-    score = freedom * np.log(errors) + np.arange(errors.size) * np.log(freedom)
-    order = int(np.argmin(score))
-    ratio = freedom * float(np.log(errors[0] / errors[order]))
-    if order == 0 or scipy.stats.chi2.sf(ratio, order) > _FALSE_COLOUR:
+    misfit, orders = freedom * np.log(errors), np.arange(errors.size)
+    sure = int(np.argmin(misfit + orders * np.log(freedom)))
+    if sure == 0 or scipy.stats.chi2.sf(misfit[0] - misfit[sure], sure) > _FALSE_COLOUR:
         return None
+    order = int(np.argmin(misfit + 2.0 * orders * freedom / np.maximum(freedom - orders - 2.0, 1.0)))
     # Each coefficient of the law takes a degree of freedom.
     innovation = errors[order] * freedom / (freedom - order)
     return Colour(tuple(laws[order].tolist()), float(np.sqrt(innovation)), float(np.sqrt(errors[0])))
