@@ -5,6 +5,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from diffrax import Dopri8
 from jaxtyping import Float
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter, lsim
@@ -118,3 +119,27 @@ def test_they_are_wrong_where_it_counts_as_white():
     coefficients, scores, _ = over_repeats((), SIGMA)
     assert np.sum(np.abs(coefficients) < 1.96) < 100
     assert np.all(np.mean(scores**2, axis=0) > 2.0)
+
+
+@pytest.mark.parametrize("integrator", [Integrator(substeps=2), Integrator(Dopri8(), rtol=1e-9, atol=1e-12)])
+def test_columns_of_absent_effects_are_weighed_as_exact_derivatives_are(integrator):
+    record = made_record()
+    record.output[:] += noise_of(1, record.output.size)
+    problem = build_problem(
+        (record,),
+        MODEL,
+        quantity="acceleration",
+        hold="linear",
+        noise=SIGMA,
+        integrator=integrator,
+        whitening=(-1.1, 0.3),
+    )
+    full, simulator = MODEL.with_elements(*ABSENT), Simulator(problem)
+    directions = one_hot(full, (1, 2, 3, 4), (1e3, 10.0, 1e9, 1e-3))
+    exact, found = (
+        simulator.evaluate(full, directions, simulator.settle(None, full, 4, Spread(1e-9)), carried=carried)
+        for carried in (4, 2)
+    )
+    size = np.sqrt(np.diag(exact.reduced.matrix))
+    difference = (found.reduced.matrix - exact.reduced.matrix) / np.outer(size, size)
+    assert np.max(np.abs(difference)) < 1e-3

@@ -68,7 +68,8 @@ def residual(fit: Fit) -> Residual:
     lags = np.arange(-MOST_LAGS, MOST_LAGS + 1, dtype=float)
     values, own, cross, band, white = [], [], [], [], []
     for run in runs:
-        left = signal.lfilter([1.0, *fit.noise.whitening], [1.0], run.residual[run.counted > 0.0])
+        left = run.residual[run.counted > 0.0]
+        left = np.asarray(signal.lfilter([1.0, *fit.noise.whitening], [1.0], left))
         drive = run.record.input[run.counted > 0.0]
         values.append(run.residual)
         own.append(_correlate(left, left))

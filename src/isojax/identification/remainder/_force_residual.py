@@ -241,7 +241,7 @@ def _noise_motion(
     """Give displacement, velocity and acceleration of simulated noise of the output alone."""
     values = noise.white * np.random.default_rng(seed).standard_normal(record.output.size)
     if noise.whitening:
-        values = lfilter([1.0], [1.0, *noise.whitening], values)
+        values = np.asarray(lfilter([1.0], [1.0, *noise.whitening], values))
     alone = dataclasses.replace(record, output=values)
     band = motion.band
     stray = measured_state(alone, campaign.output.quantity, band.lowest, band.highest)

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-import scipy.fft
 import scipy.signal
 import scipy.stats
 from jaxtyping import Float
@@ -82,7 +81,7 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     if most < 1 or freedom <= most or not any(np.any(piece.rest.signal) for piece in pieces):
         return None
     lags = np.arange(most + 1)
-    seen = sum(_products(piece.rest.signal, most) / piece.kept for piece in pieces)
+    seen = np.sum([_products(piece.rest.signal, most) / piece.kept for piece in pieces], axis=0)
     size = np.sum([piece.rest.signal.size - lags for piece in pieces], axis=0)
     # Basis signals of one frequency take alike: those of all windows together.
     # A window does not show noise slower than itself, so that the density there is that of its first line.
@@ -111,16 +110,16 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
 def whitened_square(piece: Piece, colour: Colour) -> tuple[float, float]:
     """Gives the mean square of a window's innovations and its degrees of freedom."""
     order = len(colour.whitening)
-    signal = scipy.signal.lfilter([1.0, *colour.whitening], [1.0], piece.rest.signal)[order:]
+    white = np.asarray(scipy.signal.lfilter([1.0, *colour.whitening], [1.0], piece.rest.signal))[order:]
     freedom = piece.freedom - order
-    return float(signal @ signal) / max(freedom, 1.0), max(freedom, 1.0)
+    return float(white @ white) / max(freedom, 1.0), max(freedom, 1.0)
 
 
 def _products(signal: Float[np.ndarray, " time"], most: int) -> Float[np.ndarray, " lag"]:
     """Gives the sums of products of a signal with itself, at lags from 0 on."""
-    length = scipy.fft.next_fast_len(signal.size + most, real=True)
-    power = np.abs(scipy.fft.rfft(signal, length)) ** 2
-    return scipy.fft.irfft(power, length)[: most + 1]
+    length = signal.size + most + 1
+    power = np.abs(np.fft.rfft(signal, length)) ** 2
+    return np.fft.irfft(power, length)[: most + 1]
 
 
 def _levinson(
