@@ -1,6 +1,5 @@
 """A fit simulates by the diffrax solver that its integrator names, to its tolerances; SciPy is the judge."""
 
-import dataclasses
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,10 +23,10 @@ from isojax.identification.jacobian import (
     score_information,
 )
 from isojax.identification.jacobian._segments import Segment
-from isojax.models import Integrator, Isolator
+from isojax.models import Integrator, Isolator, check_integrator
 from isojax.records import Record
 
-MASS, RATE, LENGTH = 800.0, 250.0, 160
+MASS, RATE, LENGTH = 800.0, 250.0, 120
 MODEL = Isolator(
     MASS, (LinearStiffness(1.08e6), CubicStiffness(2.5e11), LinearDamping(1.0e4), MaxwellBranch(2e5, 0.04))
 )
@@ -99,7 +98,9 @@ def test_a_record_is_what_scipy_solves_to_the_tolerance_asked_for(hold):
     size = np.std(wanted)
     loose, tight = (np.max(np.abs(_simulated(one, hold=hold) - wanted)) / size for one in (LOOSE, TIGHT))
     assert tight < 1e-8
-    assert 1e-6 < loose < 3e-2
+    # A drive that jumps at every sample takes a step a sample, which is already finer than is asked for.
+    assert loose < 3e-2
+    assert hold == "zero_order" or loose > 1e-6
 
 
 @pytest.mark.parametrize("hold", ["linear", "zero_order"])
@@ -133,12 +134,15 @@ def test_columns_are_the_differences_of_what_scipy_solves():
         assert np.max(np.abs(found[lane] - wanted) / np.outer(size, size)) < 1e-6
 
 
-@pytest.mark.parametrize(
-    "integrator",
-    [Integrator(diffrax.Heun()), Integrator(diffrax.Kvaerno5(), rtol=1e-9, atol=1e-12)],
-    ids=["coarse Heun", "implicit"],
-)
-def test_columns_are_the_differences_of_the_solver_itself(integrator):
+def test_an_implicit_solver_gives_the_same_columns():
+    implicit = Integrator(diffrax.Kvaerno5(), rtol=1e-9, atol=1e-12)
+    found, wanted = (information(one[1], one[0])[0] for one in map(_setting, (implicit, TIGHT)))
+    size = np.sqrt(np.diag(wanted))
+    assert np.max(np.abs(found - wanted) / np.outer(size, size)) < 1e-5
+
+
+def test_columns_are_the_differences_of_coarse_steps_themselves():
+    integrator = Integrator(diffrax.Heun())
     prepared, unknowns = _setting(integrator)
     gram = information(unknowns, prepared)[0]
     values = [float(entry.value) for entry in list_parameters(MODEL)]
@@ -166,7 +170,8 @@ def test_columns_of_absent_effects_are_worked_out_along_the_same_motion(friction
     wanted = information(unknowns, prepared)[0][np.ix_((0, 1, 2, 3, 4, 6), (0, 1, 2, 3, 4, 6))]
     found = score_information(unknowns, carried, prepared)[0]
     size = np.sqrt(np.diag(wanted))
-    assert found[-1, -1] == pytest.approx(wanted[-1, -1], rel=1e-10)
+    # The internal state of the absent effect has a say in the adaptive steps.
+    assert found[-1, -1] == pytest.approx(wanted[-1, -1], rel=1e-7)
     assert np.max(np.abs(found - wanted) / np.outer(size, size)) < 2e-3
 
 
@@ -200,6 +205,7 @@ def test_reports_name_what_integrated_the_records(fitted):
     assert "integration          = RK4, 16 a sample" in str(fitted.default)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_beside_such_a_fit_finds_what_the_default_finds(fitted):
     found, wanted = (diagnose(one).finding for one in (fitted.tight, fitted.default))
     assert found.effect == wanted.effect
@@ -215,14 +221,20 @@ def test_a_simulation_that_diverges_is_said_to_and_ends(fitted):
 @pytest.mark.parametrize(
     ("integrator", "words"),
     [
-        (diffrax.Dopri8(), "must be an Integrator, .* but is Dopri8"),
         (Integrator(diffrax.SemiImplicitEuler()), "holds SemiImplicitEuler: Terms are not compatible"),
         (Integrator(diffrax.KenCarp4(), rtol=1e-6), "holds KenCarp4: Terms are not compatible"),
         (Integrator(diffrax.Kvaerno5()), "holds Kvaerno5: A fixed step size controller"),
     ],
-    ids=["no integrator", "symplectic", "split", "implicit without tolerances"],
+    ids=["symplectic", "split", "implicit without tolerances"],
 )
 def test_an_integrator_that_cannot_simulate_records_is_refused(fitted, integrator, words):
     start = Isolator(MASS, (LinearStiffness(1.0e6), LinearDamping(1.3e4)))
     with pytest.raises(ValueError, match=f"Argument `integrator` .*{words}"):
-        fit(start, dataclasses.replace(fitted.campaign), integrator=integrator)
+        fit(start, fitted.campaign, integrator=integrator)
+
+
+def test_a_solver_is_no_integrator():
+    with pytest.raises(
+        ValueError, match=r"Argument `integrator` must be an Integrator, .* but is Dopri8\(\)"
+    ):
+        check_integrator(diffrax.Dopri8())

@@ -13,7 +13,7 @@ from ._unknowns import movable, scaled_model, unit_changes
 from ._whitening import Whitening, whitened_products
 
 
-def _lanes_path(
+def _solve_lanes(
     integrator: Integrator,
     jumps: bool,
     model: Isolator,
@@ -24,31 +24,17 @@ def _lanes_path(
     quantity: Quantity,
     sample_time: float,
     observed: int = 1,
-) -> State:
-    """Solve each lane with steps of its own; give its states, `observed` a sample."""
+) -> tuple[State, Array]:
+    """Solve each lane with steps of its own; give its states, `observed` a sample, and its readings."""
 
-    def lane(scale: Array, state: State, record: Instant) -> State:
+    def lane(scale: Array, state: State, record: Instant) -> tuple[State, Array]:
         current = scaled_model(model, values, scale)
-        return solve_record(current, integrator, quantity, sample_time, state, record, observed, jumps)
+        path = solve_record(current, integrator, quantity, sample_time, state, record, observed, jumps)
+        late = current.shift() - jax.lax.stop_gradient(current.shift())
+        at = record.pick(np.s_[:, 0]).delayed(late)
+        return path, current.reading(tuple(one[::observed] for one in path), at, quantity)
 
     return jax.vmap(lane, in_axes=-1, out_axes=-1)(scale, states, batch.acting)
-
-
-def _lanes_reading(
-    integrator: Integrator,
-    jumps: bool,
-    model: Isolator,
-    values: tuple[Array, ...],
-    scale: Array,
-    states: State,
-    batch: Batch,
-    quantity: Quantity,
-    sample_time: float,
-) -> Float[Array, "time lanes"]:
-    path = _lanes_path(integrator, jumps, model, values, scale, states, batch, quantity, sample_time)
-    current = scaled_model(model, values, scale)
-    late = current.shift() - jax.lax.stop_gradient(current.shift())
-    return current.reading(path, batch.acting.pick(np.s_[:, 0]).delayed(late), quantity)
 
 
 @eqx.filter_jit
@@ -73,13 +59,13 @@ def solved_information(
 
     def read(moved: tuple[Array, ...], scale: Array, states: State) -> Array:
         values = with_moved(moved)
-        return _lanes_reading(integrator, jumps, model, values, scale, states, batch, quantity, sample_time)
+        return _solve_lanes(integrator, jumps, model, values, scale, states, batch, quantity, sample_time)[1]
 
     def along(seed: tuple[Array, ...], scale_seed: Array, tangent: State) -> tuple[Array, Array]:
         return jax.jvp(read, (known, scale, states), (seed, scale_seed, tangent))
 
     reading, slopes = jax.vmap(along, out_axes=(None, 0))(*changes)
-    rows = jnp.concatenate([slopes, (batch.measured - reading)[None]]) * batch.weight
+    rows = jnp.concatenate([slopes, (batch.measured - reading)[None]]) * batch.weight[None]
     if whitening is not None:
         return whitened_products(rows.swapaxes(0, 1), batch.weight, whitening)
     return jnp.einsum("itl,jtl->ijl", rows, rows)
@@ -98,7 +84,7 @@ def solved_readings(
 ) -> Float[Array, "time lanes"]:
     """Simulate; give what the sensor chain records."""
     values = tuple(entry.value for entry in list_parameters(model))
-    return _lanes_reading(integrator, jumps, model, values, scale, states, batch, quantity, sample_time)
+    return _solve_lanes(integrator, jumps, model, values, scale, states, batch, quantity, sample_time)[1]
 
 
 @eqx.filter_jit
@@ -115,5 +101,5 @@ def solved_path(
     """Simulate; give the states at the start of each step of the tables. No law is split, nothing rings."""
     values = tuple(entry.value for entry in list_parameters(model))
     steps = (batch.drive.shape[1] - 1) // 2
-    path = _lanes_path(integrator, jumps, model, values, scale, states, batch, quantity, sample_time, steps)
-    return path, None
+    how = integrator, jumps, model, values
+    return _solve_lanes(*how, scale, states, batch, quantity, sample_time, observed=steps)[0], None

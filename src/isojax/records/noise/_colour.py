@@ -87,9 +87,10 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     # A window does not show noise slower than itself, so that the density there is that of its first line.
     lines = [np.maximum(piece.rest.taken, rate / piece.rest.signal.size) for piece in pieces]
     taken, count = np.unique(np.concatenate(lines), return_counts=True)
-    turns = np.exp(-2j * np.pi * np.outer(taken / rate, lags))
+    angle = 2.0 * np.pi * np.outer(taken / rate, lags)
+    turns = np.cos(angle) - 1j * np.sin(angle)
     # Each window lacks what its lags cut off at its end; all of them together do so on average.
-    back = turns.real.T * count * (size / size[0])[:, None]
+    back = np.cos(angle).T * count * (size / size[0])[:, None]
     density, laws, errors = np.full(taken.size, seen[0] / freedom), [np.zeros(0)], np.zeros(1)
     for _ in range(_MOST_ROUNDS):
         laws, errors = _levinson((seen + back @ density) / size)
