@@ -104,7 +104,9 @@ def fixed_information(
     start = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
     tables = (batch.acting, batch.measured, batch.weight)
     carry, rows = jax.lax.scan(body, start, tables)
-    return carry[2] if whitening is None else whitened_products(rows, batch.weight, whitening)
+    if whitening is None or rows is None:
+        return carry[2]
+    return whitened_products(rows, batch.weight, whitening)
 
 
 @eqx.filter_jit
