@@ -1,9 +1,10 @@
-"""Print what each rule of the diagnosis decides: what changes at half and at twice its value.
+"""Print what each rule of the diagnosis decides: what changes at half and twice its value, and without it.
 
 Run `python benchmarks/rules.py --seeds 3000:3004`, then `... --report`. Each seed is a campaign of the blind
 trial, as `blind_trial.py` draws it. The loop runs once with the default rules, then once more for each rule
-at half and at twice its value. A rule that the first run never read is not changed: "not consulted". A
-computation that reads none of the changed rules is not repeated, so that a seed takes a few times one loop.
+at half, at twice its value, and at one where it decides nothing. A rule that the first run never read is not
+changed. A computation that reads none of the changed rules is not repeated, so that a seed takes a few times
+one loop.
 
 Rules whose meaning is a distance from one (chi2/dof, shares and quantiles near one) have that distance
 halved and doubled; counts are rounded down. A line of `results/rules.jsonl` is one rule on one seed; what is
@@ -13,6 +14,7 @@ there is skipped, so that a run can be stopped and split by seeds.
 import argparse
 import dataclasses
 import json
+import math
 import os
 import tempfile
 from collections.abc import Callable
@@ -35,6 +37,7 @@ from isojax.records import Campaign
 
 KEPT = Path(__file__).parent / "results" / "rules.jsonl"
 FROM_ONE = ("good", "most_of_it", "close_likeness")
+VALUES = ("half", "twice", "without")
 DEFAULTS = {field.name: field.default for field in dataclasses.fields(Rules)}
 REPEATED = (
     (_diagnose, "score_test"),
@@ -49,6 +52,30 @@ REPEATED = (
     (_imitations, "refit_from"),
 )
 """What a diagnosis spends its time in."""
+
+WITHOUT: dict[str, float] = {
+    "lack_of_fit": 0.0,
+    "response_error": 1e-9,
+    "good": math.inf,
+    "most_of_it": 0.0,
+    "smallest_share": 0.0,
+    "smallest_gain": 0.0,
+    "most_at_once": 100,
+    "significance": 1.0,
+    "close_bic": 0.0,
+    "close_likeness": 1.0,
+    "determined": 0.0,
+    "smallest_visibility": 0.0,
+    "survivors": 100,
+    "worth_refit": 0.0,
+    "far": math.inf,
+    "rival_distance": math.inf,
+    "transfer_visible": 0.0,
+    "first_scatter": 10.0,
+    "same_motion": math.inf,
+    "pursuit_share": 0.0,
+}
+"""Values at which a rule decides nothing any more. What ends a search has none."""
 
 Outcome = tuple[str, list[str]]
 _readers: list[dict[str, Any]] = []
@@ -177,9 +204,12 @@ def run(options: argparse.Namespace) -> None:
                 continue
             row = {"seed": seed, "kind": kind_of(seed), "rule": name, "default": default}
             if name in consulted:
+                values = {"half": changed(name, 0.5), "twice": changed(name, 2.0)}
+                values |= {"without": WITHOUT[name]} if name in WITHOUT else {}
                 row |= {
-                    word: trial.outcome(WatchedRules(**{name: changed(name, factor)}))
-                    for word, factor in (("half", 0.5), ("twice", 2.0))
+                    word: trial.outcome(WatchedRules(**{name: value}))
+                    for word, value in values.items()
+                    if word in options.values
                 }
             with options.out.open("a") as file:
                 file.write(json.dumps(row | {"commit": version}) + "\n")
@@ -190,23 +220,20 @@ def run(options: argparse.Namespace) -> None:
 
 def report(rows: list[dict]) -> None:
     """Print the table."""
-    print(f"{'rule':<24}{'half':>16}{'value':>16}{'twice':>16}{'consulted':>11}{'verdicts':>10}{'names':>8}")
+    heads = "".join(f"{word:>10}" for word in VALUES)
+    print(f"{'rule':<24}{'half':>12}{'value':>12}{'twice':>12}{'consulted':>11}   changed at:{heads}")
     for name, value in DEFAULTS.items():
         mine = [row for row in rows if row["rule"] == name]
-        consulted = [row for row in mine if "half" in row]
-        verdicts, names = (
-            [sum(row[word][part] != row["default"][part] for row in consulted) for word in ("half", "twice")]
-            for part in (0, 1)
-        )
-        values = "".join(f"{_brief(one):>16}" for one in (changed(name, 0.5), value, changed(name, 2.0)))
-        counts = f"{len(consulted)} of {len(mine)}"
-        if consulted and not any(verdicts + names):
-            outcome = f"  no change seen on {len(consulted)} campaigns"
-        elif consulted:
-            outcome = f"{verdicts[0]:>6} / {verdicts[1]}{names[0]:>4} / {names[1]}"
-        else:
-            outcome = "  not consulted"
-        print(f"{name:<24}{values}{counts:>11}{outcome}")
+        consulted = [row for row in mine if len(row) > 5]
+        values = "".join(f"{_brief(one):>12}" for one in (changed(name, 0.5), value, changed(name, 2.0)))
+        counts = "".join(f"{_changes(consulted, word):>10}" for word in VALUES)
+        print(f"{name:<24}{values}{f'{len(consulted)} of {len(mine)}':>11}{'':14}{counts}")
+
+
+def _changes(rows: list[dict], word: str) -> str:
+    """Count the campaigns whose verdict or names changed."""
+    tried = [row for row in rows if word in row]
+    return f"{sum(row[word] != row['default'] for row in tried)} of {len(tried)}" if tried else "-"
 
 
 def _brief(value: Any) -> str:
@@ -221,6 +248,7 @@ def main() -> None:
     parser.add_argument("--seeds", default="3000:3004", help="first:stop")
     parser.add_argument("--out", type=Path, default=KEPT, help="one line a rule and seed")
     parser.add_argument("--cache", type=Path, help="folder in which compiled code is kept between runs")
+    parser.add_argument("--values", nargs="+", default=VALUES, choices=VALUES, help="which to try")
     parser.add_argument("--report", action="store_true", help="print the table of the lines that are there")
     options = parser.parse_args()
     if options.report:
