@@ -54,7 +54,6 @@ REPEATED = (
 """What a diagnosis spends its time in."""
 
 WITHOUT: dict[str, float] = {
-    "lack_of_fit": 0.0,
     "response_error": 1e-9,
     "good": math.inf,
     "most_of_it": 0.0,

@@ -70,7 +70,7 @@ CASES = (
     ),
     Case(rig.AcCoupling(0.06), {"corner": 0.06}),
     Case(rig.Clipping(0.45), {"share": 1.0, "upper": 0.45, "lower": 0.45}),
-    Case(rig.Clipping(0.45, 0.6), {"share": 1.0, "upper": 0.45, "lower": 0.6}),
+    Case(rig.Clipping(0.45, 0.5), {"share": 1.0, "upper": 0.45, "lower": 0.5}),
 )
 
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.effect.name)

@@ -18,10 +18,6 @@ class Rules:
 
     # When a fit is good, and what counts as an explanation.
 
-    lack_of_fit: float = 1e-3
-    """Chance, where the model is right, of residuals so much locked to the drive: below it a fit is not
-    good."""
-
     response_error: float = 1e-3
     """Error that a channel may have, over the response, before the model is blamed."""
 
@@ -46,7 +42,7 @@ class Rules:
 
     significance: float = 0.01
     """Family-wise level of the score test (Westfall & Young 1993), of laws that describe a remainder, and of
-    the test for scatter of the stiffness within records."""
+    the tests for lack of fit and for scatter of the stiffness within records."""
 
     close_bic: float = 10.0
     """Difference of Schwarz's criterion from which the evidence is clear: very strong in the scale of Kass
@@ -113,7 +109,7 @@ class Rules:
 
     # How a remainder is described.
 
-    pursuit_share: float = 0.02
+    pursuit_share: float = 0.03
     """Share of the excess below which a law is not taken; and share of the best law's gain by which a plainer
     one may fall short and still be taken."""
 

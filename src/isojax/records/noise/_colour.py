@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from ..spectrum import Rest
 
-MOST_LAGS = 64
+MOST_ORDERS = 64
 """Highest order of the law. Noise of density 1/f needs all of them, a single time constant needs one."""
 
 _LAGS_A_WINDOW = 0.25
@@ -18,7 +18,7 @@ _LAGS_A_WINDOW = 0.25
 _FALSE_COLOUR = 1e-3
 """Chance that white noise is taken for coloured."""
 
-_SETTLED = 1e-4
+_AGREED = 1e-4
 """Change of the density, over itself, at which expectation and maximisation agree ..."""
 
 _MOST_ROUNDS = 50
@@ -77,7 +77,7 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     """
     freedom = sum(piece.freedom for piece in pieces)
     shortest = min((piece.rest.signal.size for piece in pieces), default=0)
-    most = min(MOST_LAGS, int(_LAGS_A_WINDOW * shortest))
+    most = min(MOST_ORDERS, int(_LAGS_A_WINDOW * shortest))
     if most < 1 or freedom <= most or not any(np.any(piece.rest.signal) for piece in pieces):
         return None
     lags = np.arange(most + 1)
@@ -96,7 +96,7 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
         laws, errors = _levinson((seen + back @ density) / size)
         known = density
         density = errors[-1] / np.abs(1.0 + turns[:, 1 : laws[-1].size + 1] @ laws[-1]) ** 2
-        if np.all(np.abs(density - known) <= _SETTLED * known):
+        if np.all(np.abs(density - known) <= _AGREED * known):
             break
     misfit, orders = freedom * np.log(errors), np.arange(errors.size)
     sure = int(np.argmin(misfit + orders * np.log(freedom)))
