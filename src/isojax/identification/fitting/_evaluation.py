@@ -65,7 +65,6 @@ class Evaluation:
             hold=fitted.hold,
             noise=fitted.noise,
             share=fitted.share,
-            whitening=fitted.whitening,
             integrator=fitted.integrator,
         )
 
