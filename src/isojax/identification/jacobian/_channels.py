@@ -7,15 +7,9 @@ from jaxtyping import Float
 from scipy.signal import hilbert
 from scipy.signal.windows import blackmanharris
 
-from ..._types import Lanes
-from ...elements import CATALOGUE, Channels
+from ...elements import CATALOGUE
 from ...excitations import Hold, tabulate
 from ...records import Record
-
-
-def elapsed(channels: Channels) -> Lanes | float:
-    """Give the time since the start of the record [s], where it is among the signals that are carried."""
-    return channels.get("elapsed", 0.0)
 
 
 def effects_without_signal(records: tuple[Record, ...]) -> tuple[str, ...]:

@@ -16,7 +16,6 @@ from jaxtyping import Array, Float
 from ..._types import Internal, Lanes, Scalar
 from ...elements import AbstractElement, Channels, Scales
 from ...models import RK4, State
-from ._channels import elapsed
 from ._families import ElementFamily, follow_motion
 
 _HOOKS: dict[str, tuple[str, ...]] = {
@@ -190,7 +189,8 @@ def _input_columns(
             # The drive as recorded, shifted: a delay and a skew take their rates from it.
             "recorded": lambda: (
                 element.channel_drive(motion.channels)
-                - (element.shift() + element.skew() * elapsed(motion.channels)) * motion.recorded_rate
+                - (element.shift() + element.skew() * motion.channels.get("elapsed", 0.0))
+                * motion.recorded_rate
             ),
             "acted": lambda: element.drive(motion.acted, motion.acted_rate)[0],
             "force": lambda: (

@@ -116,8 +116,6 @@ def _verdict_words(loop: Loop) -> str:
             f"{_capital(effects)}, explain the records together; so many may together imitate one law "
             f"which is not known here; {error} (noise alone: 1)."
         )
-    if loop.verdict == "partly_explained" and found and loop.doubt:
-        return f"{_capital(effects)}, would explain the records; {error}."
     if loop.verdict == "partly_explained" and found:
         return f"{_capital(effects)}, {verb} missing, but something else is too; {error} (noise alone: 1)."
     pending = loop.last.finding
