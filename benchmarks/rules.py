@@ -70,9 +70,6 @@ WITHOUT: dict[str, float] = {
     "far": math.inf,
     "rival_distance": math.inf,
     "transfer_visible": 0.0,
-    "first_scatter": 10.0,
-    "same_motion": math.inf,
-    "pursuit_share": 0.0,
 }
 """Values at which a rule decides nothing any more. What ends a search has none."""
 
@@ -178,7 +175,7 @@ class Trial:
                 setattr(module, name, remembered(function, self.known))
             guess = self.guess
             before = remembered(fit, self.known)(guess.model, self.campaign, rules=rules)
-            search = Search(self.scales, rules, max_steps=rules.evaluations, tolerance=rules.converged)
+            search = Search(self.scales, rules)
             extensions, last = search_effects(before, search, 3)
             after = extensions[-1].after if extensions else before
             names = [finding.effect for finding in findings_in(after.model, extensions)]

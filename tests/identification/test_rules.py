@@ -16,7 +16,16 @@ from isojax.models import Integrator, Isolator
 
 SOURCE = Path(isojax.__file__).parent
 ROOMS = SOURCE / "identification"
-GUARDS = {"NULL_DRAWS", "CYCLES", "STEPS", "STEADY", "WORK_OF_STEPS", "UNKNOWN", "STEP_SHARES"}
+GUARDS = {
+    "NULL_DRAWS",
+    "CYCLES",
+    "STEPS",
+    "STEADY",
+    "WORK_OF_STEPS",
+    "UNKNOWN",
+    "STEP_SHARES",
+    "SMALLEST_LAW",
+}
 """Numbers of the diagnosis that set the accuracy of a computation or the start of a search: no decision."""
 
 NEUTRAL = {0.0, 0.5, 1.0, 2.0, 3.0, 6.0, 1e-3, 100.0, 1e3, 1e-9, 1e-12, 1e-300, 0.05, 0.25}

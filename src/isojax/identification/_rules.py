@@ -71,18 +71,7 @@ class Rules:
     """chi2/dof from which the balance of measured forces proposes a candidate, too, and correlated candidates
     are refitted: a score is a derivative at the fit."""
 
-    # When a search ends.
-
-    evaluations: int = 100
-    """Simulations with derivatives of a fit, or of a refit, at most: most need ten, a curved valley some
-    eighty."""
-
-    converged: float = 1e-2
-    """Decrease of chi2, per max(chi2/dof, 1), below which a search is over: a hundredth of a standard error
-    squared."""
-
-    rough: float = 0.1
-    """The same for refits that are only ranked, as a share of the difference that makes a tie."""
+    # When a refit is given up.
 
     rival_distance: float = 10.0
     """Differences of a tie by which a refit must be behind the best one to be given up."""
@@ -96,22 +85,6 @@ class Rules:
     transfer_visible: float = 0.03
     """Share of its gain that an effect must make at a level for that level to be left out and predicted. An
     end stop that sets in above a level cannot be estimated there."""
-
-    # Scatter of the linear stiffness.
-
-    first_scatter: float = 1e-2
-    """Standard deviation of the linear stiffness between records before they show one [relative]: the
-    prior."""
-
-    same_motion: float = 0.1
-    """Relative difference of rms from which two dwells are on different branches, or were driven
-    differently."""
-
-    # How a remainder is described.
-
-    pursuit_share: float = 0.03
-    """Share of the excess below which a law is not taken; and share of the best law's gain by which a plainer
-    one may fall short and still be taken."""
 
     def __repr__(self) -> str:
         """Give the numbers that differ from the defaults, as they would be passed."""

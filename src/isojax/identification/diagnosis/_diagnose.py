@@ -8,7 +8,7 @@ import numpy as np
 from ..._results import RESULTS
 from ...elements import CATALOGUE, AbstractElement
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, Fit, Search, complete, lack_of_fit, search_of, silent
+from ..fitting import DEFAULT_SOLVER, MOST_STEPS, Fit, Search, complete, lack_of_fit, search_of, silent
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, smallest_inflation
@@ -44,7 +44,7 @@ def diagnose(
     significance: float | None = None,
     excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
-    max_steps: int | None = None,
+    max_steps: int = MOST_STEPS,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
 ) -> Verdict:
@@ -57,7 +57,7 @@ def diagnose(
         significance: family-wise level of the score test; `rules.significance` if omitted.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver for the refits.
-        max_steps: evaluations a refit at most; 100 if omitted.
+        max_steps: simulations with derivatives of a refit at most.
         progress: receives a line a step.
         rules: numbers that decide the verdict.
 

@@ -11,6 +11,7 @@ from ...elements import AbstractElement
 from ...models import Isolator
 from .._rules import Rules
 from ..fitting import (
+    ROUGH,
     Estimate,
     Nuisances,
     Search,
@@ -103,7 +104,7 @@ def refit_from(fitted: Estimate, model: Isolator, search: Search, far: bool = Fa
 
 def _rough(search: Search, fitted: Estimate) -> Search:
     """Give the search of a refit that is only ranked: with many samples smaller steps separate nothing."""
-    return search._replace(tolerance=search.rules.rough * least_difference(fitted, search.rules))
+    return search._replace(tolerance=ROUGH * least_difference(fitted, search.rules))
 
 
 def bic(found: Estimate, inflation: float) -> float:

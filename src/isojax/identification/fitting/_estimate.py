@@ -21,9 +21,12 @@ from ._descent import descend
 from ._elimination import Nuisances, Spread
 from ._initial_states import HELD, best_nuisances
 from ._problem import Point, Problem, one_hot
-from ._search import Search
+from ._search import ROUGH, Search
 from ._segment_scatter import segment_scatter
 from ._simulator import Simulator
+
+FIRST_SCATTER = 1e-2
+"""Standard deviation of the linear stiffness between records before they show one [relative]: the prior."""
 
 
 class Estimate(NamedTuple):
@@ -178,7 +181,7 @@ def _spread(
     if len(records) == 1:
         return Spread(SMALLEST_SCATTER, within)
     inflation = _inflation(point)
-    loose = Spread(rules.first_scatter, within)
+    loose = Spread(FIRST_SCATTER, within)
     if point.nuisances.spread != loose:
         # What scatters within records moves their means, too, and must not count twice.
         directions = one_hot(point.model, places, [1.0] * len(places))
@@ -235,11 +238,9 @@ def estimate(
     sizes = magnitudes(model, places, search.scales)
     # The scatter of the stiffness is estimated at a rough solution; the search goes on from there.
     rough = (
-        max(search.tolerance, search.rules.rough * search.rules.close_bic)
-        if scatters and not known
-        else search.tolerance
+        max(search.tolerance, ROUGH * search.rules.close_bic) if scatters and not known else search.tolerance
     )
-    start = _start(simulator, model, nuisances, Spread(search.rules.first_scatter))
+    start = _start(simulator, model, nuisances, Spread(FIRST_SCATTER))
     found = descend(simulator, model, places, sizes, start, search._replace(tolerance=rough))
     steps = found.steps
     if is_successful(found.result) and scatters and (anew or not known):

@@ -17,7 +17,7 @@ from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
 from ._fit_result import Fit, Statistics
 from ._integration_steps import find_integrator
-from ._search import DEFAULT_SOLVER, search_of, silent
+from ._search import DEFAULT_SOLVER, MOST_STEPS, search_of, silent
 from ._simulator import Simulator
 
 
@@ -29,7 +29,7 @@ def fit(
     fixed: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
     integrator: Integrator | None = None,
-    max_steps: int | None = None,
+    max_steps: int = MOST_STEPS,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
 ) -> Fit:
@@ -50,7 +50,7 @@ def fit(
             omitted. Any other diffrax solver, such as `Integrator(diffrax.Dopri8(), rtol=1e-8)`, simulates
             every segment, free run and refit with its own tolerances, and is differentiated; it takes a law
             that jumps as `simulate` does, rounded, and several times as long.
-        max_steps: simulations with derivatives after which the search gives up; 100 if omitted.
+        max_steps: simulations with derivatives after which the search gives up.
         progress: receives a line a step.
         rules: when a search is over, and what counts as scatter of the stiffness.
 

@@ -24,6 +24,17 @@ Source: Nocedal & Wright 2006, *Numerical Optimization*, algorithm 4.1.
 """
 
 
+MOST_STEPS = 100
+"""Simulations with derivatives of a search at most: most need ten, a curved valley some eighty."""
+
+TOLERANCE = 1e-2
+"""Decrease of chi2, per max(chi2/dof, 1), below which a search is over: a hundredth of a standard error
+squared."""
+
+ROUGH = 0.1
+"""The same for refits that are only ranked, as a share of the difference that makes a tie."""
+
+
 def silent(line: str) -> None:
     """Take a line of progress and say nothing.
 
@@ -64,8 +75,8 @@ class Search(NamedTuple):
     rules: Rules = Rules()
     solver: Any = DEFAULT_SOLVER
     progress: Callable[[str], None] = silent
-    max_steps: int = Rules.evaluations
-    tolerance: float = Rules.converged
+    max_steps: int = MOST_STEPS
+    tolerance: float = TOLERANCE
     rival: Rival | None = None
 
 
@@ -74,7 +85,7 @@ def search_of(
     rules: Rules,
     solver: Any,
     progress: Callable[[str], None],
-    max_steps: int | None = None,
+    max_steps: int = MOST_STEPS,
 ) -> Search:
     """Give the search of a campaign, from the arguments of a public function.
 
@@ -83,10 +94,9 @@ def search_of(
         rules: numbers that decide verdicts.
         solver: an optimistix least-squares solver.
         progress: receives a line a step.
-        max_steps: simulations with derivatives of one search; `rules.evaluations` if omitted.
+        max_steps: simulations with derivatives of one search.
 
     Returns:
         The search.
     """
-    steps = rules.evaluations if max_steps is None else max_steps
-    return Search(scales(campaign), rules, solver, progress, steps, rules.converged)
+    return Search(scales(campaign), rules, solver, progress, max_steps)

@@ -16,6 +16,8 @@ from ._problem import Point
 SAME_FREQUENCY = 1e-3
 """Relative difference up to which two dwells have one frequency."""
 
+SAME_MOTION = 0.1
+"""Relative difference of rms from which two dwells are on different branches, or were driven differently."""
 
 _Lane = tuple[int, Segment]
 
@@ -44,7 +46,7 @@ def segment_scatter(
         inflation: chi2/dof. Noise that is larger than was thought would pass for scatter, and so would a law
             that is missing, as far as the repeats differ in amplitude; scatter itself hardly raises it, each
             segment having many samples to its one stiffness.
-        rules: what counts as scatter, and which dwells are on one branch.
+        rules: what counts as scatter.
 
     Returns:
         Relative standard deviation; 0 where no repeat shows one.
@@ -52,7 +54,7 @@ def segment_scatter(
     Source: DerSimonian & Laird 1986, Controlled Clinical Trials 7:177, eq. 8 (estimate by moments).
     """
     squares, freedom, weight = 0.0, 0, 0.0
-    for pair in _pairs(records, segments, point, rules.same_motion):
+    for pair in _pairs(records, segments, point):
         weights = 1.0 / (max(1.0, inflation) * pair.variances)
         mean = np.sum(weights * pair.differences) / weights.sum()
         squares += float(np.sum(weights * (pair.differences - mean) ** 2))
@@ -64,9 +66,7 @@ def segment_scatter(
     return float(np.sqrt(max(0.0, squares - freedom) / weight / 2.0)) * STIFFNESS_SCALE_UNIT
 
 
-def _pairs(
-    records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point, same: float
-) -> list[_Pair]:
+def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Point) -> list[_Pair]:
     """List pairs of repeats, no record in more than one."""
     groups = defaultdict(list)
     for place, record in enumerate(records):
@@ -79,7 +79,7 @@ def _pairs(
         for one, other in itertools.pairwise(group):
             if group.index(one) % 2:
                 continue
-            lanes = np.array(_matched(records, held[one], held[other], same), dtype=int).reshape(-1, 2)
+            lanes = np.array(_matched(records, held[one], held[other]), dtype=int).reshape(-1, 2)
             information, score = point.reduced.by_segment[lanes].transpose(2, 0, 1)
             seen = np.all(information > 0.0, axis=1)
             if np.count_nonzero(seen) > 1:
@@ -89,20 +89,18 @@ def _pairs(
     return pairs
 
 
-def _matched(
-    records: tuple[Record, ...], own: list[_Lane], others: list[_Lane], same: float
-) -> list[tuple[int, int]]:
+def _matched(records: tuple[Record, ...], own: list[_Lane], others: list[_Lane]) -> list[tuple[int, int]]:
     """List the segments of one record with those of its repeat that passed the same test, in their order."""
     pairs, left = [], list(others)
     for lane, segment in own:
-        match = next((one for one in left if _is_the_same(records, segment, one[1], same)), None)
+        match = next((one for one in left if _is_the_same(records, segment, one[1])), None)
         if match is not None:
             pairs.append((lane, match[0]))
             left = left[left.index(match) + 1 :]
     return pairs
 
 
-def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment, same: float) -> bool:
+def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment) -> bool:
     """Say whether two segments passed the same test on the same branch.
 
     A dwell is the same at equal frequency and level, wherever in the record it lies; another window only
@@ -116,7 +114,7 @@ def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment, same
         difference = (
             _rms(first.input - second.input, one) if first.input.size == second.input.size else np.inf
         )
-        if not difference < same * _rms(first.input, one):
+        if not difference < SAME_MOTION * _rms(first.input, one):
             return False
     elif abs(frequencies[0] - frequencies[1]) > SAME_FREQUENCY * frequencies[0]:
         return False
@@ -124,7 +122,7 @@ def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment, same
         (_rms(record.input, segment), _rms(record.output, segment))
         for record, segment in ((first, one), (second, other))
     ]
-    return all(abs(a - b) < same * max(a, b) for a, b in zip(*sizes, strict=True))
+    return all(abs(a - b) < SAME_MOTION * max(a, b) for a, b in zip(*sizes, strict=True))
 
 
 def _rms(signal: Float[np.ndarray, " time"], segment: Segment) -> float:

@@ -16,6 +16,10 @@ from ..diagnosis import Projection, project, refit_from
 from ..fitting import Estimate, Search, silent
 from ._free_laws import AbstractFreeForce, free_laws
 
+SMALLEST_LAW = 0.03
+"""Share of the excess below which a law is not selected; and share of the best law's gain by which a plainer
+one may fall short and still be selected. `benchmarks/remainder.py` counts the right decisions."""
+
 
 class PursuedLaw(NamedTuple):
     """One selected law.
@@ -87,13 +91,13 @@ def _pursue(
         gains = np.where(free, score**2 / np.where(free, own, 1.0), 0.0)
         inflation = max(1.0, chi2 / dof)
         best = int(np.argmax(gains))
-        tie = max(rules.close_bic * inflation, rules.pursuit_share * gains[best])
+        tie = max(rules.close_bic * inflation, SMALLEST_LAW * gains[best])
         close = free & (gains >= gains[best] - tie)
         order = np.lexsort((-gains, np.where(close, ranks, np.inf)))
         place = int(order[0])
         gain = float(gains[place])
         chance = tests * 2.0 * stats.norm.sf(np.sqrt(gain / inflation))
-        smallest = max(rules.pursuit_share * excess, rules.smallest_gain * dof)
+        smallest = max(SMALLEST_LAW * excess, rules.smallest_gain * dof)
         if chance > rules.significance or gain < smallest:
             break
         size = np.sqrt(np.where(free, own, np.inf))
