@@ -63,13 +63,8 @@ WITHOUT: dict[str, float] = {
     "significance": 1.0,
     "close_bic": 0.0,
     "close_likeness": 1.0,
-    "determined": 0.0,
     "smallest_visibility": 0.0,
     "survivors": 100,
-    "worth_refit": 0.0,
-    "far": math.inf,
-    "rival_distance": math.inf,
-    "transfer_visible": 0.0,
 }
 """Values at which a rule decides nothing any more. What ends a search has none."""
 

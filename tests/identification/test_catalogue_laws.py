@@ -6,8 +6,8 @@ import pytest
 from isojax import rig
 from isojax._results import RESULTS
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
-from isojax.identification import Rules, diagnose, fit, scales
-from isojax.identification.diagnosis._refit import is_determined, refit_candidate
+from isojax.identification import diagnose, fit, scales
+from isojax.identification.diagnosis._refit import refit_candidate
 from isojax.identification.diagnosis._score import score_test
 from isojax.identification.fitting import Search
 from isojax.models import Isolator
@@ -35,7 +35,6 @@ def _scored(simulated, effect, rate=200.0):
 def _refitted(test, magnitudes, name):
     index = next(place for place, score in enumerate(test.scores) if score.element.name == name)
     found = refit_candidate(test, index, Search(magnitudes, max_steps=40))
-    assert is_determined(found, test.scores[index], Rules.determined)
     return found
 
 

@@ -8,9 +8,9 @@ import pytest
 from isojax import rig
 from isojax._parameters import list_parameters
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
-from isojax.identification import Rules, fit, scales
+from isojax.identification import fit, scales
 from isojax.identification.diagnosis._admissibility import find_violation
-from isojax.identification.diagnosis._refit import is_determined, refit_candidate
+from isojax.identification.diagnosis._refit import refit_candidate
 from isojax.identification.diagnosis._score import score_test
 from isojax.identification.fitting import Search
 from isojax.models import Integrator, Isolator
@@ -99,7 +99,6 @@ def test_its_coefficients_come_back_within_their_errors(case, simulated):
     test, magnitudes, campaign = scored(simulated, case)
     found = refit_candidate(test, 0, Search(magnitudes, max_steps=40))
     assert found.chi2 / found.dof == pytest.approx(1.0, abs=0.03)
-    assert is_determined(found, test.scores[0], Rules.determined)
     assert find_violation(found.model, campaign.fit_records, "acceleration") is None
     listed = list_parameters(found.model)
     values = {

@@ -51,9 +51,6 @@ class Rules:
     close_likeness: float = 0.95
     """Correlation of the traces of two effects from which they look alike, where only one was refitted."""
 
-    determined: float = 1.96
-    """Standard errors that a refitted strength must be away from zero: the 95 % interval."""
-
     smallest_visibility: float = 0.005
     """Share of an effect's trace that the fitted coefficients must leave; below it the records cannot show
     the effect."""
@@ -62,29 +59,6 @@ class Rules:
 
     survivors: int = 4
     """Families of effects that are refitted."""
-
-    worth_refit: float = 0.04
-    """Squared score, over that of the leading family, below which a family is not refitted. Free shape
-    parameters may make up a part of that."""
-
-    far: float = 2.0
-    """chi2/dof from which the balance of measured forces proposes a candidate, too, and correlated candidates
-    are refitted: a score is a derivative at the fit."""
-
-    # When a refit is given up.
-
-    rival_distance: float = 10.0
-    """Differences of a tie by which a refit must be behind the best one to be given up."""
-
-    rival_patience: int = 5
-    """Evaluations over which the pace of a refit is taken: one that is behind and at its pace would not catch
-    up within all its evaluations is given up."""
-
-    # Whether an effect carries over.
-
-    transfer_visible: float = 0.03
-    """Share of its gain that an effect must make at a level for that level to be left out and predicted. An
-    end stop that sets in above a level cannot be estimated there."""
 
     def __repr__(self) -> str:
         """Give the numbers that differ from the defaults, as they would be passed."""

@@ -4,9 +4,11 @@ import numpy as np
 
 from ..._parameters import own_parameters
 from ...elements import AbstractElement
-from .._rules import Rules
 from ..fitting import Estimate
 from ._score import ScoreTest
+
+STANDARD_ERRORS = 1.96
+"""Half the width of a 95 % interval."""
 
 
 def strength_unit(element: AbstractElement) -> str:
@@ -14,9 +16,7 @@ def strength_unit(element: AbstractElement) -> str:
     return dict(own_parameters(element))[element.strength].unit
 
 
-def upper_bounds(
-    test: ScoreTest, fitted: Estimate, found: str | None, rules: Rules
-) -> dict[str, tuple[float, str]]:
+def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
     """Say how large each effect that was not found could still be.
 
     A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
@@ -26,7 +26,6 @@ def upper_bounds(
         test: the score test.
         fitted: the fit.
         found: catalogue name of the effect that was found, or None.
-        rules: the standard errors of an interval.
 
     Returns:
         `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name.
@@ -34,7 +33,7 @@ def upper_bounds(
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {
         score.element.name: (
-            abs(score.strength) + rules.determined * inflation * score.error,
+            abs(score.strength) + STANDARD_ERRORS * inflation * score.error,
             strength_unit(score.element),
         )
         for score in test.scores

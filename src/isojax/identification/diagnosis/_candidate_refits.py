@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
 from scipy import stats
 
 from ..._results import RESULTS
@@ -12,7 +11,7 @@ from ..guess import find_balance_start
 from ._admissibility import find_violation
 from ._evidence import by_evidence
 from ._imitations import find_simpler_pair
-from ._refit import Refit, follows_freely, is_determined, least_difference, refit_candidate, refit_from
+from ._refit import Refit, follows_freely, least_difference, refit_candidate, refit_from
 from ._score import Score, ScoreTest
 
 
@@ -58,59 +57,23 @@ def refit_candidates(case: Case) -> list[Refit]:
     Returns:
         The refits, in the order in which they were made, with what speaks against each.
     """
-    rules, test = case.rules, case.test
-    is_far = case.chi2_per_dof > rules.far
-    leading = _refit_from_balance(case) if is_far else None
-    refits: list[Refit] = [] if leading is None else [leading]
-    strongest = None
-    for index, score in enumerate(test.scores):
-        if len(refits) == rules.survivors:
+    refits = [] if case.is_good else _refit_from_balance(case)
+    for index, score in enumerate(case.test.scores):
+        if len(refits) == case.rules.survivors:
             break
-        if not score.admissible or score.p_value > case.significance:
-            continue
-        if leading is not None and (_explains(leading, case) or leading.score.column == score.column):
-            continue
-        if strongest is not None and score.z**2 < rules.worth_refit * strongest**2:
-            break
-        strongest = score.z if strongest is None else strongest
-        refits.append(_refit(case, index, refits, ""))
-    refits = _without_imitations(case, refits)
-    if is_far:
-        for index in _correlated(case, refits):
-            refits.append(_refit(case, index, refits, ", which resembles the best"))
-    return refits
+        known = {one.score.column for one in refits}
+        if score.admissible and score.p_value <= case.significance and score.column not in known:
+            refits.append(_refit(case, index, refits))
+    return _without_imitations(case, refits)
 
 
-def _refit(case: Case, index: int, refits: list[Refit], why: str) -> Refit:
+def _refit(case: Case, index: int, refits: list[Refit]) -> Refit:
     """Refit a candidate, beside those that were refitted before."""
     score = case.test.scores[index]
-    case.search.progress(f"refit with {score.element.name}{why}")
+    case.search.progress(f"refit with {score.element.name}")
     search = case.search._replace(rival=_rival(refits, case.rules))
     found = refit_candidate(case.test, index, search)
     return Refit(score, found, _violation(case, found, score))
-
-
-def _correlated(case: Case, refits: list[Refit]) -> list[int]:
-    """List the effects that resemble the best one and were not refitted, as far as so many are worth it.
-
-    Near the records derivatives that agree show that two laws do. Far from them only a refit does.
-    """
-    usable = by_evidence(refits, case.rules)
-    if not usable:
-        return []
-    scores = case.test.scores
-    names = [score.element.name for score in scores]
-    likeness = np.abs(case.test.likeness[names.index(usable[0].score.element.name)])
-    done = {refit.score.element.name for refit in refits}
-    open_still = [
-        index
-        for index, score in enumerate(scores)
-        if score.element.name not in done
-        and score.admissible
-        and score.p_value <= case.significance
-        and likeness[index] > case.rules.close_likeness
-    ]
-    return sorted(open_still, key=lambda index: -likeness[index])[: case.rules.survivors]
 
 
 def _rival(refits: list[Refit], rules: Rules) -> Rival | None:
@@ -120,7 +83,7 @@ def _rival(refits: list[Refit], rules: Rules) -> Rival | None:
     )
     if best is None:
         return None
-    return Rival(best.chi2, rules.rival_distance * least_difference(best, rules), rules.rival_patience)
+    return Rival(best.chi2, least_difference(best, rules))
 
 
 def _violation(case: Case, found: Estimate, score: Score) -> str | None:
@@ -130,8 +93,6 @@ def _violation(case: Case, found: Estimate, score: Score) -> str | None:
         return "its search came no nearer to that of another effect"
     if found.result != RESULTS.successful or found.excess >= fitted.excess:
         return "its refit did not converge"
-    if not is_determined(found, score, case.rules.determined):
-        return "its strength is not determined"
     element = found.model.element(score.element.name)
     if element is not None and not element.signed and float(getattr(element, element.strength)) < 0.0:
         return "its refit ends at a strength below zero"
@@ -140,19 +101,16 @@ def _violation(case: Case, found: Estimate, score: Score) -> str | None:
     return find_violation(found.model, fitted.problem.records, fitted.problem.quantity)
 
 
-def _explains(refit: Refit, case: Case) -> bool:
-    """Say whether a candidate alone explains most of the excess."""
-    left = (1.0 - case.rules.most_of_it) * case.fitted.excess
-    return refit.violation is None and refit.estimate.excess < left
+def _refit_from_balance(case: Case) -> list[Refit]:
+    """Refit the effect that the balance of measured forces asks for, if there is one.
 
-
-def _refit_from_balance(case: Case) -> Refit | None:
-    """Refit the effect that the balance of measured forces asks for, if there is one."""
+    A score is a derivative at the fit, the balance is not.
+    """
     fit, test, search = case.fit, case.test, case.search
     absent = tuple(score.element for score in test.scores)
     start = find_balance_start(fit.campaign, fit.model, search.scales, absent)
     if start is None:
-        return None
+        return []
     search.progress(f"refit with {start.element.name}, from the balance of measured forces")
     found = refit_from(fit.estimate, start.model, search, far=True)
     score = next(one for one in test.scores if one.element.name == start.element.name)
@@ -161,7 +119,7 @@ def _refit_from_balance(case: Case) -> Refit | None:
     extra = max(1, len(found.places) - len(fit.estimate.places))
     p_value = float(min(1.0, len(absent) * stats.chi2.sf(drop, extra)))
     score = score._replace(element=start.element, p_value=p_value, admissible=True)
-    return Refit(score, found, _violation(case, found, score))
+    return [Refit(score, found, _violation(case, found, score))]
 
 
 def _without_imitations(case: Case, refits: list[Refit]) -> list[Refit]:

@@ -210,23 +210,6 @@ def with_own_shape(found: Estimate, name: str, search: Search) -> Estimate:
     return freed if freed.result == RESULTS.successful and clear else found
 
 
-def is_determined(found: Estimate, score: Score, errors: float) -> bool:
-    """Say whether a refitted strength is clearly not zero.
-
-    Args:
-        found: the refit.
-        score: the score of its effect.
-        errors: standard errors that it must be away from zero.
-
-    Returns:
-        True if it is.
-    """
-    place = strength_place(found, score)
-    error = float(found.uncertainty.standard_error[place])
-    strength = float(list_parameters(found.model)[found.places[place]].value)
-    return abs(strength) > errors * error
-
-
 def strength_place(found: Estimate, score: Score) -> int:
     """Give the place of a candidate's strength among the free coefficients of its refit."""
     listed = [entry.name for entry in list_parameters(found.model)]

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
+from scipy import stats
 
 from ..._results import RESULTS
 from .._rules import Rules
@@ -17,8 +18,8 @@ def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem,
     """Leave out the records of the highest level but one; without three levels every other segment.
 
     Two levels are not separated: a law fitted to the lower alone says little of the upper. Nor is a level
-    left out at which the effect is not seen, unless its records are whole segments (releases): every other
-    one of those would leave out the highest.
+    left out at which the effect is not significant, unless its records are whole segments (releases): every
+    other one of those would leave out the highest.
     """
     problem = extended.problem
     levels = sorted({record.level for record in problem.records if record.level is not None})
@@ -26,8 +27,10 @@ def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem,
     if len(levels) >= 3:
         out = {place for place, record in enumerate(problem.records) if record.level == levels[-2]}
         gains = _misfit_by_record(fitted) - _misfit_by_record(extended)
+        gain = gains[list(out)].sum() / max(1.0, extended.chi2 / extended.dof)
+        extra = max(1, len(extended.places) - len(fitted.places))
         separated = len(problem.segments) > len(problem.records)
-        if separated and not gains[list(out)].sum() > rules.transfer_visible * gains.sum():
+        if separated and not stats.chi2.sf(gain, extra) < rules.significance:
             out = set()
     if out:
         seen = tuple(part for part in problem.segments if part.record not in out)

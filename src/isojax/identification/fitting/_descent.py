@@ -29,6 +29,8 @@ DOUBTFUL = 5
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
 
+PACE = 5
+"""Evaluations over which the pace of a search is taken, where another model is ahead of it."""
 
 SHRINKS = 3
 """Refusals that a trial which diverged counts for: it lies far outside, not just a little too far."""
@@ -201,7 +203,7 @@ def descend(
         rival = search.rival
         if rival is not None:
             behind = best.chi2 - rival.chi2
-            pace = _gain(reached, rival.patience) / rival.patience
+            pace = _gain(reached, PACE) / PACE
             if behind > rival.far and pace * search.max_steps < behind:
                 result = RESULTS.outdone
                 break

@@ -44,18 +44,16 @@ def silent(line: str) -> None:
 
 
 class Rival(NamedTuple):
-    """The best other model, far behind which a search is given up.
+    """The best other model, behind which a search is given up.
 
     Attributes:
         chi2: what it reaches.
-        far: how much more chi2 is far behind; a nearer search may take its time.
-        patience: evaluations over which the pace of a search is taken. One that would not catch up so
-            within all its evaluations is given up.
+        far: how much more chi2 is behind. A search that is, and at its pace would not catch up within all its
+            evaluations, is given up.
     """
 
     chi2: float
     far: float
-    patience: int
 
 
 class Search(NamedTuple):
