@@ -54,7 +54,6 @@ REPEATED = (
 """What a diagnosis spends its time in."""
 
 WITHOUT: dict[str, float] = {
-    "response_error": 1e-9,
     "good": math.inf,
     "most_of_it": 0.0,
     "smallest_share": 0.0,

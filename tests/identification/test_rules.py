@@ -111,7 +111,9 @@ def test_other_rules_give_another_verdict(rubbing):
     strict = diagnose(found, rules=Rules(smallest_gain=100.0))
     assert strict.finding is None
     assert strict.verdict == "unexplained"
-    assert diagnose(found, rules=Rules(smallest_gain=100.0, good=1e3, response_error=10.0)).verdict == "none"
+    rough = dataclasses.replace(rubbing.output, relative_error=10.0)
+    lax = dataclasses.replace(found, campaign=dataclasses.replace(rubbing, output=rough))
+    assert diagnose(lax, rules=Rules(smallest_gain=100.0, good=1e3)).verdict == "none"
     assert diagnose(found).finding.effect == "coulomb_friction"
 
 

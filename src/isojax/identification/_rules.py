@@ -18,9 +18,6 @@ class Rules:
 
     # When a fit is good, and what counts as an explanation.
 
-    response_error: float = 1e-3
-    """Error that a channel may have, over the response, before the model is blamed."""
-
     good: float = 1.05
     """chi2/dof up to which a fit is good."""
 

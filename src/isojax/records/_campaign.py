@@ -51,6 +51,7 @@ class OutputChannel:
         unit: Its unit in the file.
         offset_free: Whether a constant offset of the output is to be identified.
         noise: Declared rms noise in SI, or None to estimate it.
+        relative_error: Error that the reading may have, over the response.
     """
 
     quantity: OutputQuantity
@@ -58,6 +59,7 @@ class OutputChannel:
     unit: str
     offset_free: bool = False
     noise: float | None = None
+    relative_error: float = 1e-3
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ def is_good(fit: Fit, rules: Rules) -> bool:
 
 def is_locked(fit: Fit, rules: Rules) -> bool:
     """Say whether what a fit leaves comes back with every cycle of the drive."""
-    return lack_of_fit(fit, rules.response_error).p_value < rules.significance
+    return lack_of_fit(fit).p_value < rules.significance
 
 
 def diagnose(

@@ -29,6 +29,9 @@ DOUBTFUL = 5
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
 
+BEHIND = 10
+"""Ties by which a search must be behind another model to be given up: nearer ones are look-alikes."""
+
 PACE = 5
 """Evaluations over which the pace of a search is taken, where another model is ahead of it."""
 
@@ -204,7 +207,7 @@ def descend(
         if rival is not None:
             behind = best.chi2 - rival.chi2
             pace = _gain(reached, PACE) / PACE
-            if behind > rival.far and pace * search.max_steps < behind:
+            if behind > BEHIND * rival.tie and pace * search.max_steps < behind:
                 result = RESULTS.outdone
                 break
         if refused == MOST_REFUSALS or (idle and is_least):

@@ -51,7 +51,7 @@ class _Lines(NamedTuple):
     noise: Float[np.ndarray, " beside"]
 
 
-def lack_of_fit(fit: Fit, tolerance: float) -> LackOfFit:
+def lack_of_fit(fit: Fit) -> LackOfFit:
     """Test whether what a model leaves is locked to the drive.
 
     Noise and everything else that does not repeat lies at all frequencies alike, model errors lie at the
@@ -60,8 +60,6 @@ def lack_of_fit(fit: Fit, tolerance: float) -> LackOfFit:
 
     Args:
         fit: the fit; its fitted records count, each segment restarted from its own best state.
-        tolerance: error that any channel may have at a line, over the response there or the rms of the
-            response over all lines, whichever is larger [1].
 
     Returns:
         The test.
@@ -69,9 +67,8 @@ def lack_of_fit(fit: Fit, tolerance: float) -> LackOfFit:
     Source: Pintelon & Schoukens 2012, System Identification: A Frequency Domain Approach, sec. 11.3 (cost
     against the noise that periods show); Box & Draper 1987 (lack of fit).
     """
-    return locked_power(
-        [run for run in fit.restarts.runs if run.record.role == "fit"], len(fit.free), tolerance
-    )
+    runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
+    return locked_power(runs, len(fit.free), fit.campaign.output.relative_error)
 
 
 def locked_power(runs: Iterable[Run], coefficients: int, tolerance: float) -> LackOfFit:
@@ -80,7 +77,8 @@ def locked_power(runs: Iterable[Run], coefficients: int, tolerance: float) -> La
     Args:
         runs: the records, each segment restarted from its own best state.
         coefficients: coefficients that were fitted to them.
-        tolerance: see `lack_of_fit`.
+        tolerance: error that the reading may have at a line, over the response there or the rms of the
+            response over all lines, whichever is larger [1].
 
     Returns:
         The test.

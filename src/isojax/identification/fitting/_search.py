@@ -44,16 +44,16 @@ def silent(line: str) -> None:
 
 
 class Rival(NamedTuple):
-    """The best other model, behind which a search is given up.
+    """The best other model, far behind which a search is given up.
 
     Attributes:
         chi2: what it reaches.
-        far: how much more chi2 is behind. A search that is, and at its pace would not catch up within all its
-            evaluations, is given up.
+        tie: difference of chi2 up to which two models are indistinguishable. A search that is many behind,
+            and at its pace would not catch up within all its evaluations, is given up.
     """
 
     chi2: float
-    far: float
+    tie: float
 
 
 class Search(NamedTuple):

@@ -72,9 +72,9 @@ def _factor() -> Field:
     return Field("a finite number other than 0", accepts, default=1.0, convert=float)
 
 
-def _positive(required: bool = False) -> Field:
+def _positive(required: bool = False, default: float | None = None) -> Field:
     accepts = lambda value: _is_number(value) and value > 0  # noqa: E731
-    return Field("a finite number above 0", accepts, required, convert=float)
+    return Field("a finite number above 0", accepts, required, default, convert=float)
 
 
 def _count(default: int | None = None, at_least: int = 0, required: bool = False) -> Field:
@@ -108,6 +108,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "unit": _text(required=True),
         "offset_free": _flag(),
         "noise": _positive(),
+        "relative_error": _positive(default=1e-3),
     },
     "floor": {
         "quantity": _choice(*get_args(OutputQuantity), required=True),
