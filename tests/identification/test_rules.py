@@ -25,6 +25,7 @@ GUARDS = {
     "UNKNOWN",
     "STEP_SHARES",
     "SMALLEST_LAW",
+    "WIDTH_95",
 }
 """Numbers of the diagnosis that set the accuracy of a computation or the start of a search: no decision."""
 
@@ -111,8 +112,8 @@ def test_other_rules_give_another_verdict(rubbing):
     strict = diagnose(found, rules=Rules(smallest_gain=100.0))
     assert strict.finding is None
     assert strict.verdict == "unexplained"
-    rough = dataclasses.replace(rubbing.output, relative_error=10.0)
-    lax = dataclasses.replace(found, campaign=dataclasses.replace(rubbing, output=rough))
+    rough = dataclasses.replace(rubbing, output=dataclasses.replace(rubbing.output, relative_error=10.0))
+    lax = fit(start, rough, integrator=Integrator())
     assert diagnose(lax, rules=Rules(smallest_gain=100.0, good=1e3)).verdict == "none"
     assert diagnose(found).finding.effect == "coulomb_friction"
 

@@ -7,8 +7,8 @@ from ...elements import AbstractElement
 from ..fitting import Estimate
 from ._score import ScoreTest
 
-STANDARD_ERRORS = 1.96
-"""Half the width of a 95 % interval."""
+WIDTH_95 = 1.96
+"""Half the width of a 95 % interval, in standard errors."""
 
 
 def strength_unit(element: AbstractElement) -> str:
@@ -33,7 +33,7 @@ def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[s
     inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
     return {
         score.element.name: (
-            abs(score.strength) + STANDARD_ERRORS * inflation * score.error,
+            abs(score.strength) + WIDTH_95 * inflation * score.error,
             strength_unit(score.element),
         )
         for score in test.scores

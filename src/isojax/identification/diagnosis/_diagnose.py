@@ -8,7 +8,7 @@ import numpy as np
 from ..._results import RESULTS
 from ...elements import CATALOGUE, AbstractElement
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, MOST_STEPS, Fit, Search, complete, lack_of_fit, search_of, silent
+from ..fitting import DEFAULT_SOLVER, MOST_EVALUATIONS, Fit, Search, complete, lack_of_fit, search_of, silent
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, smallest_inflation
@@ -44,7 +44,7 @@ def diagnose(
     significance: float | None = None,
     excluded: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
-    max_steps: int = MOST_STEPS,
+    max_steps: int = MOST_EVALUATIONS,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
 ) -> Verdict:

@@ -35,7 +35,7 @@ from ._problem import one_hot as one_hot
 from ._residual import Residual as Residual
 from ._residual import residual as residual
 from ._search import DEFAULT_SOLVER as DEFAULT_SOLVER
-from ._search import MOST_STEPS as MOST_STEPS
+from ._search import MOST_EVALUATIONS as MOST_EVALUATIONS
 from ._search import ROUGH as ROUGH
 from ._search import Rival as Rival
 from ._search import Search as Search

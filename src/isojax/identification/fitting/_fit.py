@@ -17,7 +17,7 @@ from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
 from ._fit_result import Fit, Statistics
 from ._integration_steps import find_integrator
-from ._search import DEFAULT_SOLVER, MOST_STEPS, search_of, silent
+from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, search_of, silent
 from ._simulator import Simulator
 
 
@@ -29,7 +29,7 @@ def fit(
     fixed: tuple[str, ...] = (),
     solver: Any = DEFAULT_SOLVER,
     integrator: Integrator | None = None,
-    max_steps: int = MOST_STEPS,
+    max_steps: int = MOST_EVALUATIONS,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
 ) -> Fit:

@@ -24,10 +24,10 @@ Source: Nocedal & Wright 2006, *Numerical Optimization*, algorithm 4.1.
 """
 
 
-MOST_STEPS = 100
+MOST_EVALUATIONS = 100
 """Simulations with derivatives of a search at most: most need ten, a curved valley some eighty."""
 
-TOLERANCE = 1e-2
+CONVERGED = 1e-2
 """Decrease of chi2, per max(chi2/dof, 1), below which a search is over: a hundredth of a standard error
 squared."""
 
@@ -73,8 +73,8 @@ class Search(NamedTuple):
     rules: Rules = Rules()
     solver: Any = DEFAULT_SOLVER
     progress: Callable[[str], None] = silent
-    max_steps: int = MOST_STEPS
-    tolerance: float = TOLERANCE
+    max_steps: int = MOST_EVALUATIONS
+    tolerance: float = CONVERGED
     rival: Rival | None = None
 
 
@@ -83,7 +83,7 @@ def search_of(
     rules: Rules,
     solver: Any,
     progress: Callable[[str], None],
-    max_steps: int = MOST_STEPS,
+    max_steps: int = MOST_EVALUATIONS,
 ) -> Search:
     """Give the search of a campaign, from the arguments of a public function.
 

@@ -16,7 +16,7 @@ from ._problem import Point
 SAME_FREQUENCY = 1e-3
 """Relative difference up to which two dwells have one frequency."""
 
-SAME_MOTION = 0.1
+SAME_DRIVE_AND_RESPONSE = 0.1
 """Relative difference of rms from which two dwells are on different branches, or were driven differently."""
 
 _Lane = tuple[int, Segment]
@@ -114,7 +114,7 @@ def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment) -> b
         difference = (
             _rms(first.input - second.input, one) if first.input.size == second.input.size else np.inf
         )
-        if not difference < SAME_MOTION * _rms(first.input, one):
+        if not difference < SAME_DRIVE_AND_RESPONSE * _rms(first.input, one):
             return False
     elif abs(frequencies[0] - frequencies[1]) > SAME_FREQUENCY * frequencies[0]:
         return False
@@ -122,7 +122,7 @@ def _is_the_same(records: tuple[Record, ...], one: Segment, other: Segment) -> b
         (_rms(record.input, segment), _rms(record.output, segment))
         for record, segment in ((first, one), (second, other))
     ]
-    return all(abs(a - b) < SAME_MOTION * max(a, b) for a, b in zip(*sizes, strict=True))
+    return all(abs(a - b) < SAME_DRIVE_AND_RESPONSE * max(a, b) for a, b in zip(*sizes, strict=True))
 
 
 def _rms(signal: Float[np.ndarray, " time"], segment: Segment) -> float:
