@@ -11,6 +11,7 @@ import scipy.stats
 
 from .._progress import KeyFigure, Stage
 from .._results import RESULTS, is_successful
+from .._show import Row, number, shown
 from ..elements import CATALOGUE
 from ..records import Campaign
 from ._rules import Rules
@@ -33,6 +34,7 @@ from .remainder import Remainder, explain_remainder
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class Loop:
     """The closed loop: from records to a model that explains them, or to the admission that it does not.
@@ -81,6 +83,18 @@ class Loop:
         if not (asked and is_successful(self.after.result) and self.after.estimate.point.is_finite):
             return None
         return explain_remainder(self.after, rules=self.rules)
+
+    def _headline(self) -> str:
+        found = ", ".join(one.effect for one in self.findings)
+        before, after = (f"{one.stats.chi2 / one.stats.dof:.4g}" for one in (self.before, self.after))
+        named = f" ({found})" if found else ""
+        return f"{self.campaign.title}, {self.verdict.replace('_', ' ')}{named}, χ²/dof {before} → {after}"
+
+    def _rows(self) -> list[Row]:
+        return self.after.parameters._rows()
+
+    def _lines(self) -> list[str]:
+        return [f"  {self.last.reason}", f"  {number(self.seconds)} s"]
 
 
 def extend(before: Fit, verdict: Verdict) -> Extension:

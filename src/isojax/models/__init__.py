@@ -32,6 +32,7 @@ from ._simulate import simulate as simulate
 from ._solve import check_integrator as check_integrator
 from ._solve import solve_record as solve_record
 from ._storage import load_model as load_model
+from ._storage import model_from_dict as model_from_dict
 from ._storage import model_to_dict as model_to_dict
 from ._storage import save_model as save_model
 from ._storage import write_whole as write_whole

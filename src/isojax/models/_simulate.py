@@ -8,9 +8,11 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from .._results import RESULTS
+from .._show import amount, brief, number, shown
 from .._types import Lanes, as_float64, check_float64
 from ..excitations import AbstractExcitation
 from ._instant import Instant
@@ -20,6 +22,7 @@ from ._laws import State
 from ._solve import solve_ode
 
 
+@shown
 class Simulation(eqx.Module):
     """A simulated record.
 
@@ -42,6 +45,13 @@ class Simulation(eqx.Module):
     reading: Float[Array, " time"]
     internal: tuple[Float[Array, " time"], ...]
     result: RESULTS
+
+    def _headline(self) -> str:
+        time = np.asarray(self.time)
+        return (
+            f"{number(time[-1] - time[0])} s at {number(1.0 / (time[1] - time[0]))} Hz, displacement up to "
+            f"{amount(np.max(np.abs(np.asarray(self.displacement))), 'm')}: {brief(self.result)}"
+        )
 
 
 @eqx.filter_jit

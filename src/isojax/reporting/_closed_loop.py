@@ -6,13 +6,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from .._show import Row, shown
 from ..health import CampaignHealth, campaign_health
 from ..identification import DEFAULT_SOLVER, ClassicalGuess, Finding, Fit, Loop, Rules, silent
 from ..identification import close_loop as find_loop
 from ..records import Campaign
 from .page import loop_summary, render_text, write_report
+from .words import headline
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class ClosedLoop:
     """From records to a model that explains them, or to the admission that it does not.
@@ -78,6 +81,15 @@ class ClosedLoop:
     def __str__(self) -> str:
         """Give the summary that the terminal shows."""
         return render_text(loop_summary(self.loop))
+
+    def _headline(self) -> str:
+        return headline(self.loop)
+
+    def _rows(self) -> list[Row]:
+        return self.after.parameters._rows()
+
+    def _lines(self) -> list[str]:
+        return ["  print(loop) gives the summary, loop.report(folder) writes the report"]
 
 
 def close_loop(

@@ -10,6 +10,7 @@ from jaxtyping import Array
 
 from ..._parameters import Parameter, list_parameters, replace_parameters
 from ..._results import RESULTS, is_successful
+from ..._show import shown
 from ...elements import Scales
 from ...excitations import Hold
 from ...models import Isolator
@@ -26,6 +27,7 @@ from ._segment_scatter import segment_scatter
 from ._simulator import Simulator
 
 
+@shown
 class Estimate(NamedTuple):
     """Fitted coefficients and what is known of them.
 

@@ -15,8 +15,9 @@ from .._rules import Rules
 from ._build_problem import build_problem
 from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
-from ._fit_result import Fit, Statistics
+from ._fit_result import Fit
 from ._integration_steps import find_integrator
+from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, search_of, silent
 from ._simulator import Simulator
 

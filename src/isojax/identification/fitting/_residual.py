@@ -6,11 +6,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy import signal, stats
 
+from ..._show import Row, number, shown
 from ._fit_result import Fit
 
 MOST_LAGS = 25
 
 
+@shown
 class Residual(NamedTuple):
     """What a fitted model leaves of its records.
 
@@ -32,6 +34,22 @@ class Residual(NamedTuple):
     autocorrelation: Float[np.ndarray, "record lag"]
     cross_correlation: Float[np.ndarray, "record lag"]
     band: Float[np.ndarray, " record"]
+
+    def _headline(self) -> str:
+        inside = 100.0 * float(np.mean(self.whiteness))
+        return f"{len(self.values)} records, {inside:.3g} % of the lags within the band of white noise (99 %)"
+
+    def _rows(self) -> list[str | Row]:
+        return [
+            "noise_floor",
+            *(
+                Row(
+                    f"values[{place}]",
+                    f"{number(float(np.sqrt(np.mean(one**2))))} rms, {100.0 * white:.3g} % inside",
+                )
+                for place, (one, white) in enumerate(zip(self.values, self.whiteness, strict=True))
+            ),
+        ]
 
 
 def _correlate(

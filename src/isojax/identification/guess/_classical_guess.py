@@ -4,6 +4,7 @@ import dataclasses
 from typing import Literal
 
 from ..._parameters import list_parameters
+from ..._show import Row, amount, shown
 from ..._types import check_float64
 from ...models import Isolator
 from ...records import Campaign
@@ -20,6 +21,7 @@ _HARDLY_BALANCED = 0.7
 """Share of the force left unbalanced above which the reader is asked to check sign, unit, timing and mass."""
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class ClassicalGuess:
     """The result of classical analysis of a campaign.
@@ -53,6 +55,25 @@ class ClassicalGuess:
     def paper_model(self) -> Isolator | None:
         """The isolator of the paper's own route, averaged over sweep directions; None if it gives none."""
         return None if self.table is None else self.table.model
+
+    def _headline(self) -> str:
+        how = "harmonic balance of all dwells" if self.route == "all_dwells" else "force balance in time"
+        return f"start values by {how}, which leave {100.0 * self.unexplained:.3g} % of the force unbalanced"
+
+    def _rows(self) -> list[Row]:
+        return [
+            Row(
+                one.name,
+                amount(one.value, one.spec.unit),
+                f"{one.spec.symbol}; the paper's route {100.0 * self.bias[one.name]:+.3g} %"
+                if one.name in self.bias
+                else one.spec.symbol,
+            )
+            for one in self.model.parameters
+        ]
+
+    def _lines(self) -> list[str]:
+        return [f"  {note}" for note in self.notes]
 
 
 def _bias(paper: Isolator | None, model: Isolator) -> dict[str, float]:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._results import is_successful
+from ..._show import Row, shown
 from .._rules import Rules
 from ..fitting import DEFAULT_SOLVER, Fit, search_of, silent
 from ._dwell_remainder import DwellRemainder, dwell_remainders
@@ -20,6 +21,7 @@ _FEWEST_CELL_SAMPLES = 4
 """Fewest samples of a cell of the force map; a cell with fewer stays empty."""
 
 
+@shown
 class ForceMap(NamedTuple):
     """Mean force residual over the plane of displacement and velocity.
 
@@ -34,6 +36,7 @@ class ForceMap(NamedTuple):
     force: Float[np.ndarray, "cell cell"]
 
 
+@shown
 class Remainder(NamedTuple):
     """What a fitted model leaves unexplained.
 
@@ -46,6 +49,12 @@ class Remainder(NamedTuple):
     pursuit: Pursuit
     dwells: tuple[DwellRemainder, ...]
     force_map: ForceMap
+
+    def _headline(self) -> str:
+        return self.pursuit._headline()
+
+    def _rows(self) -> list[str | Row]:
+        return [*self.pursuit._rows(), "dwells", "force_map"]
 
 
 def explain_remainder(

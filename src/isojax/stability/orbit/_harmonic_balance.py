@@ -13,6 +13,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import shown
 from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator
@@ -20,6 +21,7 @@ from ._describing_function import imposed_internal, response_start, rest_displac
 from ._sine import recorded_sine
 
 
+@shown
 class HarmonicBalance(eqx.Module):
     """A periodic motion as a sum of a few harmonics of the drive.
 

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._results import RESULTS
+from ..._show import brief, shown
 from ..._types import check_float64
 from ...models import Instant, Integrator, Isolator, State
 from ..map import Lane, MapMethod, states_at_zero
@@ -27,6 +28,7 @@ _AMPLITUDE_STEP = 0.3
 """Largest change of an unknown in one step, as a share of its size: beyond, the basin may be left."""
 
 
+@shown
 class BackboneCurve(eqx.Module):
     """Resonance over amplitude, with and without damping.
 
@@ -46,6 +48,10 @@ class BackboneCurve(eqx.Module):
     force: Float[Array, " point"]
     y0: Float[Array, "point state"]
     result: RESULTS
+
+    def _headline(self) -> str:
+        spans = f"frequency {brief(self.frequency)} Hz, displacement {brief(self.displacements)} m"
+        return f"phase resonance: {spans}"
 
 
 def backbone_curve(

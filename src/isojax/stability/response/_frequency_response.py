@@ -9,12 +9,14 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import amount, number, shown
 from ..._types import check_float64
 from ...models import Integrator, Isolator
 from ..branch import Branch, SpecialPoint, continue_branch
 from ..orbit import Sine, recorded_sine, trajectory
 
 
+@shown
 class FrequencyResponse(eqx.Module):
     """Periodic response over frequency, in the order of the curve.
 
@@ -58,6 +60,20 @@ class FrequencyResponse(eqx.Module):
     def result(self) -> RESULTS:
         """Whether the curve was followed to its end."""
         return self.branch.result
+
+    def _headline(self) -> str:
+        points = self.branch.points
+        response, frequency = np.asarray(points.response), np.asarray(points.frequency)
+        top = np.nanargmax(response)
+        drive = number(float(np.asarray(points.amplitude).ravel()[top]))
+        peak = f"{amount(response.ravel()[top], 'm')} at {number(frequency.ravel()[top])} Hz"
+        return f"largest response {peak} under a drive of {drive}; {self.branch._headline()}"
+
+    def _rows(self) -> list[str]:
+        return ["branch", "receptance"]
+
+    def _lines(self) -> list[str]:
+        return self.branch._lines()
 
 
 def frequency_response(

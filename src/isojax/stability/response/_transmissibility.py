@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import number, shown
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import Integrator, Isolator, State
 from ..map import StabilityMap, stability_map
@@ -16,6 +17,7 @@ from ..orbit import Sine, ascending, period_map, trajectory
 from ._frequency_response import fundamental
 
 
+@shown
 class Transmissibility(eqx.Module):
     """Force on the ground over the force on the mass; under base excitation absolute motion over the base's.
 
@@ -51,6 +53,12 @@ class Transmissibility(eqx.Module):
     def stable(self) -> Bool[Array, "*orbit frequency"]:
         """Whether each orbit is stable."""
         return self.spectral_radius < 1.0
+
+    def _headline(self) -> str:
+        ratio, band = np.abs(np.asarray(self.ratio)), np.asarray(self.frequencies)
+        top = int(np.nanargmax(ratio))
+        peak = f"{number(ratio.ravel()[top])} at {number(band[top % band.size])} Hz"
+        return f"largest {peak}, drive {number(float(self.amplitude))}"
 
 
 def transmissibility(
