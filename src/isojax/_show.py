@@ -158,7 +158,11 @@ def _declared(kind: type) -> dict[str, Any]:
 
 def _field_names(one: Any) -> tuple[str, ...]:
     """List the public fields."""
-    kept = one._fields if isinstance(one, tuple) else (field.name for field in dataclasses.fields(one))
+    kept: Iterable[str] = (
+        getattr(one, "_fields", ())
+        if isinstance(one, tuple)
+        else (field.name for field in dataclasses.fields(one))
+    )
     return tuple(name for name in kept if not name.startswith("_"))
 
 

@@ -25,12 +25,14 @@ from .fitting import Coefficients as Coefficients
 from .fitting import DriftBudget as DriftBudget
 from .fitting import Errors as Errors
 from .fitting import Fit as Fit
+from .fitting import Fitted as Fitted
 from .fitting import Residual as Residual
 from .fitting import Run as Run
 from .fitting import SavedFit as SavedFit
 from .fitting import Share as Share
 from .fitting import Statistics as Statistics
 from .fitting import Uncertainty as Uncertainty
+from .fitting import as_fit as as_fit
 from .fitting import drift_budget as drift_budget
 from .fitting import fit as fit
 from .fitting import load_fit as load_fit

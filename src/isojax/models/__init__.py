@@ -6,6 +6,8 @@ Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at o
 `_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file.
 """
 
+from ._as_isolator import Modelled as Modelled
+from ._as_isolator import as_isolator as as_isolator
 from ._event_step import Ringing as Ringing
 from ._event_step import Step as Step
 from ._event_step import add_ringing as add_ringing

@@ -15,6 +15,7 @@ from .._results import RESULTS
 from .._show import amount, brief, number, shown
 from .._types import Lanes, as_float64, check_float64
 from ..excitations import AbstractExcitation
+from ._as_isolator import Modelled, as_isolator
 from ._instant import Instant
 from ._integrator import Integrator
 from ._isolator import Isolator, Quantity
@@ -76,7 +77,7 @@ def _solve_ode(
 
 
 def simulate(
-    model: Isolator,
+    model: Isolator | Modelled,
     excitation: AbstractExcitation,
     *,
     duration: float,
@@ -112,6 +113,7 @@ def simulate(
         >>> print(f"{1e3 * float(abs(settled).max()):.3f} mm")
         0.408 mm
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator() if integrator is None else integrator
     for name, value in (("duration", duration), ("rate", rate)):

@@ -173,6 +173,11 @@ class Extension(NamedTuple):
     def _rows(self) -> list[Row]:
         return self.fit.parameters._rows()
 
+    @property
+    def model(self) -> Isolator:
+        """The isolator of the last fit."""
+        return self.fit.model
+
 
 def findings_in(model: Isolator, extensions: tuple[Extension, ...]) -> tuple[Finding, ...]:
     """List what was found and is part of a model.

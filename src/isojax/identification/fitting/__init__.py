@@ -6,6 +6,8 @@ then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equatio
 What follows the search is in `_evaluation`, `_errors`, `_covariance` and `_fit_result`.
 """
 
+from ._as_fit import Fitted as Fitted
+from ._as_fit import as_fit as as_fit
 from ._coefficients import Coefficient as Coefficient
 from ._coefficients import Coefficients as Coefficients
 from ._covariance import Uncertainty as Uncertainty

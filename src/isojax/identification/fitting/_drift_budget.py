@@ -9,6 +9,7 @@ from ..._parameters import list_parameters
 from ..._results import is_successful
 from ..._show import Row, amount, number, shown
 from ..jacobian import STIFFNESS_SCALE_UNIT, has_stiffness_scale
+from ._as_fit import Fitted, as_fit
 from ._elimination import Reduced, Spread
 from ._fit_result import Fit
 
@@ -80,7 +81,7 @@ class DriftBudget(NamedTuple):
         ]
 
 
-def drift_budget(fit: Fit) -> DriftBudget:
+def drift_budget(fit: Fit | Fitted) -> DriftBudget:
     """Split the error bars of a fit into noise and repeatability.
 
     The fit holds each record's stiffness scale for one draw of a normal law, whose standard deviation repeats
@@ -93,6 +94,7 @@ def drift_budget(fit: Fit) -> DriftBudget:
     Returns:
         The budget.
     """
+    fit = as_fit(fit)
     found = fit.estimate
     single = len(found.problem.records) < 2
     if single or not is_successful(fit.result) or not has_stiffness_scale(fit.model):

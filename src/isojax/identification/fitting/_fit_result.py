@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._parameters import Parameter, list_parameters
-from ..._results import RESULTS, is_successful
+from ..._results import RESULTS, is_successful, name_of_result
 from ..._show import Row, shown
 from ...models import Isolator
 from ...records import Campaign, NoiseEstimate, brief_blows
@@ -93,7 +93,7 @@ class Fit(NamedTuple):
     def parameters(self) -> Coefficients:
         """The coefficients by full name or symbol: `fit.parameters["k1"].standard_error`."""
         start = {entry.name: float(entry.value) for entry in list_parameters(self.start)}
-        errors, found = self.standard_errors, is_successful(self.result)
+        errors, found = self.standard_errors, name_of_result(self.result) == "successful"
         return Coefficients(
             tuple(
                 Coefficient(

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from scipy import signal, stats
 
 from ..._show import Row, number, shown
+from ._as_fit import Fitted, as_fit
 from ._fit_result import Fit
 
 MOST_LAGS = 25
@@ -64,7 +65,7 @@ def _correlate(
     return window / size if size > 0.0 else np.zeros_like(window)
 
 
-def residual(fit: Fit) -> Residual:
+def residual(fit: Fit | Fitted) -> Residual:
     """Give what a fit leaves of its records, every segment restarted from its own best state.
 
     Args:
@@ -81,6 +82,7 @@ def residual(fit: Fit) -> Residual:
         >>> print(f"{ij.residual(fitted).whiteness.mean():.1f} of the lags inside")
         0.0 of the lags inside
     """
+    fit = as_fit(fit)
     runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
     lags = np.arange(-MOST_LAGS, MOST_LAGS + 1, dtype=float)
     values, own, cross, band, white = [], [], [], [], []

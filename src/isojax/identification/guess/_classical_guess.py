@@ -1,6 +1,7 @@
 """The start of every identification: classical analysis of the records, without a simulation."""
 
 import dataclasses
+from pathlib import Path
 from typing import Literal
 
 from ..._parameters import list_parameters
@@ -14,6 +15,7 @@ from ._linear_response import LinearResponse
 from ._logarithmic_decrement import Decrement
 from ._measured_receptance import MeasuredResponse, measured_receptance
 from ._paper_table import PaperTable, paper_table
+from ._read_campaign import as_campaign
 from ._sensor_offset_start import with_sensor_zero
 from ._start_coefficients import start_from_dwells, start_from_time
 
@@ -115,7 +117,7 @@ def _cautions(
 
 
 def classical_guess(
-    campaign: Campaign,
+    campaign: Campaign | str | Path,
     *,
     damping: Literal["half_power", "circle"] = "half_power",
     resonance: Literal["peak", "phase"] = "peak",
@@ -127,7 +129,8 @@ def classical_guess(
     elements of the campaign (`elements = [...]`) start absent.
 
     Args:
-        campaign: the campaign; only records with role "fit" are used.
+        campaign: the campaign, or the path of its campaign.toml or its folder; only records with role "fit"
+            are used.
         damping: where the paper's route takes its damping ratio from.
         resonance: which resonance the paper's route takes.
 
@@ -146,6 +149,7 @@ def classical_guess(
         ['linear_stiffness', 'cubic_stiffness', 'linear_damping']
     """
     check_float64()
+    campaign = as_campaign(campaign)
     base = base_model(campaign)
     names = declared_names(campaign, extra=False)
     mass_free = campaign.mass_free and not campaign.input.gain_free

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from ..._results import is_successful
 from ..._show import Row, shown
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, Fit, search_of, silent
+from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, search_of, silent
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 from ._matching_pursuit import Pursuit, pursue_laws
@@ -58,7 +58,7 @@ class Remainder(NamedTuple):
 
 
 def explain_remainder(
-    fit: Fit,
+    fit: Fit | Fitted,
     *,
     refit: bool = True,
     solver: Any = DEFAULT_SOLVER,
@@ -89,6 +89,7 @@ def explain_remainder(
         >>> len(remainder.dwells)
         54
     """
+    fit = as_fit(fit)
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
     search = search_of(fit.campaign, rules, solver, progress)

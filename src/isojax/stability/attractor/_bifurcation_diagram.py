@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator, State
+from ...models import Integrator, Isolator, Modelled, State, as_isolator
 from ..orbit import ascending, recorded_sine
 from ._stroboscope import (
     Repetition,
@@ -84,7 +84,7 @@ class BifurcationDiagram(eqx.Module):
 
 
 def bifurcation_diagram(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitudes: Any = None,
     frequency: Any = None,
     *,
@@ -135,6 +135,7 @@ def bifurcation_diagram(
         >>> diagram.period.ravel().tolist()
         [1, 1]
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator() if integrator is None else integrator
     parameter, forces, band = _points(amplitudes, frequency, amplitude, frequencies)

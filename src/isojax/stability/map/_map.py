@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from ..._results import RESULTS, cell_results
 from ..._show import number, shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import Sine, ascending, is_odd
 from ._batched_newton import (
     FOUND,
@@ -141,7 +141,7 @@ class StabilityMap(eqx.Module):
 
 
 def stability_map(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitudes: Any,
     frequencies: Any,
     *,
@@ -191,6 +191,7 @@ def stability_map(
         >>> smap.count.shape, int(smap.count.max())
         ((3, 2), 3)
     """
+    model = as_isolator(model)
     check_float64()
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:

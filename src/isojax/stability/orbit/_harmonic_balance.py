@@ -16,7 +16,7 @@ from ..._results import RESULTS
 from ..._show import shown
 from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import imposed_internal, response_start, rest_displacement
 from ._sine import recorded_sine
 
@@ -93,7 +93,7 @@ def _at(row: Complex[Array, " harmonic"], phase: Lanes) -> Lanes:
 
 
 def harmonic_balance(
-    model: Isolator,
+    model: Isolator | Modelled,
     excitation: Harmonic,
     *,
     harmonics: int = 7,
@@ -134,6 +134,7 @@ def harmonic_balance(
         >>> ij.is_successful(found.result)
         True
     """
+    model = as_isolator(model)
     check_float64()
     tolerance = (Integrator() if integrator is None else integrator).orbit_tolerance
     solver = optx.Newton(rtol=tolerance, atol=tolerance) if solver is None else solver

@@ -17,7 +17,7 @@ from ..._results import RESULTS, is_successful
 from ..._show import amount, brief, declared_numbers, number, shown
 from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import response_start
 from ._floquet import Floquet, multipliers, stable_words
 from ._harmonic_balance import harmonic_balance
@@ -105,7 +105,7 @@ class Orbit(AbstractStatePath):
 
 
 def find_periodic_orbit(
-    model: Isolator,
+    model: Isolator | Modelled,
     excitation: Harmonic,
     *,
     start: Sequence[Lanes | float] | Float[Array, " state"] | None = None,
@@ -147,6 +147,7 @@ def find_periodic_orbit(
         >>> ij.is_successful(orbit.result), float(orbit.floquet.spectral_radius) < 1.0
         (True, True)
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator() if integrator is None else integrator
     tolerance = integrator.orbit_tolerance

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from ..._results import RESULTS
 from ..._show import brief, shown
 from ..._types import check_float64
-from ...models import Instant, Integrator, Isolator, State
+from ...models import Instant, Integrator, Isolator, Modelled, State, as_isolator
 from ..map import Lane, MapMethod, states_at_zero
 from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory
 from ._free_vibration import natural_frequencies
@@ -55,7 +55,7 @@ class BackboneCurve(eqx.Module):
 
 
 def backbone_curve(
-    model: Isolator, displacements: Any, *, integrator: Integrator | None = None
+    model: Isolator | Modelled, displacements: Any, *, integrator: Integrator | None = None
 ) -> BackboneCurve:
     """Give the backbone curve, free and forced.
 
@@ -79,6 +79,7 @@ def backbone_curve(
         >>> bool(backbone.frequency[1] < backbone.frequency[0])  # this spring softens
         True
     """
+    model = as_isolator(model)
     check_float64()
     amplitudes = jnp.asarray(ascending("displacements", displacements))
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator

@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._results import RESULTS
 from ..._show import amount, number, shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..branch import Branch, SpecialPoint, continue_branch
 from ..orbit import Sine, recorded_sine, trajectory
 
@@ -77,7 +77,7 @@ class FrequencyResponse(eqx.Module):
 
 
 def frequency_response(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitude: Any,
     frequencies: Any,
     *,
@@ -115,6 +115,7 @@ def frequency_response(
         >>> print(f"resonance near {float(response.branch.points.frequency[place]):.1f} Hz")
         resonance near 5.5 Hz
     """
+    model = as_isolator(model)
     check_float64()
     forces, ends = np.asarray(amplitude, dtype=float), np.asarray(frequencies, dtype=float)
     if forces.ndim > 1 or not forces.size or not np.all(np.isfinite(forces) & (forces > 0.0)):

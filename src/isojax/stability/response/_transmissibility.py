@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._results import RESULTS
 from ..._show import number, shown
 from ..._types import Lanes, Scalar, as_float64, check_float64
-from ...models import Integrator, Isolator, State
+from ...models import Integrator, Isolator, Modelled, State, as_isolator
 from ..map import StabilityMap, stability_map
 from ..orbit import Sine, ascending, period_map, trajectory
 from ._frequency_response import fundamental
@@ -62,7 +62,7 @@ class Transmissibility(eqx.Module):
 
 
 def transmissibility(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitude: Scalar | float,
     frequencies: Any,
     *,
@@ -95,6 +95,7 @@ def transmissibility(
         >>> [f"{size:.2f}" for size in abs(ratio).ravel().tolist()]
         ['4.11', '0.10']
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
     band = ascending("frequencies", frequencies)
