@@ -16,7 +16,6 @@ from ..models import Isolator
 from ..records import Campaign
 from .page import loop_summary, render_text, write_report
 from .plots import plot_time_history
-from .words import headline
 
 
 @shown
@@ -87,7 +86,8 @@ class ClosedLoop:
         return render_text(loop_summary(self.loop))
 
     def _headline(self) -> str:
-        return headline(self.loop)
+        # Not the headline of the report: that asks held-out records, which may have to be simulated first.
+        return self.loop._headline()
 
     def _rows(self) -> list[Row]:
         return self.after.parameters._rows()

@@ -73,6 +73,8 @@ def fit(
         >>> fitted = ij.fit(guess.model, campaign)
         >>> print(f"{float(fitted.model['linear_stiffness.coefficient']):.2g} N/m, nrmse {fitted.nrmse:.2f}")
         1.1e+06 N/m, nrmse 0.22
+        >>> fitted.parameters["k1"].unit, fitted.parameters["k1"].standard_error < 1e4
+        ('N/m', True)
     """
     check_float64()
     if campaign is None and isinstance(model, Campaign | str | Path):
