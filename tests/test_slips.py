@@ -51,6 +51,9 @@ def test_the_last_fit_of_an_extension_or_loop_is_meant(made):
         assert ij.identification.as_fit(several) is extension.fit
         assert several.model is extension.fit.model
         assert ij.models.as_isolator(several) is extension.fit.model
+    assert ij.find_separating_experiment(loop).effect == "coulomb_friction"
+    with pytest.raises(ValueError, match=r"must be an extension, .* type Loop"):
+        ij.find_separating_experiment(dataclasses.replace(loop, extensions=()))
     np.testing.assert_array_equal(ij.residual(loop).whiteness, ij.residual(extension.fit).whiteness)
 
 

@@ -114,7 +114,7 @@ class ClosedLoop:
         Returns:
             The figure, shown nowhere.
         """
-        return plot_time_history(self.loop, **options)
+        return plot_time_history(self.before, self.after, **options)
 
 
 def close_loop(

@@ -83,13 +83,7 @@ def find_separating_experiment(
         >>> ij.find_separating_experiment(better).others
         ()
     """
-    steps = getattr(extension, "extensions", (extension,))
-    if not steps or not isinstance(steps[-1], Extension):
-        raise ValueError(
-            "Argument `extension` must be an extension, such as `extend` gives it, or a loop that added an "
-            f"effect, but is of type {type(extension).__name__}."
-        )
-    extension = steps[-1]
+    extension = _last_extension(extension)
     finding = extension.verdict.finding
     if finding is None:
         raise ValueError("Argument `extension` must hold a finding, but its verdict names no effect.")
@@ -140,6 +134,17 @@ def find_separating_experiment(
             else Prospect(experiment, (), "the motion diverges")
         )
     return nothing._replace(prospects=rank_prospects(tuple(prospects), needed))
+
+
+def _last_extension(given: Extension | Extended) -> Extension:
+    """Give the extension that is meant: of a loop the last."""
+    last = (None, *given.extensions)[-1] if isinstance(given, Extended) else given
+    if not isinstance(last, Extension):
+        raise ValueError(
+            "Argument `extension` must be an extension, such as `extend` gives it, or a loop that added an "
+            f"effect, but is of type {type(given).__name__}."
+        )
+    return last
 
 
 def with_separating_experiment(extension: Extension, rules: Rules = Rules()) -> Extension:
