@@ -31,6 +31,7 @@ from .identification import explain_remainder as explain_remainder
 from .identification import extend as extend
 from .identification import find_separating_experiment as find_separating_experiment
 from .identification import fit as fit
+from .identification import load_fit as load_fit
 from .identification import read_campaign as read_campaign
 from .identification import residual as residual
 from .models import Integrator as Integrator

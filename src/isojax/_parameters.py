@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ._show import shown
 from ._types import Scalar, as_float64
 
 _Model = TypeVar("_Model", bound=eqx.Module)
@@ -33,6 +34,7 @@ class ParameterSpec(NamedTuple):
     fitted: bool
 
 
+@shown
 class Parameter(NamedTuple):
     """One physical number of a model.
 

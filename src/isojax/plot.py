@@ -33,3 +33,4 @@ from .reporting.plots import plot_stiffness_scatter as stiffness_scatter
 from .reporting.plots import plot_time_history as time_history
 from .reporting.plots import plot_transmissibility as transmissibility
 from .reporting.plots import plot_where as where
+from .reporting.plots import show as show

@@ -1,6 +1,6 @@
 import pytest
 
-from isojax.reporting.words._quantities import (
+from isojax._quantities import (
     typeset_goodness,
     typeset_number,
     typeset_p_value,

@@ -2,6 +2,7 @@
 
 import abc
 
+from .._show import declared_numbers, shown
 from ._effect import Channels as Channels
 from ._effect import Group as Group
 from ._effect import LookAlike as LookAlike
@@ -11,6 +12,7 @@ from ._force import AbstractForce
 from ._instrument import AbstractInstrument
 
 
+@shown
 class AbstractElement(AbstractForce, AbstractInstrument, AbstractFollower):
     """One physical effect. An element overrides methods of one contract; those of the others stay neutral.
 
@@ -73,3 +75,6 @@ class AbstractElement(AbstractForce, AbstractInstrument, AbstractFollower):
             The element of this kind, with one of the shapes that do; None where there is none.
         """
         return None
+
+    def _headline(self) -> str:
+        return f"{self.words}: {declared_numbers(self)}"

@@ -5,6 +5,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import equinox as eqx
 
+from .._show import shown
 from .._types import Lanes
 
 Channels = Mapping[str, Lanes]
@@ -55,6 +56,7 @@ class LookAlike(NamedTuple):
         return len(names & {declared_by, *self.others}) > 1 and (self.among or declared_by in names)
 
 
+@shown
 class Scales(eqx.Module):
     """Typical magnitudes of a record, from which an element guesses its own parameters.
 

@@ -6,9 +6,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from .._show import declared_numbers, shown
 from .._types import Lanes
 
 
+@shown
 class AbstractExcitation(eqx.Module):
     """A drive [N, or m/s^2 for base excitation] as a function of time [s]."""
 
@@ -34,3 +36,6 @@ class AbstractExcitation(eqx.Module):
         """
         t = jnp.asarray(t, dtype=float)
         return jax.jvp(self.__call__, (t,), (jnp.ones_like(t),))[1]
+
+    def _headline(self) -> str:
+        return f"drive with {declared_numbers(self) or 'tabulated values'}"

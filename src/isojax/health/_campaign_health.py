@@ -3,11 +3,13 @@
 from typing import NamedTuple
 
 from .._results import is_successful
+from .._show import shown
 from ..identification import DriftBudget, Loop, drift_budget
 from ..records import DataHealth, HumLine, MainsCollision, data_health, hum_lines, mains_collisions
 from ._dwell_stability import DwellStability, dwell_stability
 
 
+@shown
 class CampaignHealth(NamedTuple):
     """State of the data and of what was found in them.
 

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from .._results import RESULTS, is_successful
+from .._show import shown
 from ..models import Isolator
 from ..records import Campaign, Dwell, OutputChannel, Record, dwell_harmonics
 from ..stability import find_nearest_folds
@@ -21,6 +22,7 @@ _ANOTHER = 0.3
 _DERIVATIVES_OF_DISPLACEMENT = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
+@shown
 class DwellStability(NamedTuple):
     """One measured dwell, compared with the periodic orbit that the fitted model has there.
 

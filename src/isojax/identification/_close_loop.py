@@ -5,13 +5,16 @@ import math
 import time
 from collections.abc import Callable
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal
 
 import scipy.stats
 
 from .._progress import KeyFigure, Stage
 from .._results import RESULTS, is_successful
+from .._show import Row, number, shown
 from ..elements import CATALOGUE
+from ..models import Isolator
 from ..records import Campaign
 from ._rules import Rules
 from .diagnosis import (
@@ -26,13 +29,14 @@ from .diagnosis import (
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, Search, fit, search_of, silent
-from .guess import ClassicalGuess, classical_guess
+from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of, silent
+from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Remainder, explain_remainder
 
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class Loop:
     """The closed loop: from records to a model that explains them, or to the admission that it does not.
@@ -82,8 +86,25 @@ class Loop:
             return None
         return explain_remainder(self.after, rules=self.rules)
 
+    def _headline(self) -> str:
+        found = ", ".join(one.effect for one in self.findings)
+        before, after = (f"{one.stats.chi2 / one.stats.dof:.4g}" for one in (self.before, self.after))
+        named = f" ({found})" if found else ""
+        return f"{self.campaign.title}, {self.verdict.replace('_', ' ')}{named}, χ²/dof {before} → {after}"
 
-def extend(before: Fit, verdict: Verdict) -> Extension:
+    def _rows(self) -> list[Row]:
+        return self.after.parameters._rows()
+
+    def _lines(self) -> list[str]:
+        return [f"  {self.last.reason}", f"  {number(self.seconds)} s"]
+
+    @property
+    def model(self) -> Isolator:
+        """The isolator of the last fit."""
+        return self.after.model
+
+
+def extend(before: Fit | Fitted, verdict: Verdict) -> Extension:
     """Add the effect that a diagnosis found, and compare the new model with every record.
 
     Args:
@@ -108,11 +129,11 @@ def extend(before: Fit, verdict: Verdict) -> Extension:
             "Argument `verdict` must have found an effect to add, but its verdict is "
             f'"{verdict.verdict}": {verdict.reason}'
         )
-    return Extension(before, verdict.after, verdict)
+    return Extension(as_fit(before, "before"), verdict.after, verdict)
 
 
 def close_loop(
-    campaign: Campaign,
+    campaign: Campaign | str | Path,
     *,
     max_iterations: int = 3,
     excluded: tuple[str, ...] = (),
@@ -126,7 +147,7 @@ def close_loop(
     against is not called "found".
 
     Args:
-        campaign: the measurements.
+        campaign: the measurements, or the path of their campaign.toml or its folder.
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.
@@ -145,7 +166,7 @@ def close_loop(
     unknown = [name for name in excluded if name not in CATALOGUE]
     if unknown:
         raise ValueError(f"Argument `excluded` must hold catalogue names, but {unknown[0]!r} is none.")
-    start = time.perf_counter()
+    start, campaign = time.perf_counter(), as_campaign(campaign)
     progress(Stage("classical guess"))
     guess = classical_guess(campaign)
     progress(Stage("fit of the declared model"))

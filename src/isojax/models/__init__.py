@@ -6,6 +6,8 @@ Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at o
 `_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file.
 """
 
+from ._as_isolator import Modelled as Modelled
+from ._as_isolator import as_isolator as as_isolator
 from ._event_step import Ringing as Ringing
 from ._event_step import Step as Step
 from ._event_step import add_ringing as add_ringing
@@ -32,6 +34,7 @@ from ._simulate import simulate as simulate
 from ._solve import check_integrator as check_integrator
 from ._solve import solve_record as solve_record
 from ._storage import load_model as load_model
+from ._storage import model_from_dict as model_from_dict
 from ._storage import model_to_dict as model_to_dict
 from ._storage import save_model as save_model
 from ._storage import write_whole as write_whole

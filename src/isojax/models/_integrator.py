@@ -4,6 +4,7 @@ import diffrax
 import equinox as eqx
 from jaxtyping import Array, Float
 
+from .._show import shown
 from ._isolator import Isolator
 from ._rk4 import RK4
 
@@ -11,6 +12,7 @@ _FINE_STEPS = 4
 """Steps a sample of a table that is interpolated: eight parts, as fine as that of a `Sampled` drive."""
 
 
+@shown
 class Integrator(eqx.Module):
     """Solver, steps and tolerances; every derived tolerance follows from these.
 

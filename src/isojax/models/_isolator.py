@@ -9,7 +9,15 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
-from .._parameters import Parameter, find_parameter, list_parameters, parameter, replace_parameters
+from .._parameters import (
+    Parameter,
+    element_names,
+    find_parameter,
+    list_parameters,
+    parameter,
+    replace_parameters,
+)
+from .._show import Row, amount, listed, shown
 from .._types import Lanes, Scalar
 from ..elements import AbstractElement, Channels
 from ._instant import Instant
@@ -18,6 +26,7 @@ from ._laws import ROUNDED, AbstractLaw, State, evaluate_switches, share_interna
 Quantity = Literal["acceleration", "velocity", "displacement"]
 
 
+@shown
 class Isolator(eqx.Module):
     """One coordinate: `mass x'' + sum of element forces = F(t)`.
 
@@ -342,3 +351,10 @@ class Isolator(eqx.Module):
                 internal_rates.extend(a + b for a, b in zip(rates, sensed, strict=True))
                 y = element.reading(y, internal)
         return (state[1], self.acceleration(state, at, law), *internal_rates)
+
+    def _headline(self) -> str:
+        driven = "its base" if self.excitation == "base_acceleration" else "a force"
+        return f"{amount(self.mass, 'kg')} driven by {driven}, with {listed(element_names(self), 20)}"
+
+    def _rows(self) -> list[Row]:
+        return [Row(one.name, amount(one.value, one.spec.unit), one.spec.symbol) for one in self.parameters]

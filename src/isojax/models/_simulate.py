@@ -8,11 +8,14 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from .._results import RESULTS
+from .._show import amount, brief, number, shown
 from .._types import Lanes, as_float64, check_float64
 from ..excitations import AbstractExcitation
+from ._as_isolator import Modelled, as_isolator
 from ._instant import Instant
 from ._integrator import Integrator
 from ._isolator import Isolator, Quantity
@@ -20,6 +23,7 @@ from ._laws import State
 from ._solve import solve_ode
 
 
+@shown
 class Simulation(eqx.Module):
     """A simulated record.
 
@@ -42,6 +46,13 @@ class Simulation(eqx.Module):
     reading: Float[Array, " time"]
     internal: tuple[Float[Array, " time"], ...]
     result: RESULTS
+
+    def _headline(self) -> str:
+        time = np.asarray(self.time)
+        return (
+            f"{number(time[-1] - time[0])} s at {number(1.0 / (time[1] - time[0]))} Hz, displacement up to "
+            f"{amount(np.max(np.abs(np.asarray(self.displacement))), 'm')}: {brief(self.result)}"
+        )
 
 
 @eqx.filter_jit
@@ -66,7 +77,7 @@ def _solve_ode(
 
 
 def simulate(
-    model: Isolator,
+    model: Isolator | Modelled,
     excitation: AbstractExcitation,
     *,
     duration: float,
@@ -102,6 +113,7 @@ def simulate(
         >>> print(f"{1e3 * float(abs(settled).max()):.3f} mm")
         0.408 mm
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator() if integrator is None else integrator
     for name, value in (("duration", duration), ("rate", rate)):

@@ -103,6 +103,24 @@ def load_model(path: str | Path) -> Isolator:
         raise ValueError(f"{path}: cannot be read ({error.strerror}).") from None
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: is no JSON file ({error}).") from None
+    return model_from_dict(content, path)
+
+
+def model_from_dict(content: Any, path: Path) -> Isolator:
+    """Give the model of `model_to_dict`'s numbers and words.
+
+    Args:
+        content: what a file holds.
+        path: the file, which messages name.
+
+    Returns:
+        The isolator.
+
+    Raises:
+        ValueError: as `load_model` does.
+        RuntimeError: if JAX is not in 64-bit mode.
+    """
+    check_float64()
     if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("version") != 1:
         raise ValueError(f'{path}: must hold "format": "{FORMAT}", "version": 1, but does not.')
     unknown = sorted(set(content) - {"format", "version", "excitation", "mass", "elements"})

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from .._show import Row, headline, listed, number, shown
 from ._record import Record
 
 InputQuantity = Literal["force", "base_acceleration", "reaction_mass_acceleration", "command"]
@@ -15,7 +16,11 @@ Hold = Literal["band_limited", "linear", "zero_order"]
 TIME_DERIVATIVES: Mapping[OutputQuantity, int] = {"displacement": 0, "velocity": 1, "acceleration": 2}
 """How often the displacement is differentiated to give each quantity."""
 
+_LISTED = 16
+"""Records of a campaign that are shown one by one."""
 
+
+@shown
 @dataclass(frozen=True)
 class InputChannel:
     """What drove the isolator.
@@ -41,6 +46,7 @@ class InputChannel:
     moving_mass: float | None = None
 
 
+@shown
 @dataclass(frozen=True)
 class OutputChannel:
     """What was measured on the isolated mass.
@@ -62,6 +68,7 @@ class OutputChannel:
     relative_error: float = 1e-3
 
 
+@shown
 @dataclass(frozen=True)
 class FloorChannel:
     """What was measured on the floor under the isolator.
@@ -79,6 +86,7 @@ class FloorChannel:
     gain: float = 1.0
 
 
+@shown
 @dataclass(frozen=True)
 class Filter:
     """Low-pass filter on all channels alike.
@@ -98,6 +106,7 @@ class Filter:
     compensate: bool = False
 
 
+@shown
 @dataclass(frozen=True, eq=False)
 class Campaign:
     """Everything campaign.toml says, with the records read.
@@ -141,3 +150,37 @@ class Campaign:
     def holdout_records(self) -> tuple[Record, ...]:
         """Records that only evaluate a fit."""
         return tuple(record for record in self.records if record.role == "holdout")
+
+    def _headline(self) -> str:
+        fitted, held_out = len(self.fit_records), len(self.holdout_records)
+        return f"{self.title}: {len(self.records)} records, {fitted} to fit and {held_out} held out"
+
+    def _rows(self) -> list[Row]:
+        declared = (*self.stiffness, *self.damping, *self.elements)
+        filtered = "none"
+        if self.filter is not None:
+            by = "test rig" if self.filter.applied else "reader"
+            filtered = (
+                f"{self.filter.kind} of order {self.filter.order}, {self.filter.cutoff_hz:g} Hz, by the {by}"
+            )
+        return [
+            Row("mass", f"{number(self.mass)} kg, {'to be identified' if self.mass_free else 'as declared'}"),
+            Row("input", f"{self.input.quantity.replace('_', ' ')}, column {self.input.column}"),
+            Row("output", f"{self.output.quantity}, column {self.output.column}"),
+            *(
+                []
+                if self.floor is None
+                else [Row("floor", f"{self.floor.quantity}, column {self.floor.column}")]
+            ),
+            Row("filter", filtered),
+            Row("rate", f"{number(self.rate)} Hz"),
+            Row("model", listed(declared, 20)),
+            Row("file", str(self.file)),
+        ]
+
+    def _lines(self) -> list[str]:
+        first = self.records[:_LISTED]
+        more = len(self.records) - len(first)
+        return [f"  {headline(record)}" for record in first] + (
+            [f"  and {more} records more"] if more else []
+        )

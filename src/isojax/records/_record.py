@@ -8,6 +8,8 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from jaxtyping import Float
 
+from .._show import Row, number, shown
+
 _Answer = TypeVar("_Answer")
 
 Direction = Literal["forward", "backward", "none"]
@@ -15,6 +17,7 @@ Role = Literal["fit", "holdout"]
 ExcitationKind = Literal["stepped_sine", "periodic", "swept", "free_decay", "impulse", "broadband"]
 
 
+@shown
 @dataclass(frozen=True)
 class Dwell:
     """A segment of a stepped sine at one frequency.
@@ -31,7 +34,13 @@ class Dwell:
     frequency: float
     cycles: float
 
+    def _headline(self) -> str:
+        return (
+            f"{number(self.frequency)} Hz, {number(self.cycles)} cycles, samples {self.start} to {self.stop}"
+        )
 
+
+@shown
 @dataclass(frozen=True, eq=False)
 class Record:
     """One measurement on a uniform time grid.
@@ -98,3 +107,16 @@ class Record:
         length = self.period or self.output.size + 1
         count = max(self.output.size - self.settle, 0) // length
         return self.output[self.output.size - count * length :].reshape(count, length)
+
+    def _headline(self) -> str:
+        kind = self.kind.replace("_", " ")
+        length = f"{number(self.output.size / self.rate)} s at {number(self.rate)} Hz"
+        role = "to fit" if self.role == "fit" else "held out"
+        return f"{self.name}: {kind}, {self.output.size} samples, {length}, {role}"
+
+    def _rows(self) -> list[str | Row]:
+        met = [dwell.frequency for dwell in self.dwells]
+        span = f"{len(met)}, {number(min(met))} to {number(max(met))} Hz" if met else "none"
+        optional = ("level", "repeat", "period", "floor")
+        given = [name for name in optional if getattr(self, name) is not None]
+        return ["input", "output", Row("dwells", span), "direction", "settle", *given, "file"]

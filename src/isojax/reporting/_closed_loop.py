@@ -6,13 +6,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
+from .._show import Row, shown
 from ..health import CampaignHealth, campaign_health
-from ..identification import DEFAULT_SOLVER, ClassicalGuess, Finding, Fit, Loop, Rules, silent
+from ..identification import DEFAULT_SOLVER, ClassicalGuess, Extension, Finding, Fit, Loop, Rules, silent
 from ..identification import close_loop as find_loop
+from ..models import Isolator
 from ..records import Campaign
 from .page import loop_summary, render_text, write_report
+from .plots import plot_time_history
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class ClosedLoop:
     """From records to a model that explains them, or to the admission that it does not.
@@ -79,9 +85,40 @@ class ClosedLoop:
         """Give the summary that the terminal shows."""
         return render_text(loop_summary(self.loop))
 
+    def _headline(self) -> str:
+        # Not the headline of the report: that asks held-out records, which may have to be simulated first.
+        return self.loop._headline()
+
+    def _rows(self) -> list[Row]:
+        return self.after.parameters._rows()
+
+    def _lines(self) -> list[str]:
+        return ["  print(loop) gives the summary, loop.report(folder) writes the report"]
+
+    @property
+    def model(self) -> Isolator:
+        """The isolator of the last fit."""
+        return self.after.model
+
+    @property
+    def extensions(self) -> tuple[Extension, ...]:
+        """Each effect that was added, with the fits before and after, in the order of discovery."""
+        return self.loop.extensions
+
+    def plot(self, **options: Any) -> Figure:
+        """Draw the record that the declared model explains worst, with free runs before and after.
+
+        Args:
+            **options: of `isojax.plot.time_history`.
+
+        Returns:
+            The figure, shown nowhere.
+        """
+        return plot_time_history(self.before, self.after, **options)
+
 
 def close_loop(
-    campaign: Campaign,
+    campaign: Campaign | str | Path,
     *,
     max_iterations: int = 3,
     excluded: tuple[str, ...] = (),
@@ -92,7 +129,7 @@ def close_loop(
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 
     Args:
-        campaign: the measurements.
+        campaign: the measurements, or the path of their campaign.toml or its folder.
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.

@@ -8,7 +8,18 @@ import numpy as np
 from ..._results import RESULTS
 from ...elements import CATALOGUE, AbstractElement
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, MOST_EVALUATIONS, Fit, Search, complete, lack_of_fit, search_of, silent
+from ..fitting import (
+    DEFAULT_SOLVER,
+    MOST_EVALUATIONS,
+    Fit,
+    Fitted,
+    Search,
+    as_fit,
+    complete,
+    lack_of_fit,
+    search_of,
+    silent,
+)
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, smallest_inflation
@@ -39,7 +50,7 @@ def is_locked(fit: Fit, rules: Rules) -> bool:
 
 
 def diagnose(
-    fit: Fit,
+    fit: Fit | Fitted,
     *,
     significance: float | None = None,
     excluded: tuple[str, ...] = (),
@@ -71,6 +82,7 @@ def diagnose(
         >>> verdict.verdict, verdict.finding.effect
         ('found', 'coulomb_friction')
     """
+    fit = as_fit(fit)
     search = search_of(fit.campaign, rules, solver, progress, max_steps)
     return diagnose_with(search, fit, significance, excluded)
 

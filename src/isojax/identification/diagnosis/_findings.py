@@ -2,6 +2,8 @@
 
 from typing import Literal, NamedTuple
 
+from ..._quantities import typeset_p_value
+from ..._show import Row, amount, shown
 from ...elements import AbstractElement
 from ...models import Isolator
 from ..fitting import Estimate, Fit
@@ -9,7 +11,11 @@ from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
 
+_LISTED = 8
+"""Candidates of a ranking that are shown."""
 
+
+@shown
 class Candidate(NamedTuple):
     """One absent effect, as the evidence ranks it.
 
@@ -42,7 +48,17 @@ class Candidate(NamedTuple):
     likeness: float
     admissible: bool
 
+    def _headline(self) -> str:
+        likely = "" if self.admissible else ", not physical"
+        return f"{self.effect}, z = {self.z:.3g}, p {_chance(self.p_value)}, {self.strength_words}{likely}"
 
+    @property
+    def strength_words(self) -> str:
+        """Strength with standard error and unit."""
+        return amount(self.strength, self.unit, self.strength_error)
+
+
+@shown
 class Finding(NamedTuple):
     """An effect that the model lacked.
 
@@ -68,7 +84,19 @@ class Finding(NamedTuple):
     rivals: tuple[AbstractElement, ...] = ()
     separation: Separation | None = None
 
+    def _headline(self) -> str:
+        others = f", or {' or '.join(self.indistinguishable)}" if self.indistinguishable else ""
+        return f"{self.effect}{others}, explains {100.0 * self.excess_explained:.3g} % of the excess"
 
+    def _rows(self) -> list[str | Row]:
+        first = ["p_value", "excess_explained", "transfer"]
+        return [*first, *_ranked(self.ranking)]
+
+    def _lines(self) -> list[str]:
+        return [f"  {self.separating_experiment}"] if self.separating_experiment else []
+
+
+@shown
 class Verdict(NamedTuple):
     """What the residual of a fit says.
 
@@ -101,7 +129,23 @@ class Verdict(NamedTuple):
         """The equations of the fit with the effect; None where nothing was found."""
         return None if self.after is None else self.after.estimate
 
+    def _headline(self) -> str:
+        named = "" if self.finding is None else f" ({self.finding.effect})"
+        return f"{self.verdict.replace('_', ' ')}{named}. {self.reason}"
 
+    def _rows(self) -> list[Row]:
+        return _ranked(self.ranking)
+
+    def _lines(self) -> list[str]:
+        lines = []
+        if self.indistinguishable:
+            lines.append(f"  these data do not distinguish it from: {', '.join(self.indistinguishable)}")
+        if self.hidden:
+            lines.append(f"  these data cannot show: {', '.join(self.hidden)}")
+        return lines
+
+
+@shown
 class Extension(NamedTuple):
     """A model before and after an effect was added.
 
@@ -120,6 +164,20 @@ class Extension(NamedTuple):
         """The fit with the effect."""
         return self.fit
 
+    def _headline(self) -> str:
+        finding = self.verdict.finding
+        before, after = (f"{one.stats.chi2 / one.stats.dof:.4g}" for one in (self.before, self.fit))
+        added = "nothing" if finding is None else finding.effect
+        return f"{added} added, χ²/dof {before} before and {after} after"
+
+    def _rows(self) -> list[Row]:
+        return self.fit.parameters._rows()
+
+    @property
+    def model(self) -> Isolator:
+        """The isolator of the last fit."""
+        return self.fit.model
+
 
 def findings_in(model: Isolator, extensions: tuple[Extension, ...]) -> tuple[Finding, ...]:
     """List what was found and is part of a model.
@@ -133,3 +191,17 @@ def findings_in(model: Isolator, extensions: tuple[Extension, ...]) -> tuple[Fin
     """
     found = (step.verdict.finding for step in extensions)
     return tuple(one for one in found if one is not None and model.element(one.effect) is not None)
+
+
+def _chance(p_value: float) -> str:
+    """Give a chance with the sign before it: "= 0.03", "< 10⁻⁶"."""
+    words = typeset_p_value(p_value)
+    return words if words.startswith("<") else f"= {words}"
+
+
+def _ranked(ranking: tuple[Candidate, ...]) -> list[Row]:
+    """Give the best candidates, a row each."""
+    return [
+        Row(one.effect, f"z = {one.z:.3g}, p {_chance(one.p_value)}, {one.strength_words}", one.words)
+        for one in ranking[:_LISTED]
+    ]

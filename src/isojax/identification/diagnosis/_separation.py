@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import Row, number, shown
 from ...elements import CATALOGUE
 from ...models import Quantity
 
@@ -12,6 +13,7 @@ AGAIN = "again"
 """Name of the yardstick: the campaign once more."""
 
 
+@shown
 class Experiment(NamedTuple):
     """A test that could be made.
 
@@ -42,7 +44,11 @@ class Experiment(NamedTuple):
         """Measuring time of one period of all records [s]."""
         return self.drive.size / self.rate
 
+    def _headline(self) -> str:
+        return f"{self.words}, {number(self.seconds)} s"
 
+
+@shown
 class Prospect(NamedTuple):
     """What an experiment promises.
 
@@ -73,7 +79,11 @@ class Prospect(NamedTuple):
         """
         return sum(gain >= needed for gain in self.gains)
 
+    def _headline(self) -> str:
+        return f"{self.experiment.words}: {self.reason or f'expected chi2 {number(self.gain)}'}"
 
+
+@shown
 class Separation(NamedTuple):
     """Which test separates a finding from its look-alikes.
 
@@ -135,6 +145,15 @@ class Separation(NamedTuple):
             return numbers[0]
         named = zip(numbers, self.others, strict=True)
         return ", ".join(f"{number} from {CATALOGUE[name].words}" for number, name in named)
+
+    def _headline(self) -> str:
+        return self.words or "no test could be simulated"
+
+    def _rows(self) -> list[Row]:
+        return [
+            Row(one.experiment.name, one.reason or f"expected chi2 {number(one.gain)}", one.experiment.words)
+            for one in self.prospects
+        ]
 
 
 def rank_prospects(prospects: tuple[Prospect, ...], needed: float) -> tuple[Prospect, ...]:

@@ -1,6 +1,6 @@
 """The experiment that separates a finding from its look-alikes, found by simulation with the fitted model."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -41,8 +41,18 @@ class _Question(NamedTuple):
     strength: float
 
 
+@runtime_checkable
+class Extended(Protocol):
+    """Whatever holds extensions: a closed loop."""
+
+    @property
+    def extensions(self) -> tuple[Extension, ...]:
+        """Each effect that was added, in the order of discovery."""
+        ...
+
+
 def find_separating_experiment(
-    extension: Extension, *, seconds: float | None = None, rules: Rules = Rules()
+    extension: Extension | Extended, *, seconds: float | None = None, rules: Rules = Rules()
 ) -> Separation:
     """Find the test that separates a finding from its look-alikes.
 
@@ -53,7 +63,8 @@ def find_separating_experiment(
     expected chi2, per max(chi2/dof, 1) of the fit. Shapes of A and B stay as they were refitted.
 
     Args:
-        extension: a model before and after the finding, such as one of `close_loop(campaign).extensions`.
+        extension: a model before and after the finding, such as one of `close_loop(campaign).extensions`; of
+            a closed loop the last.
         seconds: measuring time of the new test [s]; that of the campaign if omitted.
         rules: the evidence that separates two effects.
 
@@ -72,6 +83,7 @@ def find_separating_experiment(
         >>> ij.find_separating_experiment(better).others
         ()
     """
+    extension = _last_extension(extension)
     finding = extension.verdict.finding
     if finding is None:
         raise ValueError("Argument `extension` must hold a finding, but its verdict names no effect.")
@@ -122,6 +134,17 @@ def find_separating_experiment(
             else Prospect(experiment, (), "the motion diverges")
         )
     return nothing._replace(prospects=rank_prospects(tuple(prospects), needed))
+
+
+def _last_extension(given: Extension | Extended) -> Extension:
+    """Give the extension that is meant: of a loop the last."""
+    last = (None, *given.extensions)[-1] if isinstance(given, Extended) else given
+    if not isinstance(last, Extension):
+        raise ValueError(
+            "Argument `extension` must be an extension, such as `extend` gives it, or a loop that added an "
+            f"effect, but is of type {type(given).__name__}."
+        )
+    return last
 
 
 def with_separating_experiment(extension: Extension, rules: Rules = Rules()) -> Extension:

@@ -6,6 +6,10 @@ then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equatio
 What follows the search is in `_evaluation`, `_errors`, `_covariance` and `_fit_result`.
 """
 
+from ._as_fit import Fitted as Fitted
+from ._as_fit import as_fit as as_fit
+from ._coefficients import Coefficient as Coefficient
+from ._coefficients import Coefficients as Coefficients
 from ._covariance import Uncertainty as Uncertainty
 from ._covariance import uncertainty as uncertainty
 from ._drift_budget import DriftBudget as DriftBudget
@@ -22,7 +26,6 @@ from ._estimate import estimate as estimate
 from ._fit import complete as complete
 from ._fit import fit as fit
 from ._fit_result import Fit as Fit
-from ._fit_result import Statistics as Statistics
 from ._initial_states import best_nuisances as best_nuisances
 from ._lack_of_fit import LackOfFit as LackOfFit
 from ._lack_of_fit import lack_of_fit as lack_of_fit
@@ -34,6 +37,9 @@ from ._problem import Problem as Problem
 from ._problem import one_hot as one_hot
 from ._residual import Residual as Residual
 from ._residual import residual as residual
+from ._saved_fit import SavedFit as SavedFit
+from ._saved_fit import Statistics as Statistics
+from ._saved_fit import load_fit as load_fit
 from ._search import DEFAULT_SOLVER as DEFAULT_SOLVER
 from ._search import MOST_EVALUATIONS as MOST_EVALUATIONS
 from ._search import ROUGH as ROUGH

@@ -20,6 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ..._show import shown
+
 SMALLEST_EIGENVALUE = 1e-11
 """Relative eigenvalue of the scaled information below which a combination counts as undetermined.
 
@@ -28,6 +30,7 @@ margin.
 """
 
 
+@shown
 class Uncertainty(NamedTuple):
     """Error bars.
 

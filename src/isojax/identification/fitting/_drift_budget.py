@@ -7,11 +7,14 @@ from jaxtyping import Float, Int
 
 from ..._parameters import list_parameters
 from ..._results import is_successful
+from ..._show import Row, amount, number, shown
 from ..jacobian import STIFFNESS_SCALE_UNIT, has_stiffness_scale
+from ._as_fit import Fitted, as_fit
 from ._elimination import Reduced, Spread
 from ._fit_result import Fit
 
 
+@shown
 class Share(NamedTuple):
     """What limits one coefficient.
 
@@ -34,7 +37,11 @@ class Share(NamedTuple):
     repeatability: float
     if_ignored: float
 
+    def _headline(self) -> str:
+        return f"{self.name}, {amount(self.value, self.unit, self.standard_error)}"
 
+
+@shown
 class DriftBudget(NamedTuple):
     """How far the scatter of the linear stiffness limits a fit.
 
@@ -60,8 +67,21 @@ class DriftBudget(NamedTuple):
         """
         return next((share for share in self.shares if share.name == name), None)
 
+    def _headline(self) -> str:
+        return f"the linear stiffness scatters by {100.0 * self.scatter:.2g} % between records"
 
-def drift_budget(fit: Fit) -> DriftBudget:
+    def _rows(self) -> list[Row]:
+        return [
+            Row(
+                one.name,
+                amount(one.value, one.unit, one.standard_error),
+                f"noise {number(one.noise)}, repeatability {number(one.repeatability)}",
+            )
+            for one in self.shares
+        ]
+
+
+def drift_budget(fit: Fit | Fitted) -> DriftBudget:
     """Split the error bars of a fit into noise and repeatability.
 
     The fit holds each record's stiffness scale for one draw of a normal law, whose standard deviation repeats
@@ -74,6 +94,7 @@ def drift_budget(fit: Fit) -> DriftBudget:
     Returns:
         The budget.
     """
+    fit = as_fit(fit)
     found = fit.estimate
     single = len(found.problem.records) < 2
     if single or not is_successful(fit.result) or not has_stiffness_scale(fit.model):

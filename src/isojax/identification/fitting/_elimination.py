@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
+from ..._show import shown
 from ..jacobian import STIFFNESS_SCALE_UNIT
 
 
+@shown
 class Spread(NamedTuple):
     """Standard deviations of the linear stiffness, which are the priors of its deviations.
 
@@ -25,6 +27,7 @@ class Spread(NamedTuple):
     segments: float = 0.0
 
 
+@shown
 class Nuisances(NamedTuple):
     """Where the nuisances stand, and their priors.
 
@@ -57,6 +60,7 @@ class Nuisances(NamedTuple):
         return 1.0 + STIFFNESS_SCALE_UNIT * (self.stiffness[owner] + self.segments)
 
 
+@shown
 class Reduced(NamedTuple):
     """Normal equations of the coefficients alone, and the way back to the nuisances.
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import number, shown
 from ...models import Isolator
 from ...records import Record
 from ..jacobian import STIFFNESS_SCALE_UNIT, Segment, readings
@@ -14,6 +15,7 @@ from ._problem import Point, Problem, stiffness_deviation
 from ._simulator import Simulator
 
 
+@shown
 class Errors(NamedTuple):
     """Errors of one role's records.
 
@@ -31,7 +33,12 @@ class Errors(NamedTuple):
     chi2_per_dof: float
     dof: float
 
+    def _headline(self) -> str:
+        shares = f"NRMSE {100.0 * self.nrmse:.3g} %, restarted {100.0 * self.nrmse_segments:.3g} %"
+        return f"free run {shares}, χ²/dof {self.chi2_per_dof:.4g}"
 
+
+@shown
 class Run(NamedTuple):
     """One record against its simulation.
 
@@ -50,7 +57,11 @@ class Run(NamedTuple):
         """Measured less simulated [SI unit of the output]; 0 where a sample does not count."""
         return np.where(self.counted > 0.0, self.record.output - self.simulated, 0.0)
 
+    def _headline(self) -> str:
+        return f"{self.record.name}, residual {number(float(np.sqrt(np.mean(self.residual**2))))} rms"
 
+
+@shown
 class Restarts(NamedTuple):
     """Records with every segment restarted from its own best initial state.
 

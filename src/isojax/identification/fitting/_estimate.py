@@ -10,6 +10,7 @@ from jaxtyping import Array
 
 from ..._parameters import Parameter, list_parameters, replace_parameters
 from ..._results import RESULTS, is_successful
+from ..._show import shown
 from ...elements import Scales
 from ...excitations import Hold
 from ...models import Isolator
@@ -29,6 +30,7 @@ FIRST_SCATTER = 1e-2
 """Standard deviation of the linear stiffness between records before they show one [relative]: the prior."""
 
 
+@shown
 class Estimate(NamedTuple):
     """Fitted coefficients and what is known of them.
 

@@ -107,3 +107,8 @@ class Evaluation:
             "fit": summarise(self.free_runs, self.restarts, "fit", len(self._found.places)),
             "holdout": summarise(self.free_runs, self.restarts, "holdout", 0),
         }
+
+    @property
+    def known_errors(self) -> dict[str, Errors | None] | None:
+        """The errors where they have been asked for; None where they would have to be computed."""
+        return vars(self).get("errors")

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,21 +10,23 @@ import numpy as np
 from ..._parameters import element_names, list_parameters, replace_parameters
 from ..._results import RESULTS
 from ..._types import check_float64
-from ...models import Integrator, Isolator, check_integrator
+from ...models import Integrator, Isolator, Modelled, as_isolator, check_integrator
 from ...records import Campaign, NoiseEstimate, estimate_noise
 from .._rules import Rules
+from ..guess import as_campaign, classical_guess
 from ._build_problem import build_problem
 from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
-from ._fit_result import Fit, Statistics
+from ._fit_result import Fit
 from ._integration_steps import find_integrator
+from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, search_of, silent
 from ._simulator import Simulator
 
 
 def fit(
-    model: Isolator,
-    campaign: Campaign,
+    model: Isolator | Modelled | Campaign | str | Path,
+    campaign: Campaign | str | Path | None = None,
     *,
     free: tuple[str, ...] | None = None,
     fixed: tuple[str, ...] = (),
@@ -40,8 +43,9 @@ def fit(
     record to record by as much as repeats show; both are eliminated before optimistix sees the residual.
 
     Args:
-        model: start, such as `classical_guess(campaign).model`.
-        campaign: the measurements.
+        model: start, such as `classical_guess(campaign)` or its `.model`; a campaign by itself, or its path,
+            is fitted from its classical guess.
+        campaign: the measurements, or the path of their campaign.toml or its folder.
         free: names of the coefficients to fit, and no others; all fitted kinds (and the mass, where the
             campaign frees it) if omitted.
         fixed: names of coefficients to hold.
@@ -69,8 +73,14 @@ def fit(
         >>> fitted = ij.fit(guess.model, campaign)
         >>> print(f"{float(fitted.model['linear_stiffness.coefficient']):.2g} N/m, nrmse {fitted.nrmse:.2f}")
         1.1e+06 N/m, nrmse 0.22
+        >>> fitted.parameters["k1"].unit, fitted.parameters["k1"].standard_error < 1e4
+        ('N/m', True)
     """
     check_float64()
+    if campaign is None and isinstance(model, Campaign | str | Path):
+        campaign = as_campaign(model)
+        model = classical_guess(campaign)
+    campaign, model = as_campaign(campaign), as_isolator(model)
     if integrator is not None:
         check_integrator(integrator)
     places = free_places(model, fixed, free, campaign.mass_free)

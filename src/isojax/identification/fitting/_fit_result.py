@@ -1,19 +1,26 @@
 """What a fit gives, and its report as text in the layout that users of lmfit know."""
 
 import math
-from typing import NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from ..._parameters import Parameter, list_parameters
-from ..._results import RESULTS, is_successful
+from ..._results import RESULTS, is_successful, name_of_result
+from ..._show import Row, shown
 from ...models import Isolator
 from ...records import Campaign, NoiseEstimate, brief_blows
+from ._coefficients import Coefficient, Coefficients
 from ._errors import Errors, Restarts, Run
 from ._estimate import Estimate
 from ._evaluation import Evaluation
 from ._output_units import OUTPUT_UNITS, plain_unit
+from ._saved_fit import SavedFit, Statistics, fit_words, save_fit, to_dataframe
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _ROLES = {"fit": "fitted", "holdout": "held out"}
 _STRONG = 0.9
@@ -23,35 +30,7 @@ _UNMOVED = 1e-12
 """A coefficient that changed by less than this share of itself never moved."""
 
 
-class Statistics(NamedTuple):
-    """Counts and criteria of a fit.
-
-    Attributes:
-        samples: samples that count, filtered noise counted by its independent samples.
-        coefficients: free coefficients.
-        chi2: squared whitened residual after the nuisances.
-        dof: samples less nuisances less coefficients.
-        aic: Akaike's criterion, chi2 + 2 coefficients.
-        bic: Schwarz's criterion, chi2 + coefficients ln(samples).
-        steps: simulations with derivatives that the search took.
-        stiffness_scatter: standard deviation of the linear stiffness between records [relative].
-        segment_scatter: the same between the segments of a record; 0 where no repeat shows one.
-        integration_error: rms change of the readings when the integration steps are halved, over the noise;
-            NaN where the steps were given.
-    """
-
-    samples: int
-    coefficients: int
-    chi2: float
-    dof: float
-    aic: float
-    bic: float
-    steps: int
-    stiffness_scatter: float
-    segment_scatter: float
-    integration_error: float
-
-
+@shown
 class Fit(NamedTuple):
     """A fitted model, its error bars and its errors.
 
@@ -109,6 +88,79 @@ class Fit(NamedTuple):
     def integration(self) -> str:
         """What integrated the records: the solver with its steps or tolerances."""
         return self.estimate.problem.integrator.words(self.model)
+
+    @property
+    def parameters(self) -> Coefficients:
+        """The coefficients by full name or symbol: `fit.parameters["k1"].standard_error`."""
+        start = {entry.name: float(entry.value) for entry in list_parameters(self.start)}
+        errors, found = self.standard_errors, name_of_result(self.result) == "successful"
+        return Coefficients(
+            tuple(
+                Coefficient(
+                    entry.name,
+                    entry.spec.symbol,
+                    float(entry.value) if found or entry.name not in errors else math.nan,
+                    errors.get(entry.name, math.nan),
+                    plain_unit(entry.spec.unit, self.campaign),
+                    start.get(entry.name, math.nan),
+                    entry.name in errors,
+                )
+                for entry in list_parameters(self.model)
+            )
+        )
+
+    @property
+    def saved(self) -> SavedFit:
+        """The numbers of the fit, without the measurements."""
+        return SavedFit(
+            self.campaign.title,
+            self.model,
+            self.start,
+            self.free,
+            self.parameters,
+            self.covariance,
+            self.stats,
+            self.noise,
+            self.errors,
+            self.result,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give the fit as plain numbers, words, lists and dictionaries, as `save` writes them."""
+        return self.saved.to_dict()
+
+    def to_dataframe(self) -> "pd.DataFrame":
+        """Give the coefficients as a pandas table: a row each, by full name."""
+        return to_dataframe(self.parameters)
+
+    def save(self, path: str | Path) -> None:
+        """Write model, start, coefficients, covariance, statistics, noise and errors; `load_fit` reads them.
+
+        The file is written whole or not at all. The campaign with its records, the residuals and the
+        equations of the search (`campaign`, `estimate`, `evaluation`) are not saved.
+
+        Args:
+            path: the JSON file to write; its folder must exist.
+
+        Raises:
+            ValueError: if a number of the model is not finite.
+        """
+        save_fit(self.saved, path)
+
+    def _headline(self) -> str:
+        return f"{self.campaign.title}, {fit_words(self.stats, self.parameters, self.result)}"
+
+    def _rows(self) -> list[Row]:
+        return self.parameters._rows()
+
+    def _lines(self) -> list[str]:
+        known = self.evaluation.known_errors or {}
+        said = [
+            f"  {_ROLES[role]}: free-run NRMSE {100 * one.nrmse:.3g} %, χ²/dof {one.chi2_per_dof:.4g}"
+            for role, one in known.items()
+            if one is not None
+        ]
+        return [*said, "  print(fit) gives the report with statistics, correlations and warnings"]
 
     def __str__(self) -> str:
         """Give the fit report."""

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import signal, stats
 
+from ..._show import shown
 from ...records import Record
 from ._errors import Run
 from ._fit_result import Fit
@@ -28,6 +29,7 @@ _HIGHEST = 0.4
 """Highest frequency, over the sampling rate: above it anti-alias filters work."""
 
 
+@shown
 class LackOfFit(NamedTuple):
     """Power of a residual at the harmonics of the drive, against the power of the lines beside them.
 

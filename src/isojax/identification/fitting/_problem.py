@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._parameters import list_parameters
+from ..._show import shown
 from ...excitations import Hold
 from ...models import Integrator, Isolator, Quantity
 from ...records import Record
@@ -14,6 +15,7 @@ from ..jacobian import STIFFNESS_SCALE_UNIT, Segment
 from ._elimination import Nuisances, Reduced
 
 
+@shown
 class Problem(NamedTuple):
     """Records cut into segments, and the noise against which errors are held.
 
@@ -41,6 +43,7 @@ class Problem(NamedTuple):
     share: float = 1.0
 
 
+@shown
 class Point(NamedTuple):
     """A model with the nuisances that belong to it, and the equations there.
 

@@ -6,11 +6,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy import signal, stats
 
+from ..._show import Row, number, shown
+from ._as_fit import Fitted, as_fit
 from ._fit_result import Fit
 
 MOST_LAGS = 25
 
 
+@shown
 class Residual(NamedTuple):
     """What a fitted model leaves of its records.
 
@@ -33,6 +36,22 @@ class Residual(NamedTuple):
     cross_correlation: Float[np.ndarray, "record lag"]
     band: Float[np.ndarray, " record"]
 
+    def _headline(self) -> str:
+        inside = 100.0 * float(np.mean(self.whiteness))
+        return f"{len(self.values)} records, {inside:.3g} % of the lags within the band of white noise (99 %)"
+
+    def _rows(self) -> list[str | Row]:
+        return [
+            "noise_floor",
+            *(
+                Row(
+                    f"values[{place}]",
+                    f"{number(float(np.sqrt(np.mean(one**2))))} rms, {100.0 * white:.3g} % inside",
+                )
+                for place, (one, white) in enumerate(zip(self.values, self.whiteness, strict=True))
+            ),
+        ]
+
 
 def _correlate(
     first: Float[np.ndarray, " time"], second: Float[np.ndarray, " time"]
@@ -46,7 +65,7 @@ def _correlate(
     return window / size if size > 0.0 else np.zeros_like(window)
 
 
-def residual(fit: Fit) -> Residual:
+def residual(fit: Fit | Fitted) -> Residual:
     """Give what a fit leaves of its records, every segment restarted from its own best state.
 
     Args:
@@ -63,6 +82,7 @@ def residual(fit: Fit) -> Residual:
         >>> print(f"{ij.residual(fitted).whiteness.mean():.1f} of the lags inside")
         0.0 of the lags inside
     """
+    fit = as_fit(fit)
     runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
     lags = np.arange(-MOST_LAGS, MOST_LAGS + 1, dtype=float)
     values, own, cross, band, white = [], [], [], [], []

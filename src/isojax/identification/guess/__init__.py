@@ -24,5 +24,6 @@ from ._motion import is_absolute as is_absolute
 from ._motion import measured_motion as measured_motion
 from ._paper_table import PaperTable as PaperTable
 from ._paper_table import paper_table as paper_table
+from ._read_campaign import as_campaign as as_campaign
 from ._read_campaign import read_campaign as read_campaign
 from ._scales import scales as scales

@@ -5,7 +5,10 @@ import dataclasses
 import numpy as np
 from jaxtyping import Complex, Float
 
+from ..._show import shown
 
+
+@shown
 @dataclasses.dataclass(frozen=True)
 class CircleFit:
     """Circle through the mobility of one resonance.

@@ -1,9 +1,11 @@
 """The start of every identification: classical analysis of the records, without a simulation."""
 
 import dataclasses
+from pathlib import Path
 from typing import Literal
 
 from ..._parameters import list_parameters
+from ..._show import Row, amount, shown
 from ..._types import check_float64
 from ...models import Isolator
 from ...records import Campaign
@@ -13,6 +15,7 @@ from ._linear_response import LinearResponse
 from ._logarithmic_decrement import Decrement
 from ._measured_receptance import MeasuredResponse, measured_receptance
 from ._paper_table import PaperTable, paper_table
+from ._read_campaign import as_campaign
 from ._sensor_offset_start import with_sensor_zero
 from ._start_coefficients import start_from_dwells, start_from_time
 
@@ -20,6 +23,7 @@ _HARDLY_BALANCED = 0.7
 """Share of the force left unbalanced above which the reader is asked to check sign, unit, timing and mass."""
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class ClassicalGuess:
     """The result of classical analysis of a campaign.
@@ -53,6 +57,25 @@ class ClassicalGuess:
     def paper_model(self) -> Isolator | None:
         """The isolator of the paper's own route, averaged over sweep directions; None if it gives none."""
         return None if self.table is None else self.table.model
+
+    def _headline(self) -> str:
+        how = "harmonic balance of all dwells" if self.route == "all_dwells" else "force balance in time"
+        return f"start values by {how}, which leave {100.0 * self.unexplained:.3g} % of the force unbalanced"
+
+    def _rows(self) -> list[Row]:
+        return [
+            Row(
+                one.name,
+                amount(one.value, one.spec.unit),
+                f"{one.spec.symbol}; the paper's route {100.0 * self.bias[one.name]:+.3g} %"
+                if one.name in self.bias
+                else one.spec.symbol,
+            )
+            for one in self.model.parameters
+        ]
+
+    def _lines(self) -> list[str]:
+        return [f"  {note}" for note in self.notes]
 
 
 def _bias(paper: Isolator | None, model: Isolator) -> dict[str, float]:
@@ -94,7 +117,7 @@ def _cautions(
 
 
 def classical_guess(
-    campaign: Campaign,
+    campaign: Campaign | str | Path,
     *,
     damping: Literal["half_power", "circle"] = "half_power",
     resonance: Literal["peak", "phase"] = "peak",
@@ -106,7 +129,8 @@ def classical_guess(
     elements of the campaign (`elements = [...]`) start absent.
 
     Args:
-        campaign: the campaign; only records with role "fit" are used.
+        campaign: the campaign, or the path of its campaign.toml or its folder; only records with role "fit"
+            are used.
         damping: where the paper's route takes its damping ratio from.
         resonance: which resonance the paper's route takes.
 
@@ -125,6 +149,7 @@ def classical_guess(
         ['linear_stiffness', 'cubic_stiffness', 'linear_damping']
     """
     check_float64()
+    campaign = as_campaign(campaign)
     base = base_model(campaign)
     names = declared_names(campaign, extra=False)
     mass_free = campaign.mass_free and not campaign.input.gain_free

@@ -6,12 +6,14 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import shown
 from ._circle_fit import CircleFit, fit_circle
 from ._equivalent_coefficients import invert_equivalent
 from ._half_power import HalfPower, find_half_power, find_jumps, find_phase_resonance
 from ._measured_receptance import MeasuredResponse
 
 
+@shown
 @dataclasses.dataclass(frozen=True)
 class Resonance:
     """Equivalent stiffness and damping of one record at its resonance.
@@ -91,6 +93,7 @@ def find_resonance(
     )
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class EquivalentLaw:
     """Equivalent stiffness or damping as polynomials of the amplitude, by sweep direction, and their average.

@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from ..._show import shown
+
 _POINTS_A_GAP = 256
 """Points between two lines of the interpolated curve."""
 
@@ -17,6 +19,7 @@ _OVERSHOOT = 0.5
 """A cubic through 1/|H|^2 that falls below this share of its smallest value is replaced by a monotone one."""
 
 
+@shown
 @dataclasses.dataclass(frozen=True)
 class HalfPower:
     """Peak, half-power points and damping ratio of one receptance.

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy import signal
 
+from ..._show import shown
 from ...records import Record
 from ._circle_fit import CircleFit, fit_circle
 from ._motion import Motion
@@ -14,6 +15,7 @@ _DRIVEN = 1e-3
 """Power density of the drive, over its largest, below which a line is not driven."""
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinearResponse:
     """Best linear receptance of one record.

@@ -6,6 +6,8 @@ import itertools
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import shown
+
 _FEWEST_HALF_CYCLES = 3
 """Half cycles without which no decrement is estimated."""
 
@@ -13,6 +15,7 @@ _LAST_FIFTH = 5
 """The mean of the last fifth of a decay is taken for the position at rest."""
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class Decrement:
     """Amplitude and frequency of a free decay, by half cycle, and its damping ratio.

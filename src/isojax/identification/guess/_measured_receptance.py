@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Complex, Float
 
+from ..._show import shown
 from ...records import TIME_DERIVATIVES, Campaign, Record, dwell_harmonics
 from ._motion import is_absolute
 
@@ -18,6 +19,7 @@ UNSTEADY_NOISE = 6.0
 """Times the median of what all dwells leave, which is noise, that a steady dwell may leave as well."""
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class MeasuredResponse:
     """Harmonics of one stepped-sine record, dwell by dwell in order of frequency.

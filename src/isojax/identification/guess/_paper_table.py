@@ -7,12 +7,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ... import elements
+from ..._show import shown
 from ...models import Isolator
 from ._equivalent_law import EquivalentLaw, Resonance, find_resonance, fit_equivalent_law
 from ._measured_receptance import MeasuredResponse
 from ._physical_fit import unphysical_side
 
 
+@shown
 @dataclasses.dataclass(frozen=True, eq=False)
 class PaperTable:
     """Resonances of the records and the laws that follow from them.

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._show import shown
 from ...models import Instant, Isolator
 from ...records import Record
 
@@ -21,6 +22,7 @@ SHORTEST = 8
 """Samples below which a piece of a record says nothing."""
 
 
+@shown
 class Segment(NamedTuple):
     """A piece of a record that is simulated from a state of its own.
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Complex, Float
 
+from ..._show import number, shown
 from ...records import Dwell
 from ...records.spectrum import fit_harmonics, settled_window
 from ..fitting import Fit
@@ -15,6 +16,7 @@ HARMONICS = 7
 _PHASES = 128
 
 
+@shown
 class DwellRemainder(NamedTuple):
     """Force residual of one dwell.
 
@@ -50,6 +52,9 @@ class DwellRemainder(NamedTuple):
     def force(self) -> Float[np.ndarray, " phase"]:
         """Force residual over one cycle, as `displacement` [N]."""
         return _waveform(self.harmonics)
+
+    def _headline(self) -> str:
+        return f"{self.record} at {number(self.frequency)} Hz, χ²/dof {self.chi2_per_dof:.4g}"
 
 
 def _waveform(harmonics: Complex[np.ndarray, " harmonic"]) -> Float[np.ndarray, " phase"]:

@@ -10,6 +10,7 @@ from scipy import stats
 
 from ..._parameters import list_parameters, replace_parameters
 from ..._results import is_successful
+from ..._show import Row, amount, shown
 from ...models import Isolator
 from .._rules import Rules
 from ..diagnosis import Projection, project, refit_from
@@ -21,6 +22,7 @@ SMALLEST_LAW = 0.03
 one may fall short and still be selected. `benchmarks/remainder.py` counts the right decisions."""
 
 
+@shown
 class PursuedLaw(NamedTuple):
     """One selected law.
 
@@ -46,7 +48,11 @@ class PursuedLaw(NamedTuple):
     share: float
     alike: tuple[str, ...]
 
+    def _headline(self) -> str:
+        return f"{self.formula}, {amount(self.coefficient, self.unit, self.error)}, {self.words}"
 
+
+@shown
 class Pursuit(NamedTuple):
     """Force laws that would explain what a fitted model leaves.
 
@@ -63,6 +69,15 @@ class Pursuit(NamedTuple):
     chi2_per_dof: float
     linear: float
     refitted: float
+
+    def _headline(self) -> str:
+        found = f"{len(self.laws)} of {self.tried} force laws stand out of the noise"
+        return f"{found}, χ²/dof {self.chi2_per_dof:.4g} without and {self.linear:.4g} with them"
+
+    def _rows(self) -> list[Row]:
+        return [
+            Row(one.formula, amount(one.coefficient, one.unit, one.error), one.words) for one in self.laws
+        ]
 
 
 class _Selection(NamedTuple):

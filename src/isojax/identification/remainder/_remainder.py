@@ -7,8 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._results import is_successful
+from ..._show import Row, shown
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, Fit, search_of, silent
+from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, search_of, silent
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 from ._matching_pursuit import Pursuit, pursue_laws
@@ -20,6 +21,7 @@ _FEWEST_CELL_SAMPLES = 4
 """Fewest samples of a cell of the force map; a cell with fewer stays empty."""
 
 
+@shown
 class ForceMap(NamedTuple):
     """Mean force residual over the plane of displacement and velocity.
 
@@ -34,6 +36,7 @@ class ForceMap(NamedTuple):
     force: Float[np.ndarray, "cell cell"]
 
 
+@shown
 class Remainder(NamedTuple):
     """What a fitted model leaves unexplained.
 
@@ -47,9 +50,15 @@ class Remainder(NamedTuple):
     dwells: tuple[DwellRemainder, ...]
     force_map: ForceMap
 
+    def _headline(self) -> str:
+        return self.pursuit._headline()
+
+    def _rows(self) -> list[str | Row]:
+        return [*self.pursuit._rows(), "dwells", "force_map"]
+
 
 def explain_remainder(
-    fit: Fit,
+    fit: Fit | Fitted,
     *,
     refit: bool = True,
     solver: Any = DEFAULT_SOLVER,
@@ -80,6 +89,7 @@ def explain_remainder(
         >>> len(remainder.dwells)
         54
     """
+    fit = as_fit(fit)
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
     search = search_of(fit.campaign, rules, solver, progress)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
+from ..._show import shown
 from .._blow import blow_samples
 from .._campaign import Campaign
 from .._record import Dwell, Record
@@ -29,6 +30,7 @@ _FEW_SAMPLES = 4
 """Samples in a row below which the shape of a blow between them is unknown."""
 
 
+@shown
 @dataclass(frozen=True)
 class UnsettledDwell:
     """A dwell whose last cycles still differ from one another by more than noise.
@@ -46,6 +48,7 @@ class UnsettledDwell:
     change: float
 
 
+@shown
 @dataclass(frozen=True)
 class RepeatDifference:
     """How much two records at equal level and direction differ.
@@ -63,6 +66,7 @@ class RepeatDifference:
     input: float
 
 
+@shown
 @dataclass(frozen=True)
 class BriefBlow:
     """A blow so brief that its samples do not show its shape, nor the momentum that it gave.
@@ -76,6 +80,7 @@ class BriefBlow:
     samples: int
 
 
+@shown
 @dataclass(frozen=True)
 class DataHealth:
     """What the reader must know of the data before judging a model.

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.stats
 from jaxtyping import Float
 
+from ..._show import number, shown
 from .._blow import ring_down
 from .._campaign import Campaign
 from .._record import Dwell, Record
@@ -40,6 +41,7 @@ _TRIMMED = 6
 """From so many records on, the pooled noise comes from the inner half: one bad record does not count."""
 
 
+@shown
 @dataclass(frozen=True)
 class NoiseEstimate:
     """rms noise of the output channel [its SI unit].
@@ -71,6 +73,10 @@ class NoiseEstimate:
         lies inside the band, where a filter leaves the noise as it is.
         """
         return self.sigma / float(np.sqrt(self.share))
+
+    def _headline(self) -> str:
+        known = f"{number(self.sigma)} rms up to {number(self.bandwidth_hz)} Hz"
+        return f"{known}, from {self.method.replace('_', ' ')}"
 
 
 def estimate_noise(campaign: Campaign) -> NoiseEstimate:

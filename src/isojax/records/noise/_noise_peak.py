@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import shown
 from .._campaign import Campaign
 from .._record import Record
 from ..spectrum import MOST_HARMONICS, NoiseBand, harmonic_basis
@@ -50,6 +51,7 @@ _Window = tuple[Float[np.ndarray, " _"], float]
 """What was measured in a window, and the frequency whose harmonics do not count in it, or 0 [Hz]."""
 
 
+@shown
 @dataclass(frozen=True)
 class NoisePeak:
     """A peak in the spectrum of what does not repeat from cycle to cycle.

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from ..._show import shown
 from .._campaign import Campaign
 from .._record import Record
 
@@ -26,6 +27,7 @@ _MOST = 5e-3
 """Share of the samples above which they are no outliers but how the signal is."""
 
 
+@shown
 @dataclass(frozen=True)
 class Spikes:
     """Spikes of one channel of a record.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
+from ..._show import shown
 from .._campaign import Hold, InputQuantity, OutputQuantity
 from .._record import Direction, ExcitationKind, Role
 from .._wording import listing, nearest
@@ -144,6 +145,7 @@ _ABSENT_SECTIONS = ("floor", "filter")
 """Sections that are None where the file has none; of the others every field is then at its default."""
 
 
+@shown
 @dataclass(frozen=True)
 class Declaration:
     """The checked contents of campaign.toml; every field present, absent ones at their default.

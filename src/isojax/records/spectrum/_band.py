@@ -9,6 +9,7 @@ import scipy.stats
 from jaxtyping import Float
 from scipy.fft import next_fast_len
 
+from ..._show import shown
 from .._record import Record
 from ._noise_band import NoiseBand
 
@@ -34,6 +35,7 @@ _FIRST_POWER = 1e-3
 """Share of the drive's power that lies below its lowest excited frequency."""
 
 
+@shown
 @dataclass(frozen=True)
 class Band:
     """The frequencies at which a record has a signal.

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float
 
+from ..._show import shown
 from .._campaign import TIME_DERIVATIVES, Campaign, OutputQuantity
 from .._record import Record
 from ._basis import usable_orders
@@ -12,6 +13,7 @@ from ._filter import zero_phase_butterworth
 from ._harmonics import fit_harmonics, settled_window
 
 
+@shown
 @dataclass(frozen=True, eq=False)
 class Receptance:
     """First harmonics of the settled dwells of one record.
@@ -29,6 +31,7 @@ class Receptance:
     receptance: Complex[np.ndarray, " frequency"]
 
 
+@shown
 @dataclass(frozen=True, eq=False)
 class FilterComparison:
     """Receptances of one record before and after a low-pass on both channels alike.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Complex, Float
 
+from ..._show import shown
 from .._record import Dwell, Record
 from ._basis import harmonic_basis as harmonic_basis
 from ._basis import meeting_order, usable_orders
@@ -16,6 +17,7 @@ _FEWEST_SETTLED = 4.0
 """Cycles at the end of a dwell, a third of them and at least so many, that are taken for settled."""
 
 
+@shown
 @dataclass(frozen=True, eq=False)
 class DwellHarmonics:
     """Complex amplitudes of a settled dwell: signal = Re sum_k c_k exp(2 pi i k frequency t), t from the

@@ -7,6 +7,7 @@ import numpy as np
 import scipy.stats
 from jaxtyping import Complex
 
+from ..._show import shown
 from .._record import Dwell, Record
 from ._basis import USABLE_SHARE, meeting_order
 from ._dwell_end import dwell_rest, dwell_window
@@ -24,6 +25,7 @@ _FALSE_ALARM = 1e-4
 """Chance that a record without hum shows one."""
 
 
+@shown
 @dataclass(frozen=True)
 class HumLine:
     """A significant line of the mains in a record.
@@ -39,6 +41,7 @@ class HumLine:
     amplitude: float
 
 
+@shown
 @dataclass(frozen=True)
 class MainsCollision:
     """A dwell with a harmonic that cannot be separated from the mains.

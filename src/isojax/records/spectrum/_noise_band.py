@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import shown
 from .._campaign import Filter
 from ._filter import LEAST_GAIN
 
@@ -12,6 +13,7 @@ _FREQUENCIES = 4096
 """Frequencies over which the power gain is averaged."""
 
 
+@shown
 @dataclass(frozen=True)
 class NoiseBand:
     """White noise, or white noise that a declared filter has shaped.

@@ -11,8 +11,8 @@ from rich.text import Text
 
 from ..._parameters import list_parameters, own_parameters
 from ...elements import CATALOGUE
-from ...identification import OUTPUT_UNITS, Candidate, Fit, Loop, Verdict, plain_unit
-from ..plots import ROLES
+from ...identification import OUTPUT_UNITS, Candidate, Finding, Fit, Loop, Verdict, plain_unit
+from ..plots import ROLES, fits_meant
 from ..words import (
     effect_words,
     finding_words,
@@ -44,8 +44,30 @@ def render_text(content: RenderableType, width: int = 110) -> str:
     return page.getvalue().rstrip("\n")
 
 
+class PlainTable(Table):
+    """A table for rich that `print` shows as text."""
+
+    def __str__(self) -> str:
+        """Give the table as text."""
+        return render_text(self)
+
+    __repr__ = __str__
+
+
+class PlainGroup(Group):
+    """Lines and tables for rich that `print` shows as text."""
+
+    def __str__(self) -> str:
+        """Give them as text."""
+        return render_text(self)
+
+    __repr__ = __str__
+
+
 def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", header_style="dim", box=SIMPLE_HEAD)
+    table = PlainTable(
+        title=title, title_justify="left", title_style="bold", header_style="dim", box=SIMPLE_HEAD
+    )
     for place, column in enumerate(columns):
         table.add_column(column, justify="right" if place else "left", no_wrap=place == 0)
     return table
@@ -78,6 +100,7 @@ def _labelled(before: Fit, after: Fit | None) -> tuple[tuple[str, Fit], ...]:
     return (("before", before), ("after", after))
 
 
+@fits_meant
 def error_rows(before: Fit, after: Fit | None = None) -> tuple[ErrorRow, ...]:
     """Give the errors before and after, role by role.
 
@@ -103,8 +126,9 @@ def error_rows(before: Fit, after: Fit | None = None) -> tuple[ErrorRow, ...]:
     )
 
 
+@fits_meant
 def error_table(before: Fit, after: Fit | None = None) -> Table:
-    """Give the errors before and after; a notebook shows it, `render_text` makes it plain text.
+    """Give the errors before and after; a notebook shows it, `print` as text.
 
     Args:
         before: the declared model, fitted.
@@ -120,8 +144,9 @@ def error_table(before: Fit, after: Fit | None = None) -> Table:
     return table
 
 
+@fits_meant
 def parameter_table(before: Fit, after: Fit | None = None) -> Table:
-    """Give the coefficients before and after; a notebook shows it, `render_text` makes it plain text.
+    """Give the coefficients before and after; a notebook shows it, `print` as text.
 
     Args:
         before: the declared model, fitted.
@@ -158,15 +183,16 @@ def parameter_words(fit: Fit, name: str) -> str:
     return words if error == error else f"{words} (not determined)"
 
 
-def ranking_table(ranking: Sequence[Candidate]) -> Table:
-    """Give the best candidates; a notebook shows it, `render_text` makes it plain text.
+def ranking_table(ranking: Sequence[Candidate] | Verdict | Finding) -> Table:
+    """Give the best candidates; a notebook shows it, `print` as text.
 
     Args:
-        ranking: candidates, best first.
+        ranking: candidates, best first; of a diagnosis or a finding, its own.
 
     Returns:
         A table for rich.
     """
+    ranking = ranking.ranking if isinstance(ranking, Verdict | Finding) else ranking
     table = _table("Effects, best first", "effect", "z", "p", "strength", "χ²/dof", "ΔBIC", "admissible")
     for one in ranking[:_RANKS_IN_SUMMARY]:
         table.add_row(
@@ -191,7 +217,7 @@ def loop_summary(loop: Loop) -> RenderableType:
         Headline, evidence, unexplained residual if any, errors, coefficients.
     """
     lines = [line for finding in loop.findings for line in finding_words(finding)]
-    return Group(
+    return PlainGroup(
         Text(headline(loop), style="bold"),
         *(Text(line) for line in (*lines, *remainder_summary(loop))),
         error_table(loop.before, loop.after),
@@ -211,7 +237,7 @@ def verdict_summary(verdict: Verdict) -> RenderableType:
     finding = verdict.finding
     named = "" if finding is None else f": {effect_words(finding.effect)}"
     lines = () if finding is None else finding_words(finding)
-    return Group(
+    return PlainGroup(
         Text(f"{verdict.verdict.replace('_', ' ')}{named}", style="bold"),
         Text(verdict.reason),
         *(Text(line) for line in lines),

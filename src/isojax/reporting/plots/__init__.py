@@ -29,6 +29,8 @@ from ._force_plots import plot_effect as plot_effect
 from ._force_plots import plot_restoring_force as plot_restoring_force
 from ._map_plots import plot_response_map as plot_response_map
 from ._map_plots import plot_stability_map as plot_stability_map
+from ._obvious_picture import OBVIOUS as OBVIOUS
+from ._obvious_picture import show as show
 from ._record_plot import plot_record as plot_record
 from ._remainder_plots import plot_force_residual_loops as plot_force_residual_loops
 from ._remainder_plots import plot_force_residual_map as plot_force_residual_map
@@ -41,6 +43,7 @@ from ._sensitivity_plot import plot_sensitivity as plot_sensitivity
 from ._stability_style import drive_unit as drive_unit
 from ._stability_style import quantity as quantity
 from ._style import ROLES as ROLES
+from ._style import fits_meant as fits_meant
 from ._style import pair as pair
 from ._time_history_plots import plot_time_history as plot_time_history
 from ._time_history_plots import worst_window as worst_window

@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...identification import Candidate, Fit
+from ...identification import Candidate, Finding, Fit, Verdict
 from ..words import typeset_number, typeset_unit
-from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle, pair
+from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle, fits_meant, pair
 
 _LIKE = "#8fb8de"
 _WRONG = "#f0d5d0"
@@ -17,7 +17,7 @@ _RANKS_IN_PLOT = 10
 
 
 def plot_ranking(
-    ranking: Sequence[Candidate],
+    ranking: Sequence[Candidate] | Verdict | Finding,
     *,
     effect: str | None = None,
     indistinguishable: Sequence[str] = (),
@@ -26,7 +26,7 @@ def plot_ranking(
     """Draw the score of each absent effect, |z|, the best ten.
 
     Args:
-        ranking: candidates, best first.
+        ranking: candidates, best first; of a diagnosis or a finding, its own with the two that follow.
         effect: the one that was found, if any.
         indistinguishable: catalogue names that the data cannot distinguish from it.
         ax: axes to draw on.
@@ -34,6 +34,11 @@ def plot_ranking(
     Returns:
         The figure.
     """
+    if isinstance(ranking, Verdict | Finding):
+        finding = ranking.finding if isinstance(ranking, Verdict) else ranking
+        effect = effect or (None if finding is None else finding.effect)
+        indistinguishable = indistinguishable or ranking.indistinguishable
+        ranking = ranking.ranking
     shown = list(ranking)[:_RANKS_IN_PLOT]
     figure, ax = axes_for(ax, height=0.9 + 0.27 * max(3, len(shown)))
     kinds = [_kind(candidate, effect, indistinguishable) for candidate in shown]
@@ -79,6 +84,7 @@ def _beside(candidate: Candidate) -> str:
     return f"|z| {typeset_number(abs(candidate.z), 3)}, {words}"
 
 
+@fits_meant
 def plot_errors(
     before: Fit,
     after: Fit | None = None,
@@ -129,6 +135,7 @@ def _noise_share(fit: Fit, role: str) -> float:
     return float("nan") if errors is None else fit.noise.sigma * errors.nrmse / errors.rmse
 
 
+@fits_meant
 def plot_stiffness_scatter(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure:
     """Draw how the linear stiffness deviates from record to record, in the order of the test.
 

@@ -14,7 +14,7 @@ from ...identification import Fit
 from ...models import Isolator
 from ...records import Record, measured_state
 from ._force_cycles import trace_cycles
-from ._style import AFTER, BAND, CURVES, MEASURED, NEUTRAL, axes_for, entitle, pair
+from ._style import AFTER, BAND, CURVES, MEASURED, NEUTRAL, axes_for, entitle, fits_meant, pair
 
 _MOST_POINTS = 4000
 
@@ -41,6 +41,7 @@ def measured_forces(
     return x[kept], v[kept], (drive - float(fit.model.mass) * a)[kept]
 
 
+@fits_meant
 def plot_restoring_force(
     before: Fit,
     after: Fit | None = None,

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ...identification import OUTPUT_UNITS, Fit, Residual, Run
 from ..words import typeset_unit
 from ._over_time import draw_signal, finish_time_axes, is_dense, shown_samples
-from ._style import BAND, ROLES, axes_for, entitle, pair
+from ._style import BAND, ROLES, axes_for, entitle, fits_meant, pair
 from ._time_history_plots import worst_window
 
 _SMOOTHED_POINTS = 60
@@ -19,6 +19,7 @@ _PHASE_BINS = 36
 """Pieces of a cycle over which a residual is averaged."""
 
 
+@fits_meant
 def plot_residual(
     before: Fit,
     after: Fit | None = None,
@@ -95,6 +96,7 @@ def plot_correlation(
     return figure
 
 
+@fits_meant
 def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure:
     """Draw the residual of each segment over the noise: against drive frequency, or time without dwells.
 
@@ -128,6 +130,7 @@ def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None)
     return figure
 
 
+@fits_meant
 def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | None = None) -> Figure:
     """Draw the residual of the worst dwell, averaged over its cycles.
 

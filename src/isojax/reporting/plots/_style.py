@@ -1,10 +1,15 @@
 """How pictures look: colours that mean the same everywhere, and axes to draw on."""
 
-from collections.abc import Mapping
-from typing import Any
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar, cast
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from ...identification import Fit, as_fit
+
+_Draw = TypeVar("_Draw", bound=Callable[..., Any])
 
 MEASURED = "#222222"
 BEFORE = "#d1495b"
@@ -19,6 +24,29 @@ LEVELS = ("#0b3c6f", "#2a9d8f", "#e08e0b", "#a23b72", "#5f0f40", "#6b705c")
 
 ROLES: Mapping[str, str] = {"fit": "fitted", "holdout": "held out"}
 """What the roles of records are called."""
+
+
+def fits_meant(draw: _Draw) -> _Draw:
+    """Let what takes the fits before and after take what holds them as well.
+
+    An extension or a closed loop by itself is both of its fits; after another fit it is its last one.
+
+    Args:
+        draw: a function of `before`, `after` and options.
+
+    Returns:
+        The same function of what is meant.
+    """
+
+    @functools.wraps(draw)
+    def meant(before: Any, after: Any = None, **options: Any) -> Any:
+        if after is None and isinstance(getattr(before, "before", None), Fit):
+            before, after = before.before, before.after
+        before = as_fit(before, "before")
+        after = None if after is None else as_fit(after, "after")
+        return draw(before, None if after is before else after, **options)
+
+    return cast(_Draw, meant)
 
 
 def pair(before: Any, after: Any) -> tuple[tuple[str, Any, str], ...]:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from ...identification import OUTPUT_UNITS, Fit
 from ...records import Record
 from ._over_time import draw_signal, finish_time_axes, shown_samples
-from ._style import MEASURED, ROLES, axes_for, entitle, pair
+from ._style import MEASURED, ROLES, axes_for, entitle, fits_meant, pair
 
 _CYCLES = 6.0
 """Cycles of the drive in a zoomed window."""
@@ -50,6 +50,7 @@ def _window_length(record: Record) -> int:
     return int(np.clip(_CYCLES * record.rate / frequency, 8, record.time.size - 1))
 
 
+@fits_meant
 def plot_time_history(
     before: Fit,
     after: Fit | None = None,

@@ -1,23 +1,23 @@
 """Numbers and sentences of every report.
 
 In: findings, fits, data health, an unexplained remainder. Out: strings, typeset with unit and error, and
-plain dictionaries for result.json. Read `_quantities.py` (one number), `_sentences.py` (the verdict), then
-the words on data health and on the remainder.
+plain dictionaries for result.json. Read `isojax/_quantities.py` (one number), `_sentences.py` (the verdict),
+then the words on data health and on the remainder.
 """
 
+from ..._quantities import INPUT_WORDS as INPUT_WORDS
+from ..._quantities import finite_or_none as finite_or_none
+from ..._quantities import typeset_goodness as typeset_goodness
+from ..._quantities import typeset_number as typeset_number
+from ..._quantities import typeset_p_value as typeset_p_value
+from ..._quantities import typeset_share as typeset_share
+from ..._quantities import typeset_unit as typeset_unit
+from ..._quantities import typeset_with_error as typeset_with_error
 from ._health_words import budget_rows as budget_rows
 from ._health_words import budget_words as budget_words
 from ._health_words import dwell_words as dwell_words
 from ._health_words import health_dict as health_dict
 from ._health_words import mains_words as mains_words
-from ._quantities import INPUT_WORDS as INPUT_WORDS
-from ._quantities import finite_or_none as finite_or_none
-from ._quantities import typeset_goodness as typeset_goodness
-from ._quantities import typeset_number as typeset_number
-from ._quantities import typeset_p_value as typeset_p_value
-from ._quantities import typeset_share as typeset_share
-from ._quantities import typeset_unit as typeset_unit
-from ._quantities import typeset_with_error as typeset_with_error
 from ._remainder_words import law_rows as law_rows
 from ._remainder_words import pursuit_words as pursuit_words
 from ._remainder_words import remainder_dict as remainder_dict

@@ -4,9 +4,7 @@ import math
 from collections.abc import Sequence
 
 from ..._parameters import list_parameters
-from ...health import REACH, CampaignHealth, DwellStability
-from ...identification import DriftBudget, Finding, Fit, plain_unit
-from ._quantities import (
+from ..._quantities import (
     INPUT_WORDS,
     finite_or_none,
     typeset_number,
@@ -14,6 +12,8 @@ from ._quantities import (
     typeset_unit,
     typeset_with_error,
 )
+from ...health import REACH, CampaignHealth, DwellStability
+from ...identification import DriftBudget, Finding, Fit, plain_unit
 from ._sentences import effect_words, own_strength, scatter_words
 
 _MOST_NAMED = 6

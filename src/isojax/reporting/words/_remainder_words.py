@@ -4,9 +4,9 @@ import math
 import re
 from typing import Any
 
+from ..._quantities import finite_or_none, typeset_goodness, typeset_number, typeset_share, typeset_unit
+from ..._quantities import typeset_with_error as with_error
 from ...identification import Loop, Pursuit, Remainder
-from ._quantities import finite_or_none, typeset_goodness, typeset_number, typeset_share, typeset_unit
-from ._quantities import typeset_with_error as with_error
 
 _RAISED_FACTORS = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
 

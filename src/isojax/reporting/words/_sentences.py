@@ -3,11 +3,7 @@
 import math
 
 from ..._parameters import Parameter, list_parameters
-from ..._results import RESULTS, is_successful
-from ...elements import CATALOGUE
-from ...identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
-from ...records import DataHealth
-from ._quantities import (
+from ..._quantities import (
     typeset_goodness,
     typeset_number,
     typeset_p_value,
@@ -15,6 +11,10 @@ from ._quantities import (
     typeset_unit,
     typeset_with_error,
 )
+from ..._results import RESULTS, is_successful
+from ...elements import CATALOGUE
+from ...identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
+from ...records import DataHealth
 
 
 def effect_words(effect: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._results import RESULTS
+from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State
@@ -21,6 +22,7 @@ _SAME_ATTRACTOR = 1000.0
 to the tolerance, but creeps, lies further from its end than one period moves it."""
 
 
+@shown
 class BasinsOfAttraction(eqx.Module):
     """The attractor to which each initial state leads.
 
@@ -46,6 +48,14 @@ class BasinsOfAttraction(eqx.Module):
         """Share of the initial states that each attractor draws."""
         places = jnp.arange(self.periods.size)
         return jnp.mean(self.index.ravel()[None] == places[:, None], axis=1)
+
+    def _headline(self) -> str:
+        index, periods = np.asarray(self.index), np.asarray(self.periods)
+        shares = ", ".join(
+            f"period {period} draws {100.0 * float(np.mean(index == place)):.3g} %"
+            for place, period in enumerate(periods)
+        )
+        return f"{periods.size} attractors on {index.shape[0]} × {index.shape[1]} initial states: {shares}"
 
 
 def basins_of_attraction(

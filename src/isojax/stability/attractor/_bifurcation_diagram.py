@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._results import RESULTS
+from ..._show import shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator, State
+from ...models import Integrator, Isolator, Modelled, State, as_isolator
 from ..orbit import ascending, recorded_sine
 from ._stroboscope import (
     Repetition,
@@ -31,6 +32,7 @@ _CHAOS = math.log(100.0)
 as chaotic: more than what turning and shearing lend to a motion that is only slow to settle."""
 
 
+@shown
 class BifurcationDiagram(eqx.Module):
     """The settled motion, once a drive period, along the drive's amplitude or frequency.
 
@@ -70,9 +72,19 @@ class BifurcationDiagram(eqx.Module):
         """[m/s]."""
         return self.samples[..., 1]
 
+    def _headline(self) -> str:
+        period, chaotic = np.asarray(self.period), int(np.sum(np.asarray(self.chaotic)))
+        counts = zip(*np.unique(period, return_counts=True), strict=True)
+        words = ", ".join(f"{count} of period {value}" for value, count in counts if value)
+        runs = ", ".join(dict.fromkeys(self.runs))
+        return f"along {self.parameter} ({runs}): {words or 'no periodic motion'}, {chaotic} chaotic"
+
+    def _rows(self) -> list[str]:
+        return ["model", "amplitudes", "frequencies", "samples", "period", "lyapunov", "result"]
+
 
 def bifurcation_diagram(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitudes: Any = None,
     frequency: Any = None,
     *,
@@ -123,6 +135,7 @@ def bifurcation_diagram(
         >>> diagram.period.ravel().tolist()
         [1, 1]
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator() if integrator is None else integrator
     parameter, forces, band = _points(amplitudes, frequency, amplitude, frequencies)

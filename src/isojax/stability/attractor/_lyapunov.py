@@ -5,9 +5,11 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..._results import RESULTS
+from ..._show import amount, shown
 from ..._types import Lanes, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State
@@ -18,6 +20,7 @@ _BLOCKS = 20
 """Segments of the motion whose scatter gives the standard error."""
 
 
+@shown
 class LyapunovExponent(eqx.Module):
     """Rate at which neighbouring motions separate.
 
@@ -34,6 +37,9 @@ class LyapunovExponent(eqx.Module):
     growth: Float[Array, " period"]
     state: Float[Array, " state"]
     result: RESULTS
+
+    def _headline(self) -> str:
+        return f"largest exponent {amount(self.value, '1/s', float(np.asarray(self.standard_error)))}"
 
 
 def largest_lyapunov_exponent(

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._results import RESULTS
+from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State
@@ -14,6 +15,7 @@ from ..orbit import AbstractStatePath, recorded_sine, trajectory
 from ._stroboscope import bounded_or_not, check_counts, settle_down, start_states
 
 
+@shown
 class PhasePortrait(AbstractStatePath):
     """The motion over some drive periods.
 

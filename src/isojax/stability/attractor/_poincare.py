@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._results import RESULTS
+from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, advance
@@ -17,6 +18,7 @@ from ..orbit import AbstractStatePath, Sine, recorded_sine, trajectory
 from ._stroboscope import Watch, bounded_or_not, check_counts, settle_down, start_states
 
 
+@shown
 class PoincareSection(AbstractStatePath):
     """Points of the settled motion at fixed phases of the drive.
 

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..._results import RESULTS
+from ..._show import brief, shown
 from ..._types import Lanes, check_float64
 from ...models import Integrator, Isolator, State
 from ..orbit import Orbit, Sine, modulus, multipliers, period_map, recorded_sine
@@ -29,6 +30,7 @@ _BACK = 1e-3
 """Share of the first distance at which the motion counts as returned."""
 
 
+@shown
 class ReturnToOrbit(eqx.Module):
     """The way of a disturbed motion back to its orbit, or away from it.
 
@@ -55,6 +57,14 @@ class ReturnToOrbit(eqx.Module):
     def spectral_radius(self) -> Float[Array, ""]:
         """Of the orbit's multipliers: what `rate` must come to."""
         return self.orbit.floquet.spectral_radius
+
+    def _headline(self) -> str:
+        back = (
+            "comes back to the orbit"
+            if bool(np.asarray(self.returned))
+            else "does not come back to the orbit"
+        )
+        return f"{back}, rate {brief(self.rate)} a period"
 
 
 def return_to_orbit(

@@ -1,11 +1,14 @@
 """What is known of a curve of bifurcations over the plane of the drive."""
 
 import equinox as eqx
+import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import brief, number, shown
 
 
+@shown
 class Cusp(eqx.Module):
     """Where two folds meet and end.
 
@@ -19,7 +22,11 @@ class Cusp(eqx.Module):
     frequency: Float[Array, ""]
     y0: Float[Array, " state"]
 
+    def _headline(self) -> str:
+        return f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
 
+
+@shown
 class FoldCurve(eqx.Module):
     """Folds over the plane of the drive: where an orbit meets a saddle and both vanish.
 
@@ -47,7 +54,13 @@ class FoldCurve(eqx.Module):
     symmetric: bool = eqx.field(static=True)
     result: RESULTS
 
+    def _headline(self) -> str:
+        amplitude, frequency = brief(self.amplitude), brief(self.frequency)
+        shape = "closed" if bool(np.asarray(self.closed)) else "open"
+        return f"{shape} curve of folds: amplitude {amplitude}, frequency {frequency} Hz"
 
+
+@shown
 class PeriodDoublingCurve(eqx.Module):
     """Period doublings over the plane of the drive.
 
@@ -68,3 +81,8 @@ class PeriodDoublingCurve(eqx.Module):
     closed: Bool[Array, ""]
     periods: int = eqx.field(static=True)
     result: RESULTS
+
+    def _headline(self) -> str:
+        amplitude, frequency = brief(self.amplitude), brief(self.frequency)
+        shape = "closed" if bool(np.asarray(self.closed)) else "open"
+        return f"{shape} curve of period doublings: amplitude {amplitude}, frequency {frequency} Hz"

@@ -5,15 +5,18 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import Row, brief, number, shown
 from ...models import Integrator, Isolator, State
 from ..orbit import ShootingMethod, Sine, modulus, multipliers, trajectory
 from ._extended_system import BifurcationKind
 from ._parameter_family import ParameterFamily
 
 
+@shown
 class BranchPoints(eqx.Module):
     """Points along a branch, in the order in which they were found; NaN past the end of the shorter branches
     of a batch.
@@ -48,7 +51,13 @@ class BranchPoints(eqx.Module):
         """Whether every disturbance dies out."""
         return self.spectral_radius < 1.0
 
+    def _headline(self) -> str:
+        known = np.isfinite(np.asarray(self.value))
+        stable = np.abs(np.asarray(self.multipliers)[..., 0]) < 1.0
+        return f"{int(known.sum())} points, {int(stable.sum())} of them stable"
 
+
+@shown
 class SpecialPoint(eqx.Module):
     """A bifurcation of periodic orbits.
 
@@ -95,7 +104,16 @@ class SpecialPoint(eqx.Module):
         """Largest modulus of the multipliers."""
         return modulus(self.multipliers[0])
 
+    def _headline(self) -> str:
+        drive = f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
+        after = "" if self.periods == 1 else f", orbit over {self.periods} drive periods"
+        return f"{self.kind.replace('_', ' ')} at {drive}{after}"
 
+    def _rows(self) -> list[str]:
+        return ["value", "y0", "multipliers", "direction", "result"]
+
+
+@shown
 class Branch(eqx.Module):
     """Periodic orbits along one parameter, or a batch of such branches.
 
@@ -127,6 +145,20 @@ class Branch(eqx.Module):
     integrator: Integrator
     scale: Float[Array, "*branch state"]
     longest: float = eqx.field(static=True)
+
+    def _headline(self) -> str:
+        kinds = [point.kind.replace("_", " ") for point in self.special_points]
+        special = ", ".join(f"{kinds.count(kind)} × {kind}" for kind in dict.fromkeys(kinds))
+        return f"along {self.parameter}, {self.points._headline()}; {special or 'no bifurcation'}"
+
+    def _rows(self) -> list[str | Row]:
+        points = self.points
+        own = ["model", "closed", "result"]
+        span = [Row(name, brief(getattr(points, name))) for name in ("amplitude", "frequency", "response")]
+        return [*own, *span]
+
+    def _lines(self) -> list[str]:
+        return [f"  {point._headline()}" for point in self.special_points]
 
 
 def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float[Array, ""]:

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import ShootingMethod, multipliers, state_scale, trajectory
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._bifurcation_curves import Cusp, FoldCurve, PeriodDoublingCurve
@@ -42,7 +42,7 @@ _CUSP_SECTIONS = 3
 
 
 def fold_curve(
-    model: Isolator,
+    model: Isolator | Modelled,
     *,
     amplitude_range: tuple[float, float],
     frequency_range: tuple[float, float],
@@ -85,6 +85,7 @@ def fold_curve(
         >>> ij.is_successful(folds.result)
         True
     """
+    model = as_isolator(model)
     search_for = _Search("fold", (amplitude_range, frequency_range), search, Stride(step, most))
     curve = _curve(model, search_for, start, integrator)
     followed = curve.follow()

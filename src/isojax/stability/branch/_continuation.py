@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ..._types import Lanes, Scalar, as_float64, check_float64
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import ShootingMethod, is_odd, response_start
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._branch import Branch, BranchPoints, branch_point
@@ -52,7 +52,7 @@ def refuse_traced(*values: object) -> None:
 
 
 def continue_branch(
-    model: Isolator,
+    model: Isolator | Modelled,
     *,
     parameter: str,
     start: Scalar | float,
@@ -108,6 +108,7 @@ def continue_branch(
         >>> [point.kind for point in branch.special_points]
         ['fold', 'fold']
     """
+    model = as_isolator(model)
     check_float64()
     refuse_traced(model, amplitude, frequency, start, stop)
     integrator = tracing_steps() if integrator is None else integrator

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import shown
 from ..._types import check_float64
 from ...models import Integrator, Isolator
 from ..orbit import is_odd, modulus, multipliers, period_map, recorded_sine, state_scale, trajectory
@@ -38,6 +39,7 @@ _WAYS = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
 """Amplitude down and up, frequency down and up."""
 
 
+@shown
 class NearestFolds(eqx.Module):
     """Periodic orbits next to given motions, and where their branches fold.
 

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._parameters import find_parameter, list_parameters, replace_parameters
+from ..._show import shown
 from ..._types import Lanes
 from ...models import Isolator
 from ..orbit import ShootingMethod, Sine, period_map, recorded_sine
@@ -31,6 +32,7 @@ class Setting(NamedTuple):
         return recorded_sine(self.model, self.amplitude, self.frequency)
 
 
+@shown
 class ParameterFamily(eqx.Module):
     """Isolators and drives over a range of one or two parameters.
 

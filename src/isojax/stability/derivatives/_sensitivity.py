@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
+from ..._show import Row, brief, shown
 from ..._types import check_float64
 from ...models import Isolator
 from ..branch import SpecialPoint
@@ -17,6 +18,7 @@ from ._parameter_values import DRIVE
 from ._subjects import as_subject
 
 
+@shown
 class Sensitivity(eqx.Module):
     """Exact derivatives of quantities by parameters, and what the parameters' error bars make of them.
 
@@ -68,6 +70,28 @@ class Sensitivity(eqx.Module):
         """
         slope = self.derivatives[quantity]
         return slope * self.at.reshape(-1, *(1,) * (slope.ndim - 1)) / self.values[quantity]
+
+    def _headline(self) -> str:
+        return f"of {', '.join(self.values)} by {len(self.parameters)} parameters"
+
+    def _rows(self) -> list[Row]:
+        errors = self.standard_errors or {}
+        own = [
+            Row(name, brief(value), f"± {brief(errors[name])}" if name in errors else "")
+            for name, value in self.values.items()
+        ]
+        return [*own, *(self._slopes(name) for name in self.parameters)]
+
+    def _slopes(self, parameter: str) -> Row:
+        """Show by how many percent each scalar moves with a parameter that grows by one percent."""
+        place = self.parameters.index(parameter)
+        at = float(np.asarray(self.at)[place])
+        moved = [
+            f"{name} {at * float(np.asarray(slope)[place]) / float(np.asarray(self.values[name])):+.3g} %"
+            for name, slope in self.derivatives.items()
+            if np.ndim(slope) == 1 and not np.iscomplexobj(slope)
+        ]
+        return Row(f"{parameter} +1 %", ", ".join(moved) or brief(self.derivatives), self.units[place])
 
 
 def sensitivity(

@@ -12,9 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
 
-from ..._results import RESULTS
+from ..._results import RESULTS, cell_results
+from ..._show import number, shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import Sine, ascending, is_odd
 from ._batched_newton import (
     FOUND,
@@ -37,7 +38,11 @@ _TRIED = 64
 _STILL_STARTS = 1.25
 """Times those steps up to which orbits found with them are good enough starts."""
 
+_ROWS, _COLUMNS = 12, 60
+"""Size of the map in characters."""
 
+
+@shown
 class StabilityMap(eqx.Module):
     """Periodic orbits and their multipliers over drive amplitude and frequency.
 
@@ -57,7 +62,7 @@ class StabilityMap(eqx.Module):
         split: whether an orbit was split there; else it was integrated with four times the steps.
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
-        result: how the search ended in each cell; beside NaN, why.
+        result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
         error: largest integration error of a multiplier in a sample of cells, against steps four times finer.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
@@ -75,7 +80,7 @@ class StabilityMap(eqx.Module):
     split: Bool[Array, "*orbit amplitude frequency"]
     response: Float[Array, "*orbit amplitude frequency"]
     count: Int[Array, "amplitude frequency"]
-    result: RESULTS
+    result: RESULTS = eqx.field(converter=cell_results)
     error: float
     symmetric: bool = eqx.field(static=True)
     integrator: Integrator
@@ -97,9 +102,46 @@ class StabilityMap(eqx.Module):
         method = MapMethod(self.integrator, self.symmetric, None, steps)
         return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)
 
+    def _headline(self) -> str:
+        count, radius = np.asarray(self.count), np.asarray(self.spectral_radius)
+        found = radius[np.isfinite(radius)]
+        cells = {
+            "with an unstable orbit": self._unstable,
+            "with coexisting orbits": count > 1,
+            "without any": count == 0,
+        }
+        counted = ", ".join(f"{int(np.sum(which))} {words}" for words, which in cells.items())
+        largest = number(found.max()) if found.size else "unknown"
+        grid = " × ".join(map(str, count.shape))
+        return f"{grid} cells of amplitude and frequency, {counted}; largest |mu| {largest}"
+
+    @property
+    def _unstable(self) -> np.ndarray:
+        radius = np.asarray(self.spectral_radius)
+        return np.any((radius >= 1.0).reshape(-1, *radius.shape[-2:]), axis=0)
+
+    def _rows(self) -> list[str]:
+        return ["model", "amplitudes", "frequencies", "response", "symmetric", "error", "result"]
+
+    def _lines(self) -> list[str]:
+        count, unstable = np.asarray(self.count), self._unstable
+        marks = np.where(count == 0, "?", np.where(count > 1, "2", "."))
+        marks = np.where((count > 1) & (count < 10), count.astype(str), marks)
+        marks = np.where((count == 1) & unstable, "x", marks)
+        forces, band = np.asarray(self.amplitudes), np.asarray(self.frequencies)
+        rows = np.unique(np.linspace(0, forces.size - 1, min(_ROWS, forces.size)).round().astype(int))
+        columns = np.unique(np.linspace(0, band.size - 1, min(_COLUMNS, band.size)).round().astype(int))
+        drawn = [f"  {forces[row]:>10.4g} |{''.join(marks[row, columns])}" for row in rows[::-1]]
+        return [
+            *drawn,
+            f"  {'F0':>10} +{'-' * columns.size}",
+            f"  {'f [Hz]':>10}  {band[0]:.4g} to {band[-1]:.4g}",
+            "  . one stable orbit, x one unstable orbit, 2 to 9 coexisting orbits, ? none found",
+        ]
+
 
 def stability_map(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitudes: Any,
     frequencies: Any,
     *,
@@ -149,6 +191,7 @@ def stability_map(
         >>> smap.count.shape, int(smap.count.max())
         ((3, 2), 3)
     """
+    model = as_isolator(model)
     check_float64()
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:

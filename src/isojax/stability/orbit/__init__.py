@@ -15,6 +15,7 @@ from ._describing_function import rest_displacement as rest_displacement
 from ._floquet import Floquet as Floquet
 from ._floquet import modulus as modulus
 from ._floquet import multipliers as multipliers
+from ._floquet import stable_words as stable_words
 from ._harmonic_balance import HarmonicBalance as HarmonicBalance
 from ._harmonic_balance import harmonic_balance as harmonic_balance
 from ._kink_crossings import Crossings as Crossings

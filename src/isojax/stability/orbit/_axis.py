@@ -20,6 +20,14 @@ def ascending(name: str, values: Any, *, positive: bool = True) -> Float[np.ndar
     Raises:
         ValueError: if the list is empty, does not ascend, or a number is not finite or not positive.
     """
+    if isinstance(values, tuple) and len(values) == 2:
+        # A tuple of two is how a range is written elsewhere; taken as a grid of two it would answer another
+        # question without a word.
+        first, last = values
+        raise ValueError(
+            f"Argument `{name}` must list the values, but is the pair {values}. For a range write "
+            f"np.linspace({first}, {last}, 100), for these two values [{first}, {last}]."
+        )
     axis = np.asarray(values, dtype=float)
     if axis.ndim != 1 or not axis.size:
         raise ValueError(f"Argument `{name}` must be a list of numbers, but has shape {axis.shape}.")

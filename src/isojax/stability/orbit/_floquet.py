@@ -3,9 +3,13 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Complex, Float
 
+from ..._show import number, shown
 
+
+@shown
 class Floquet(eqx.Module):
     """How a small disturbance of a periodic orbit grows over one drive period.
 
@@ -35,6 +39,24 @@ class Floquet(eqx.Module):
     def stable(self) -> Array:
         """Whether every disturbance dies out; False where no orbit was found."""
         return self.spectral_radius < 1.0
+
+    def _headline(self) -> str:
+        radius = np.abs(np.asarray(self.multipliers)[..., 0])
+        if radius.ndim:
+            return f"{int(np.sum(radius < 1.0))} of {radius.size} orbits stable"
+        return f"{stable_words(radius)}, largest multiplier of modulus {number(float(radius))}"
+
+
+def stable_words(radius: Float[np.ndarray, ""] | float) -> str:
+    """Say what the largest modulus of the multipliers means.
+
+    Args:
+        radius: the modulus; NaN where no orbit was found.
+
+    Returns:
+        "stable", "unstable" or "not found".
+    """
+    return "stable" if radius < 1.0 else "unstable" if radius >= 1.0 else "not found"
 
 
 def modulus(value: Complex[Array, "..."]) -> Float[Array, "..."]:

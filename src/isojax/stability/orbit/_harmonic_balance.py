@@ -13,13 +13,15 @@ from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import shown
 from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import imposed_internal, response_start, rest_displacement
 from ._sine import recorded_sine
 
 
+@shown
 class HarmonicBalance(eqx.Module):
     """A periodic motion as a sum of a few harmonics of the drive.
 
@@ -91,7 +93,7 @@ def _at(row: Complex[Array, " harmonic"], phase: Lanes) -> Lanes:
 
 
 def harmonic_balance(
-    model: Isolator,
+    model: Isolator | Modelled,
     excitation: Harmonic,
     *,
     harmonics: int = 7,
@@ -132,6 +134,7 @@ def harmonic_balance(
         >>> ij.is_successful(found.result)
         True
     """
+    model = as_isolator(model)
     check_float64()
     tolerance = (Integrator() if integrator is None else integrator).orbit_tolerance
     solver = optx.Newton(rtol=tolerance, atol=tolerance) if solver is None else solver

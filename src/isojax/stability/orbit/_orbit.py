@@ -7,17 +7,19 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optimistix as optx
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from ..._parameters import list_parameters
 from ..._results import RESULTS, is_successful
+from ..._show import amount, brief, declared_numbers, number, shown
 from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import response_start
-from ._floquet import Floquet, multipliers
+from ._floquet import Floquet, multipliers, stable_words
 from ._harmonic_balance import harmonic_balance
 from ._period_map import trajectory
 from ._shooting import ShootingSolution, shoot
@@ -37,6 +39,7 @@ _SYMMETRIC_TO = 1e-4
 sampled with the steps of maps, whose error at a kink is a few times 1e-5."""
 
 
+@shown
 class Orbit(AbstractStatePath):
     """A periodic orbit of the forced isolator.
 
@@ -88,9 +91,21 @@ class Orbit(AbstractStatePath):
         spectrum = jnp.fft.rfft(self.displacement[:-1]) / (self.time.size - 1)
         return jnp.concatenate([spectrum[:1], 2.0 * spectrum[1:]])
 
+    def _headline(self) -> str:
+        at = declared_numbers(self.excitation)
+        radius = np.abs(np.asarray(self.floquet.multipliers)[0])
+        if np.isnan(radius):
+            return f"none found at {at}. {brief(self.result)}"
+        x = np.asarray(self.states)[:, 0]
+        size = amount(0.5 * (x.max() - x.min()), "m")
+        return f"{stable_words(radius)}, {size} at {at}, spectral radius {number(radius)}"
+
+    def _rows(self) -> list[str]:
+        return ["model", "periods", "y0", "floquet", "symmetric", "error", "result"]
+
 
 def find_periodic_orbit(
-    model: Isolator,
+    model: Isolator | Modelled,
     excitation: Harmonic,
     *,
     start: Sequence[Lanes | float] | Float[Array, " state"] | None = None,
@@ -132,6 +147,7 @@ def find_periodic_orbit(
         >>> ij.is_successful(orbit.result), float(orbit.floquet.spectral_radius) < 1.0
         (True, True)
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator() if integrator is None else integrator
     tolerance = integrator.orbit_tolerance

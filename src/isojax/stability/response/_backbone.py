@@ -10,8 +10,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._results import RESULTS
+from ..._show import brief, shown
 from ..._types import check_float64
-from ...models import Instant, Integrator, Isolator, State
+from ...models import Instant, Integrator, Isolator, Modelled, State, as_isolator
 from ..map import Lane, MapMethod, states_at_zero
 from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory
 from ._free_vibration import natural_frequencies
@@ -27,6 +28,7 @@ _AMPLITUDE_STEP = 0.3
 """Largest change of an unknown in one step, as a share of its size: beyond, the basin may be left."""
 
 
+@shown
 class BackboneCurve(eqx.Module):
     """Resonance over amplitude, with and without damping.
 
@@ -47,9 +49,13 @@ class BackboneCurve(eqx.Module):
     y0: Float[Array, "point state"]
     result: RESULTS
 
+    def _headline(self) -> str:
+        spans = f"frequency {brief(self.frequency)} Hz, displacement {brief(self.displacements)} m"
+        return f"phase resonance: {spans}"
+
 
 def backbone_curve(
-    model: Isolator, displacements: Any, *, integrator: Integrator | None = None
+    model: Isolator | Modelled, displacements: Any, *, integrator: Integrator | None = None
 ) -> BackboneCurve:
     """Give the backbone curve, free and forced.
 
@@ -73,6 +79,7 @@ def backbone_curve(
         >>> bool(backbone.frequency[1] < backbone.frequency[0])  # this spring softens
         True
     """
+    model = as_isolator(model)
     check_float64()
     amplitudes = jnp.asarray(ascending("displacements", displacements))
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator

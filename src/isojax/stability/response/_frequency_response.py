@@ -9,12 +9,14 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import amount, number, shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..branch import Branch, SpecialPoint, continue_branch
 from ..orbit import Sine, recorded_sine, trajectory
 
 
+@shown
 class FrequencyResponse(eqx.Module):
     """Periodic response over frequency, in the order of the curve.
 
@@ -59,9 +61,23 @@ class FrequencyResponse(eqx.Module):
         """Whether the curve was followed to its end."""
         return self.branch.result
 
+    def _headline(self) -> str:
+        points = self.branch.points
+        response, frequency = np.asarray(points.response), np.asarray(points.frequency)
+        top = np.nanargmax(response)
+        drive = number(float(np.asarray(points.amplitude).ravel()[top]))
+        peak = f"{amount(response.ravel()[top], 'm')} at {number(frequency.ravel()[top])} Hz"
+        return f"largest response {peak} under a drive of {drive}; {self.branch._headline()}"
+
+    def _rows(self) -> list[str]:
+        return ["branch", "receptance"]
+
+    def _lines(self) -> list[str]:
+        return self.branch._lines()
+
 
 def frequency_response(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitude: Any,
     frequencies: Any,
     *,
@@ -99,6 +115,7 @@ def frequency_response(
         >>> print(f"resonance near {float(response.branch.points.frequency[place]):.1f} Hz")
         resonance near 5.5 Hz
     """
+    model = as_isolator(model)
     check_float64()
     forces, ends = np.asarray(amplitude, dtype=float), np.asarray(frequencies, dtype=float)
     if forces.ndim > 1 or not forces.size or not np.all(np.isfinite(forces) & (forces > 0.0)):

@@ -9,13 +9,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
+from ..._show import number, shown
 from ..._types import Lanes, Scalar, as_float64, check_float64
-from ...models import Integrator, Isolator, State
+from ...models import Integrator, Isolator, Modelled, State, as_isolator
 from ..map import StabilityMap, stability_map
 from ..orbit import Sine, ascending, period_map, trajectory
 from ._frequency_response import fundamental
 
 
+@shown
 class Transmissibility(eqx.Module):
     """Force on the ground over the force on the mass; under base excitation absolute motion over the base's.
 
@@ -52,9 +54,15 @@ class Transmissibility(eqx.Module):
         """Whether each orbit is stable."""
         return self.spectral_radius < 1.0
 
+    def _headline(self) -> str:
+        ratio, band = np.abs(np.asarray(self.ratio)), np.asarray(self.frequencies)
+        top = int(np.nanargmax(ratio))
+        peak = f"{number(ratio.ravel()[top])} at {number(band[top % band.size])} Hz"
+        return f"largest {peak}, drive {number(float(self.amplitude))}"
+
 
 def transmissibility(
-    model: Isolator,
+    model: Isolator | Modelled,
     amplitude: Scalar | float,
     frequencies: Any,
     *,
@@ -87,6 +95,7 @@ def transmissibility(
         >>> [f"{size:.2f}" for size in abs(ratio).ravel().tolist()]
         ['4.11', '0.10']
     """
+    model = as_isolator(model)
     check_float64()
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
     band = ascending("frequencies", frequencies)

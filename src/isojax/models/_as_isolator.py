@@ -1,0 +1,37 @@
+"""What is meant where an isolator is asked for: many a result holds the one that it is about."""
+
+from typing import Protocol, runtime_checkable
+
+from ._isolator import Isolator
+
+
+@runtime_checkable
+class Modelled(Protocol):
+    """Whatever holds an isolator as `.model`: a classical guess, a fit, an extension, a closed loop."""
+
+    @property
+    def model(self) -> Isolator:
+        """The isolator."""
+        ...
+
+
+def as_isolator(value: object, argument: str = "model") -> Isolator:
+    """Give the isolator that is meant.
+
+    Args:
+        value: an isolator, or what holds one as `.model`.
+        argument: name of the argument, for the message.
+
+    Returns:
+        The isolator.
+
+    Raises:
+        ValueError: if there is none.
+    """
+    meant = value if isinstance(value, Isolator) else getattr(value, "model", None)
+    if not isinstance(meant, Isolator):
+        raise ValueError(
+            f"Argument `{argument}` must be an isolator, such as guess.model or fit.model, but is of type "
+            f"{type(value).__name__}."
+        )
+    return meant
