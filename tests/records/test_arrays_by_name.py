@@ -288,6 +288,7 @@ def test_measured_files_are_listed_whole(shared_data: Path) -> None:
     beam = read_mat_columns(shared_data / "brb" / "ForcedFrequencyResponses.mat", None)
     assert len([name for name in beam if name.startswith("FRdata")]) > 20
     fighter = inspect_file(shared_data / "f16" / "F16Data_FullMSine_Level1.mat", rate=400.0)
-    assert fighter.drive == "Force"
-    assert fighter.kind == "periodic"
-    assert fighter.period == 16384 // 2 or fighter.period == 16384 or fighter.period == 8192
+    assert (fighter.drive, fighter.response) == ("Force", "Acceleration[0, :]")
+    assert (fighter.kind, fighter.period) == ("periodic", 8192)
+    box = inspect_file(shared_data / "silverbox" / "SNLS80mV_multisine.mat", rate=610.3516)
+    assert (box.drive, box.response) == ("V1", "V2")

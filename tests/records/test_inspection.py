@@ -158,6 +158,8 @@ def test_a_gap_in_the_time_is_said_and_the_time_left_out_of_the_draft(tmp_path: 
         ("Acc_table_X", None, "acceleration"),
         ("load cell", "V", "force"),
         ("U", "mV", "command"),
+        ("V1", None, "command"),
+        ("v", None, "velocity"),
         ("ch1", None, None),
         ("Beschleunigung", None, "acceleration"),
     ],

@@ -38,7 +38,7 @@ def read_hdf5_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
 def _leaves(file: Path, path: str, node: Any) -> Iterator[Leaf]:
     if isinstance(node, h5py.Group):
         point = "." if "MATLAB_class" in node.attrs else "/"
-        for name in node:
+        for name in map(str, node):
             if not name.startswith("#"):  # where MATLAB keeps what its cells and structs refer to
                 yield from _leaves(file, f"{path}{point}{name}" if path else name, node.get(name))
     elif isinstance(node, h5py.Dataset):

@@ -74,11 +74,11 @@ def find_layout(
     if width == 0:
         return None
     first = _first_row(rows, which, width)
-    cells = lambda i: list(rows[i]) if divide is None else list(divide(i, width))  # noqa: E731
-    above = [cells(i) for i in range(max(first - 2, 0), first)][::-1]
+    places = range(first - 1, max(first - 3, -1), -1)
+    above: list[Sequence[str]] = [rows[i] if divide is None else divide(i, width) for i in places]
     units: list[str | None] = [None] * width
     if len(above) == 2 and len(above[1]) == width and _are_units(above[0], width):
-        units = [bare_unit(cell) for cell in (above[0] + [""] * width)[:width]]
+        units = [bare_unit(cell) for cell in [*above[0], *[""] * width][:width]]
         above = above[1:]
     if not above or (len(above[0]) < 2 <= width):
         headings = [f"[:, {i}]" for i in range(width)]

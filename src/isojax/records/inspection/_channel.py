@@ -78,8 +78,8 @@ def inspect_channel(
     finite = samples[np.isfinite(samples)]
     missing = samples.size - finite.size
     if finite.size < 2:
-        nothing = (float("nan"),) * 4
-        return ChannelInspection(name, unit, quantity, samples, *nothing, missing, 0.0, 0.0, float("nan"), 0)
+        nan = float("nan")
+        return ChannelInspection(name, unit, quantity, samples, nan, nan, nan, nan, missing, 0.0, 0.0, nan, 0)
     rms = float(np.std(finite))
     quarter = finite.size // _ENDS
     weight = np.blackman(quarter + 2)[1:-1] if quarter else np.ones(0)

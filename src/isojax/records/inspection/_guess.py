@@ -32,7 +32,9 @@ def guess_quantity(name: str, unit: str | None) -> str | None:
         return measured.quantity
     if measured is not None and measured.quantity == "current":
         return "command"
-    words = [word for word in re.split(r"[^A-Za-z]+", name.lower()) if word]
+    words = [word for word in re.split(r"[^A-Za-z]+", name) if word]
+    # "V1" is a voltage, "v" a velocity.
+    words = ["voltage" if word == "V" else word.lower() for word in words]
     for quantity, pattern in _WORDS.items():
         if any(re.fullmatch(pattern, word) for word in words):
             return quantity

@@ -11,12 +11,16 @@ from jaxtyping import Float
 from .._record import Direction, Dwell, ExcitationKind
 from ..formats import Column, channel_unit, columns_of, split_heading, uniform_rate
 from ..reading import detect_kind, find_reader
+from ..spectrum import ringing_frequency
 from ._channel import ChannelInspection, inspect_channel
 from ._guess import drive_and_response, guess_quantity, is_time
 from ._period import find_period
 
 _FEWEST = 16
 """Values without which a column is no channel."""
+
+_PARTS = 8
+"""Parts of a sweep whose frequencies are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +177,7 @@ def _direction(
     if kind == "stepped_sine":
         frequency = np.array([one.frequency for one in dwells])
     elif kind == "swept":
-        parts = np.array_split(drive - np.mean(drive), 8)
-        frequency = np.array([np.count_nonzero(np.diff(np.signbit(part))) / part.size for part in parts])
+        frequency = np.array([ringing_frequency(part, 1.0) for part in np.array_split(drive, _PARTS)])
     else:
         return "none"
     way = float(np.sum(np.sign(np.diff(frequency))))

@@ -1,8 +1,10 @@
 """The period of a periodic excitation, from its samples alone."""
 
+from typing import cast
+
 import numpy as np
-import scipy.fft
 from jaxtyping import Float
+from scipy.fft import next_fast_len
 
 _SHORTEST = 16
 """Samples below which a repetition is a sine rather than a period."""
@@ -30,10 +32,10 @@ def find_period(signal: Float[np.ndarray, " time"]) -> int | None:
     size = centred.size
     if size < 2 * _SHORTEST or not np.any(centred):
         return None
-    length = scipy.fft.next_fast_len(2 * size, real=True)
-    spectrum = np.abs(scipy.fft.rfft(centred, length)) ** 2
+    length = cast(int, next_fast_len(2 * size, real=True))
+    spectrum = np.abs(np.fft.rfft(centred, length)) ** 2
     lags = np.arange(size // 2 + 1)
-    product = scipy.fft.irfft(spectrum, length)[: lags.size]
+    product = np.fft.irfft(spectrum, length)[: lags.size]
     power = np.concatenate([[0.0], np.cumsum(centred**2)])
     early, late = power[size - lags], power[size] - power[lags]
     correlation = product / np.sqrt(np.maximum(early * late, 1e-300))

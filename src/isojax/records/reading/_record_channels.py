@@ -77,11 +77,11 @@ def read_channels(
         ValueError: If the file, a channel, its unit or the span of the record is wrong.
     """
     sections, clock = declared.sections, declared.sections["sampling"]["time"]
-    named = {
+    named: dict[str, str] = {
         one: sections[one]["column"] for one in ("input", "output", "floor") if sections[one] is not None
     }
-    wanted = list(dict.fromkeys([*named.values(), *([clock] if clock else [])]))
-    columns = read_columns(file, wanted, declared.given(entry))
+    wanted: list[str] = [*named.values(), clock] if clock else [*named.values()]
+    columns = read_columns(file, list(dict.fromkeys(wanted)), declared.given(entry))
     total = columns[named["input"]].samples.size
     start, stop = _checked_span(where, file, entry, total)
     measured, units = {}, {}
