@@ -201,6 +201,13 @@ def test_files_that_differ_in_channels_or_lack_a_rate_are_no_campaign(tmp_path: 
         draft_campaign([inspect_file("bare", data={"F [N]": sine, "a [g]": sine})], tmp_path)
 
 
+def test_a_given_rate_must_be_that_of_the_file() -> None:
+    held = run(np.sin(TIME), np.cos(TIME))
+    assert inspect_file("run", RATE, data=held).rate_from == "given, and time column `t [s]`"
+    with pytest.raises(ValueError, match=r"run: the given rate is 400 Hz, but 500 Hz by .*time column"):
+        inspect_file("run", 400.0, data=held)
+
+
 def test_the_steps_and_sweeps_of_simulated_campaigns_are_seen(tmp_path: Path) -> None:
     plant = Plant((LinearStiffness(4e4), LinearDamping(300.0)), mass=40.0)
     plan = SteppedSine((20.0,), (3.0, 4.0, 5.0), cycles=12, holdout_levels=())

@@ -44,6 +44,7 @@ TEXTS = {
     "free lines above semicolons": FREE + "\n\n" + written(";", ","),
     "a row of units": written(",").replace("acceleration\n", "acceleration\nN,m/s^2\n", 1),
     "a row of units in brackets": written(";").replace("acceleration\n", "acceleration\n[N];[m/s²]\n", 1),
+    "a row of units, then one of remarks": written(",").replace("on\n", "on\nN,m/s^2\ncell 3,table\n", 1),
     "units in the heading": written(",", head="force [N],acceleration [m/s^2]"),
     "units in round brackets": written("\t", head="force (N),acceleration (m/s2)"),
     "units and spaces": spaced(written(","))

@@ -74,12 +74,15 @@ def find_layout(
     if width == 0:
         return None
     first = _first_row(rows, which, width)
-    places = range(first - 1, max(first - 3, -1), -1)
+    places = range(first - 1, max(first - 4, -1), -1)
     above: list[Sequence[str]] = [rows[i] if divide is None else divide(i, width) for i in places]
     units: list[str | None] = [None] * width
-    if len(above) == 2 and len(above[1]) == width and _are_units(above[0], width):
-        units = [bare_unit(cell) for cell in [*above[0], *[""] * width][:width]]
-        above = above[1:]
+    # A row of remarks may stand between the units and the numbers.
+    for i in range(min(2, len(above) - 1)):
+        if len(above[i + 1]) == width and _are_units(above[i], width):
+            units = [bare_unit(cell) for cell in [*above[i], *[""] * width][:width]]
+            above = above[i + 1 :]
+            break
     if not above or (len(above[0]) < 2 <= width):
         headings = [f"[:, {i}]" for i in range(width)]
     else:

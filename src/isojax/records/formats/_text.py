@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 import math
 import re
 import warnings
@@ -17,7 +18,7 @@ from .._wording import row
 from ._layout import Layout, find_layout, numeric_cells, pick_columns
 from ._samples import Column, as_samples
 
-_LOOKED_AT = 2000
+_LOOKED_AT = 500
 """Lines from which separator and heading are found."""
 
 _SPACES = r"\s+"
@@ -39,15 +40,18 @@ class TextTable:
         headings: One a column.
         units: Unit that the file states, one a column, or None.
         cells: One array a column: numbers, or objects where a cell is text.
-        lines: Line of the file, counted from 1, in which each row stands.
+        text: The rows of values as they are written.
+        first: Lines of the file above them.
+        decimal: Decimal sign.
     """
 
     file: Path
     headings: tuple[str, ...]
     units: tuple[str | None, ...]
     cells: tuple[np.ndarray, ...]
-    lines: Sequence[int]
-    decimal: str = "."
+    text: str
+    first: int
+    decimal: str
 
     def numbers(self, column: int) -> Float[np.ndarray, " time"] | np.ndarray:
         """Gives a column as numbers; an empty cell is NaN.
@@ -65,7 +69,7 @@ class TextTable:
                 if not _number_test(self.decimal)(text):
                     raise ValueError(
                         f"{self.file}: column `{name}` holds the text {cell!r} at {row(index)}, line "
-                        f"{self.lines[index]} of the file, not a number{self._cause(text)}"
+                        f"{_line(self.text, self.first, index)} of the file, not a number{self._cause(text)}"
                     )
                 found[index] = float(re.sub("[dD]", "e", text).replace(self.decimal, "."))
             else:
@@ -109,9 +113,9 @@ def read_table(file: Path) -> TextTable:
     Raises:
         ValueError: If it is empty, holds no row of numbers, or its rows differ in length.
     """
-    text = decoded(file.read_bytes())
-    lines = re.split(r"\r\n|\r|\n", text)
-    written = [i for i, line in enumerate(lines[: 5 * _LOOKED_AT]) if line.strip()][:_LOOKED_AT]
+    text = decoded(file.read_bytes()).replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.split("\n", 5 * _LOOKED_AT)[: 5 * _LOOKED_AT]
+    written = [i for i, line in enumerate(lines) if line.strip()][:_LOOKED_AT]
     if not written:
         raise ValueError(f"{file} is empty; expected a heading and rows of numbers")
     separator, decimal = _dialect([lines[i] for i in written])
@@ -128,20 +132,21 @@ def read_table(file: Path) -> TextTable:
             f"{lines[written[0]]!r:.80}"
         )
     first = written[layout.first]
-    numbered = [i + 1 for i in range(first, len(lines)) if lines[i].strip()]
     if len(layout.headings) != layout.width:
         raise ValueError(
             f"{file} has {len(layout.headings)} headings but {layout.width} columns of values "
             f"(line {first + 1}); expected one heading a column. Separated by {_NAMES[separator]}; is one of "
             "these within a heading, or is it a decimal comma?"
         )
-    table = _parsed(file, lines, numbered, separator, decimal, layout)
+    values = text[sum(len(line) + 1 for line in lines[:first]) :]
+    table = _parsed(file, values, first, separator, decimal, layout)
     return TextTable(
         file,
         layout.headings,
         layout.units,
         tuple(np.asarray(table.iloc[:, i].to_numpy()) for i in range(layout.width)),
-        numbered,
+        values,
+        first,
         decimal,
     )
 
@@ -209,18 +214,22 @@ def _heading_cells(line: str, separator: str, width: int) -> list[str]:
     return next((cells for cells in others if len(cells) == width), first)
 
 
-def _parsed(
-    file: Path, lines: Sequence[str], numbered: Sequence[int], separator: str, decimal: str, layout: Layout
-) -> pd.DataFrame:
-    first = lines[numbered[0] - 1]
-    count = layout.width if separator == _SPACES else max(layout.width, first.count(separator) + 1)
+def _line(text: str, first: int, index: int) -> int:
+    """Gives the line of the file, from 1 on, in which a row of values stands; empty lines are no rows."""
+    written = (i for i, line in enumerate(text.split("\n")) if line.strip())
+    return first + 1 + next(itertools.islice(written, index, None), 0)
+
+
+def _parsed(file: Path, text: str, first: int, separator: str, decimal: str, layout: Layout) -> pd.DataFrame:
+    head = text.partition("\n")[0]
+    count = layout.width if separator == _SPACES else max(layout.width, head.count(separator) + 1)
     # pandas takes the number of columns from the first row, which may lack cells.
     full = (" " if separator == _SPACES else separator).join(["0"] * count)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             table = pd.read_csv(
-                io.StringIO("\n".join([full, *lines[numbered[0] - 1 :]])),
+                io.StringIO(f"{full}\n{text}"),
                 sep=separator,
                 decimal=decimal,
                 header=None,
@@ -229,28 +238,27 @@ def _parsed(
                 index_col=False,
             )
     except (ValueError, OverflowError, pd.errors.ParserWarning) as error:
-        raise _ragged(file, lines, numbered, separator, layout) from error
+        raise _ragged(file, text, first, separator, layout) from error
     table = table.iloc[1:]
     extra = table.iloc[:, layout.width :]
-    if table.shape[1] < layout.width or not extra.isna().to_numpy().all() or table.shape[0] > len(numbered):
-        raise _ragged(file, lines, numbered, separator, layout)
+    if table.shape[1] < layout.width or not extra.isna().to_numpy().all():
+        raise _ragged(file, text, first, separator, layout)
     return table.iloc[:, : layout.width]
 
 
-def _ragged(
-    file: Path, lines: Sequence[str], numbered: Sequence[int], separator: str, layout: Layout
-) -> ValueError:
+def _ragged(file: Path, text: str, first: int, separator: str, layout: Layout) -> ValueError:
     """Gives the error of a table whose rows differ in length, at the first one that does."""
-    for index, number in enumerate(numbered):
-        count = len(_cells(lines[number - 1], separator))
+    rows = (line for line in text.split("\n") if line.strip())
+    for index, line in enumerate(rows):
+        count = len(_cells(line, separator))
         if count > layout.width:
             cause = "a decimal comma, or one comma too many" if separator == "," else "one separator too many"
             return ValueError(
-                f"{file} is no table of {layout.width} columns: {row(index)}, line {number} of the file, has "
-                f"{count} cells, separated by {_NAMES[separator]}; expected {layout.width}. Likely cause: "
-                f"{cause}"
+                f"{file} is no table of {layout.width} columns: {row(index)}, line "
+                f"{_line(text, first, index)} of the file, has {count} cells, separated by "
+                f"{_NAMES[separator]}; expected {layout.width}. Likely cause: {cause}"
             )
     return ValueError(
         f"{file} is no table of {layout.width} columns separated by {_NAMES[separator]}: from line "
-        f"{numbered[0]} on its rows cannot be told apart. Likely cause: a quotation mark that is never closed"
+        f"{first + 1} on its rows cannot be told apart. Likely cause: a quotation mark that is never closed"
     )

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from .._record import Direction, Dwell, ExcitationKind
 from ..formats import Column, channel_unit, columns_of, split_heading, uniform_rate
-from ..reading import detect_kind, find_reader
+from ..reading import RATE_TOLERANCE, detect_kind, find_reader
 from ..spectrum import ringing_frequency
 from ._channel import ChannelInspection, inspect_channel
 from ._guess import drive_and_response, guess_quantity, is_time
@@ -87,7 +87,7 @@ def inspect_file(
         The inspection.
 
     Raises:
-        ValueError: If the file cannot be read, or holds no channel.
+        ValueError: If the file cannot be read, holds no channel, or contradicts the given rate.
 
     Example:
         >>> time = np.arange(4000) / 500.0
@@ -150,11 +150,20 @@ def _rate(
             steps = np.diff(seconds[np.isfinite(seconds)])
             usual = float(np.median(steps)) if steps.size else 0.0
             measured = 1.0 / usual if usual > 0.0 else None
-    if given is not None:
-        return given, "given", fault
-    if stated is not None:
-        return stated, "stated by the file", fault
-    return measured, "" if measured is None else f"time column `{time}`", fault
+    found = stated or measured
+    origin = "stated by the file" if stated is not None else f"time column `{time}`"
+    if given is None or found is None:
+        return (
+            (given or found),
+            ("given" if given is not None else origin if found is not None else ""),
+            fault,
+        )
+    if abs(given / found - 1.0) > RATE_TOLERANCE:
+        raise ValueError(
+            f"{file}: the given rate is {given:.7g} Hz, but {found:.7g} Hz by what the file says ({origin}); "
+            "they must agree"
+        )
+    return given, f"given, and {origin}", fault
 
 
 def _excitation(

@@ -83,9 +83,6 @@ def _draw_spectra(ax: Axes, file: FileInspection, channels: Sequence[tuple[Chann
 
 
 def _label(channel: ChannelInspection) -> str:
-    unit = channel.unit or "?"
-    return (
-        channel.name
-        if f"[{unit}]" in channel.name or f"({unit})" in channel.name
-        else f"{channel.name} [{unit}]"
-    )
+    unit = channel.unit
+    written = unit is None or f"[{unit}]" in channel.name or f"({unit})" in channel.name
+    return channel.name if written else f"{channel.name} [{unit}]"
