@@ -69,9 +69,7 @@ class FileInspection:
         return self.channels[0].samples.size
 
 
-def inspect_file(
-    file: str | Path, rate: float | None = None, data: Mapping[str, Any] | Any | None = None
-) -> FileInspection:
+def inspect_file(file: str | Path, rate: float | None = None, data: Any = None) -> FileInspection:
     """Gives what is in a data file: channels, rate, units, ranges, clipping, gaps, drift, noise, excitation.
 
     Nothing is declared: what a channel measures is guessed from its unit and its name, and the kind of the
