@@ -71,6 +71,36 @@ def test_a_file_in_place_of_the_folder_is_refused_before_any_work(tmp_path, caps
     assert (tmp_path / "out").read_text(encoding="utf-8") == "mine"
 
 
+def test_inspect_lists_drafts_and_draws_and_the_draft_is_a_campaign(tmp_path, capsys):
+    draft, picture = tmp_path / "new" / "campaign.toml", tmp_path / "new" / "seen.png"
+    options = ["--rate", "500", "--draft", str(draft), "--picture", str(picture)]
+    assert main(["inspect", str(campaign_folder()), *options]) == 0
+    shown = capsys.readouterr().out
+    assert shown.count("stepped sine, 9 dwells from 4.6 to 7 Hz") == 6
+    assert "6 records are read by it" in shown
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert len(isojax.read_campaign(draft).records) == 6
+    assert main(["inspect", str(campaign_folder()), *options]) == 2
+    assert "is not overwritten" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--rate", "-1"], "--rate must be a finite number above 0"),
+        (["--draft", "{}/campaign.toml"], "does not state its sampling rate"),
+        (["{}/none.csv"], "none.csv does not exist"),
+    ],
+)
+def test_inspect_refuses_what_it_cannot_use_in_one_line(options, message, tmp_path, capsys):
+    data = next(campaign_folder().glob("*.npz"))
+    assert main(["inspect", str(data), *(one.format(tmp_path) for one in options)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
 def test_no_command_is_an_error_of_usage(capsys):
     with pytest.raises(SystemExit) as ended:
         main([])

@@ -1,4 +1,4 @@
-"""The command line: close-loop, fit, map, effects, demo."""
+"""The command line: inspect, close-loop, fit, map, effects, demo."""
 
 import argparse
 import contextlib
@@ -15,6 +15,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from . import plot
 from ._compiling import compile_quickly
 from ._progress import KeyFigure, Stage
 from ._results import is_successful
@@ -22,16 +23,18 @@ from ._stage_lines import stage_lines, step_lines
 from .demo import campaign_folder
 from .identification import Fit, classical_guess, fit, read_campaign, silent
 from .models import load_model
-from .records import Campaign
+from .records import Campaign, draft_campaign, find_data_files, inspect_file
 from .reporting import (
     catalogue_table,
     check_folder,
     close_loop,
     compile_seconds,
     folds_around,
+    inspection_summary,
     loop_summary,
     map_summary,
     model_text,
+    png_bytes,
     write_map,
     write_texts,
 )
@@ -82,6 +85,25 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"isojax {version('isojax')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    seen = commands.add_parser(
+        "inspect",
+        help="list what is in data files, draft a campaign.toml",
+        description="List channels, units, ranges, rates, flaws and the kind of excitation of data files "
+        "that no campaign.toml describes yet. Units and quantities come from headings and names.",
+        epilog=_EXIT_CODES,
+    )
+    seen.add_argument("files", nargs="+", metavar="FILE", help="data files, or folders of them")
+    seen.add_argument(
+        "--rate", type=float, metavar="HZ", help="samples per second, where no file states them"
+    )
+    seen.add_argument(
+        "--picture", metavar="PATH", help="draw drive, response and spectra of each file (.png)"
+    )
+    seen.add_argument(
+        "--draft", metavar="PATH", help="write a campaign.toml there, each guess of it marked `# guessed`"
+    )
+    seen.set_defaults(run=_inspect)
 
     loop = commands.add_parser("close-loop", help="fit, name what is missing, add it, report")
     _campaign(loop)
@@ -168,6 +190,32 @@ def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Ca
 def _results() -> Console:
     """Give what shows results; where no terminal reports its width, wide enough for every table."""
     return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
+
+
+def _inspect(asked: argparse.Namespace) -> int:
+    if asked.rate is not None and not 0.0 < asked.rate < math.inf:
+        raise ValueError(f"--rate must be a finite number above 0 [Hz], but is {asked.rate:g}.")
+    targets = [Path(one) for one in (asked.picture, asked.draft) if one is not None]
+    for target in targets:
+        check_folder(target.parent)
+    if asked.draft is not None and Path(asked.draft).exists():
+        raise ValueError(f"--draft {asked.draft} exists already; it is not overwritten.")
+    found, schedules = find_data_files(asked.files)
+    files = [inspect_file(file, asked.rate) for file in found]
+    _results().print(inspection_summary(files))
+    if asked.draft is not None:
+        draft = Path(asked.draft)
+        write_texts(draft.parent, {draft.name: draft_campaign(files, draft.parent, schedules)})
+        try:
+            measured = read_campaign(draft)
+            print(f"{draft}: {len(measured.records)} records are read by it. Check what it says was guessed.")
+        except ValueError as error:
+            print(f"{draft} is written, but must be mended: {error}")
+    if asked.picture is not None:
+        picture = Path(asked.picture)
+        write_texts(picture.parent, {picture.name: png_bytes(plot.inspection(files))})
+        print(f"see {asked.picture}")
+    return 0
 
 
 def _close_loop(asked: argparse.Namespace) -> int:

@@ -1,6 +1,7 @@
 """Every picture is a function here: `isojax.plot.record(record, campaign)` draws a record.
 
-Each takes `ax=`, the axes to draw on, and makes a figure without them. It returns the Figure, shown nowhere.
+Each but `inspection` takes `ax=`, the axes to draw on, and makes a figure without them. It returns the
+Figure, shown nowhere.
 """
 # ruff: noqa: F401
 
@@ -18,6 +19,7 @@ from .reporting.plots import plot_fold_curve as fold_curve
 from .reporting.plots import plot_force_residual_loops as force_residual_loops
 from .reporting.plots import plot_force_residual_map as force_residual_map
 from .reporting.plots import plot_frequency_response as frequency_response
+from .reporting.plots import plot_inspection as inspection
 from .reporting.plots import plot_phase_portrait as phase_portrait
 from .reporting.plots import plot_ranking as ranking
 from .reporting.plots import plot_receptance as receptance

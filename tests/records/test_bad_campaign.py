@@ -24,7 +24,21 @@ MISTAKES = {
     "a misspelt field": ("^mass = ", "mas = ", r"\[campaign\].*unknown field `mas`; did you mean `mass`"),
     "a missing mass": ("^mass = 2.0\n", "", r"\[campaign\] lacks the field `mass`"),
     "a missing column field": ('column = "force"\n', "", r"\[input\] lacks the field `column`"),
-    "a missing unit": ('unit = "N"\n', "", r"\[input\] lacks the field `unit`"),
+    "a missing unit": (
+        'unit = "N"\n',
+        "",
+        r"\[input\] unit is not declared, and .*run\.csv states no unit of .*`force`; write unit = \"N\"",
+    ),
+    "G for standard gravity": (
+        '"m/s\\^2"',
+        '"G"',
+        r'unit = "G" \(gauss\) does not .* did you mean `g`, standard',
+    ),
+    "a unit of time without a time column": (
+        "rate = 200.0",
+        'rate = 200.0\nunit = "ms"',
+        r"\[sampling\] unit = 'ms' is that of the time column, but the field `time`.* is missing",
+    ),
     "a missing quantity": (
         'quantity = "force"\n',
         "",
@@ -77,11 +91,6 @@ MISTAKES = {
     "a knot for a kilonewton": ('unit = "N"', 'unit = "kn"', r"does not measure a force.*did you mean `kN`"),
     "gram for an acceleration's unit": ('"m/s\\^2"', '"kg"', r"does not measure an acceleration"),
     "a unit with a number": ('"m/s\\^2"', '"2 m/s^2"', r"is not a unit"),
-    "a floor without its unit": (
-        r"\[model\]",
-        FLOOR.replace('unit = "m/s^2"', ""),
-        r"\[floor\] lacks the field `unit`",
-    ),
     "a floor measured in newtons": (
         r"\[model\]",
         FLOOR.replace("m/s^2", "N"),

@@ -2,6 +2,7 @@
 
 In: the path of a campaign.toml. Out: a `Campaign` of `Record`s in SI, its noise and the health of its data.
 Read `_record.py` and `_campaign.py` first, then `reading/` (with `formats/`), `spectrum/` and `noise/`.
+`inspection/` is for files that no campaign.toml describes yet.
 """
 
 from ._blow import driven_samples as driven_samples
@@ -13,6 +14,12 @@ from ._campaign import InputChannel as InputChannel
 from ._campaign import OutputChannel as OutputChannel
 from ._record import Dwell as Dwell
 from ._record import Record as Record
+from .inspection import ChannelInspection as ChannelInspection
+from .inspection import FileInspection as FileInspection
+from .inspection import draft_campaign as draft_campaign
+from .inspection import find_data_files as find_data_files
+from .inspection import find_period as find_period
+from .inspection import inspect_file as inspect_file
 from .noise import DataHealth as DataHealth
 from .noise import NoiseEstimate as NoiseEstimate
 from .noise import NoisePeak as NoisePeak
@@ -21,8 +28,10 @@ from .noise import brief_blows as brief_blows
 from .noise import data_health as data_health
 from .noise import estimate_noise as estimate_noise
 from .noise import noise_peak as noise_peak
+from .reading import READERS as READERS
 from .reading import Declaration as Declaration
 from .reading import detect_kind as detect_kind
+from .reading import find_reader as find_reader
 from .reading import read_declaration as read_declaration
 from .reading import read_measurements as read_measurements
 from .reading import segment_dwells as segment_dwells

@@ -12,11 +12,13 @@ from .page import catalogue_table as catalogue_table
 from .page import check_folder as check_folder
 from .page import error_table as error_table
 from .page import folds_around as folds_around
+from .page import inspection_summary as inspection_summary
 from .page import loop_summary as loop_summary
 from .page import map_arrays as map_arrays
 from .page import map_summary as map_summary
 from .page import model_text as model_text
 from .page import parameter_table as parameter_table
+from .page import png_bytes as png_bytes
 from .page import ranking_table as ranking_table
 from .page import render_page as render_page
 from .page import render_text as render_text

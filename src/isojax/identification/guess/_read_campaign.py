@@ -1,20 +1,27 @@
 """A campaign that can be identified: every name in its [model] is in the catalogue."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ...elements import CATALOGUE
 from ...records import Campaign, read_declaration, read_measurements
 from ._declared_model import catalogue_names
 
 
-def read_campaign(path: str | Path) -> Campaign:
+def read_campaign(
+    source: str | Path | Mapping[str, Any], *, data: Mapping[str, Any] | None = None
+) -> Campaign:
     """Give a measurement campaign, its records in SI units and in the order of the test.
 
     The whole declaration is checked, the names of [model] against the catalogue included, before the first
     data file is opened.
 
     Args:
-        path: the campaign.toml or its folder.
+        source: the campaign.toml, its folder, or a mapping with the sections of one, checked alike. Paths in
+            a mapping are relative to the working directory.
+        data: records in memory in place of files, by the `file` of each [[record]]: arrays by name, a pandas
+            `DataFrame`, an xarray `Dataset`, a NumPy array or a list of SEP 005 channels.
 
     Returns:
         The campaign.
@@ -32,8 +39,22 @@ def read_campaign(path: str | Path) -> Campaign:
         >>> campaign = ij.read_campaign(campaign_folder())
         >>> len(campaign.fit_records), len(campaign.holdout_records)
         (4, 2)
+
+        Without files, of arrays; the unit of the force stands in its name:
+
+        >>> declared = {
+        ...     "campaign": {"mass": 2.0},
+        ...     "input": {"quantity": "force", "column": "force"},
+        ...     "output": {"quantity": "acceleration", "column": "a", "unit": "g"},
+        ...     "sampling": {"rate": 200.0},
+        ...     "record": [{"file": "run", "role": "fit"}],
+        ... }
+        >>> force = np.random.default_rng(0).normal(size=400)
+        >>> campaign = ij.read_campaign(declared, data={"run": {"force [kN]": force, "a": 0.5 * force}})
+        >>> campaign.input.unit, campaign.records[0].rate
+        ('kN', 200.0)
     """
-    declared = read_declaration(path)
+    declared = read_declaration(source, data)
     model = declared.sections["model"]
     names = catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"])
     for name in names:

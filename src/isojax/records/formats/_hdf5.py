@@ -1,24 +1,28 @@
 """HDF5 files, and MATLAB v7.3 files, which are HDF5 with MATLAB's class written on each dataset."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
-from .._wording import listing
-from ._samples import Column, as_samples, missing_column
+from ._leaves import Leaf, leaf_columns
+from ._samples import Column
+
+_UNIT_NAMES = ("unit", "units", "Unit", "Units", "unit_str", "unit_string")
 
 
-def read_hdf5_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
+def read_hdf5_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
     """Gives the named datasets of an HDF5 file.
 
     Args:
         file: The file.
-        names: Paths of datasets, with or without the leading slash.
+        names: Paths of datasets, with or without the leading slash, of a matrix as "path[:, 2]"; None for
+            all.
 
     Returns:
-        Name to column.
+        Name to column, with the unit that an attribute states.
 
     Raises:
         ValueError: If it is not HDF5, a dataset is missing, or one is a group, text or a matrix.
@@ -28,24 +32,56 @@ def read_hdf5_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
     except OSError as error:
         raise ValueError(f"{file} cannot be read as HDF5: {error}") from error
     with handle:
-        return {name: Column(as_samples(_dataset(handle, file, name), file, name)) for name in names}
+        return leaf_columns(file, names, list(_leaves(file, "", handle)))
 
 
-def _dataset(handle: h5py.File, file: Path, name: str) -> np.ndarray:
-    found = handle.get(name)
-    if found is None:
-        present: list[str] = []
-        handle.visititems(lambda path, node: present.append(path) if isinstance(node, h5py.Dataset) else None)
-        raise missing_column(file, name, [path for path in present if not path.startswith("#")])
-    if not isinstance(found, h5py.Dataset):
-        inside = listing(f"{name}/{key}" for key in found) if isinstance(found, h5py.Group) else "no numbers"
-        raise ValueError(
-            f"{file}: `{name}` is a group or struct, not a dataset of numbers; it holds {inside}"
-        )
-    matlab = found.attrs.get("MATLAB_class", b"")
-    matlab = matlab.decode() if isinstance(matlab, bytes) else str(matlab)
-    if matlab in ("char", "cell", "struct", "logical", "function_handle", "string"):
-        raise ValueError(f"{file}: `{name}` is a MATLAB {matlab}; expected one row or column of real numbers")
-    if "MATLAB_empty" in found.attrs:
-        raise ValueError(f"{file}: column `{name}` is empty; expected one row or column of numbers")
-    return np.asarray(found[()])
+def _leaves(file: Path, path: str, node: Any) -> Iterator[Leaf]:
+    if isinstance(node, h5py.Group):
+        point = "." if "MATLAB_class" in node.attrs else "/"
+        for name in map(str, node):
+            if not name.startswith("#"):  # where MATLAB keeps what its cells and structs refer to
+                yield from _leaves(file, f"{path}{point}{name}" if path else name, node.get(name))
+    elif isinstance(node, h5py.Dataset):
+        if node.dtype == h5py.ref_dtype:
+            # The field of an array of structs, and a cell array: a list of references.
+            parent, _, field = path.rpartition(".")
+            cell = _matlab_class(node) == "cell" or not parent
+            for i, reference in enumerate(np.asarray(node[()]).reshape(-1)):
+                if reference:
+                    place = f"{path}[{i}]" if cell else f"{parent}[{i}].{field}"
+                    yield from _leaves(file, place, node.file[reference])
+        elif node.dtype.names:
+            for field in node.dtype.names:
+                yield Leaf(f"{path}.{field}", _field(node, field))
+        else:
+            yield Leaf(path, _reader(file, path, node), _unit(node))
+
+
+def _field(node: Any, field: str) -> Callable[[], Any]:
+    return lambda: node[field]
+
+
+def _reader(file: Path, path: str, node: Any) -> Callable[[], Any]:
+    def read() -> np.ndarray:
+        matlab = _matlab_class(node)
+        if matlab in ("char", "cell", "struct", "logical", "function_handle", "string"):
+            raise ValueError(
+                f"{file}: `{path}` is a MATLAB {matlab}; expected one row or column of real numbers"
+            )
+        if "MATLAB_empty" in node.attrs:
+            raise ValueError(f"{file}: column `{path}` is empty; expected one row or column of numbers")
+        values = np.asarray(node[()])
+        return values.T if matlab else values  # MATLAB writes columns first
+
+    return read
+
+
+def _matlab_class(node: Any) -> str:
+    found = node.attrs.get("MATLAB_class", b"")
+    return found.decode() if isinstance(found, bytes) else str(found)
+
+
+def _unit(node: Any) -> str | None:
+    found = next((node.attrs[name] for name in _UNIT_NAMES if name in node.attrs), None)
+    found = found.decode(errors="replace") if isinstance(found, bytes) else found
+    return found.strip() or None if isinstance(found, str) else None

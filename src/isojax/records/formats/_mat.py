@@ -1,21 +1,26 @@
 """MATLAB files up to v7 by SciPy, v7.3 as the HDF5 it is."""
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import h5py
+import numpy as np
 import scipy.io
 
 from ._hdf5 import read_hdf5_columns
-from ._samples import Column, as_samples, missing_column
+from ._leaves import Leaf, leaf_columns
+from ._samples import Column
 
 
-def read_mat_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
+def read_mat_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
     """Gives the named variables of a .mat file.
 
     Args:
         file: The file, of any MATLAB version.
-        names: Variable names; in v7.3 a field of a struct is "struct/field".
+        names: Variable names; a field of a struct is "struct.field", of the second struct of an array
+            "struct[1].field", a column of a matrix "data[:, 2]", counted from 0. None for all.
 
     Returns:
         Name to column.
@@ -27,13 +32,40 @@ def read_mat_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
     if h5py.is_hdf5(file):
         return read_hdf5_columns(file, names)
     try:
-        held = scipy.io.loadmat(file, appendmat=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # SciPy warns of variables that nobody asked for
+            held = scipy.io.loadmat(file, appendmat=False)
     except Exception as error:  # SciPy raises TypeError, ValueError, zlib.error, ... on a broken file
         raise ValueError(f"{file} cannot be read as a MATLAB .mat file: {error}") from error
-    present = [name for name in held if not name.startswith("__")]
-    columns = {}
-    for name in names:
-        if name not in present:
-            raise missing_column(file, name, present)
-        columns[name] = Column(as_samples(held[name], file, name))
-    return columns
+    leaves = [
+        leaf
+        for name, value in held.items()
+        if not name.startswith("__")
+        for leaf in _leaves(file, name, value)
+    ]
+    return leaf_columns(file, names, leaves)
+
+
+def _leaves(file: Path, path: str, value: Any) -> Iterator[Leaf]:
+    if isinstance(value, scipy.io.matlab.MatlabOpaque):
+        yield Leaf(path, _refusal(file, path))
+    elif isinstance(value, np.ndarray) and (value.dtype.names or value.dtype == object):
+        for i, one in enumerate(value.reshape(-1)):
+            place = path if value.size == 1 else f"{path}[{i}]"
+            if value.dtype.names:
+                for field in value.dtype.names:
+                    yield from _leaves(file, f"{place}.{field}", one[field])
+            else:
+                yield from _leaves(file, place, one)
+    else:
+        yield Leaf(path, lambda: value)
+
+
+def _refusal(file: Path, path: str) -> Callable[[], Any]:
+    def refuse() -> Any:
+        raise ValueError(
+            f"{file}: column `{path}` holds objects, a MATLAB table, timetable or class, that only MATLAB "
+            "can read; save its variables as arrays, such as force = T.force"
+        )
+
+    return refuse

@@ -1,16 +1,18 @@
 """NumPy archives."""
 
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ._samples import Column, as_samples, missing_column
+from ._leaves import Leaf, leaf_columns
+from ._samples import Column
 
 
-def read_npz_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
-    """Gives the named arrays of an .npz archive.
+def read_npz_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
+    """Gives the named arrays of an .npz archive; "data[:, 2]" is a column of a matrix.
 
     Raises:
         ValueError: If it is no archive, an array is missing, or one is not a row or column of real numbers.
@@ -21,14 +23,15 @@ def read_npz_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
         raise ValueError(f"{file} cannot be read as a NumPy .npz archive: {error}") from error
     if not isinstance(archive, np.lib.npyio.NpzFile):
         raise ValueError(f"{file} holds a single array without a name; expected a NumPy .npz archive")
-    with archive:
-        columns = {}
-        for name in names:
-            if name not in archive.files:
-                raise missing_column(file, name, archive.files)
+
+    def reader(name: str) -> Callable[[], Any]:
+        def read() -> np.ndarray:
             try:
-                values = archive[name]
+                return archive[name]
             except (ValueError, zipfile.BadZipFile, EOFError, OSError) as error:
                 raise ValueError(f"{file}: array `{name}` cannot be read as numbers: {error}") from error
-            columns[name] = Column(as_samples(values, file, name))
-    return columns
+
+        return read
+
+    with archive:
+        return leaf_columns(file, names, [Leaf(name, reader(name)) for name in archive.files])

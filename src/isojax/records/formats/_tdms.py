@@ -6,15 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from ._samples import Column, as_samples, find_channel
+from ._heading import split_heading
+from ._samples import Column, as_samples, find_channel, missing_extra, unit_of_time
+
+_UNIT_NAMES = ("unit_string", "NI_UnitDescription", "Unit", "unit")
+"""Properties under which LabVIEW, DIAdem and others write the unit of a channel."""
 
 
-def read_tdms_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
+def read_tdms_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
     """Gives the named channels of a TDMS file.
 
     Args:
         file: The file.
-        names: Channel names, as "channel" or "group/channel".
+        names: Channel names, as "channel" or "group/channel"; None for all channels of numbers.
 
     Returns:
         Name to column, with the rate and, relative to the first of them, the start time that the file states.
@@ -26,26 +30,38 @@ def read_tdms_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
     try:
         from nptdms import TdmsFile
     except ImportError as error:
-        raise ValueError(f"{file}: reading TDMS needs npTDMS; pip install isojax[io]") from error
+        raise missing_extra(file, "npTDMS", "TDMS") from error
     try:
         held = TdmsFile.read(str(file))
         channels = [channel for group in held.groups() for channel in group.channels()]
     except Exception as error:  # npTDMS raises ValueError, KeyError, struct.error, ... on a broken file
         raise ValueError(f"{file} cannot be read as TDMS: {error}") from error
     known = [(f"{one.group_name}/{one.name}", one.name) for one in channels]
+    if names is None:
+        names = [_shortest(own, known) for own, one in zip(known, channels, strict=True) if _is_channel(one)]
     chosen = {name: channels[find_channel(file, name, known)] for name in names}
     clocks = [channel.properties.get("wf_start_time") for channel in chosen.values()]
     origin = next((clock for clock in clocks if clock is not None), None)
     return {name: _channel_column(file, name, channel, origin) for name, channel in chosen.items()}
 
 
+def _shortest(own: tuple[str, str], known: Sequence[tuple[str, str]]) -> str:
+    return own[1] if sum(own[1] in other for other in known) == 1 else own[0]
+
+
+def _is_channel(channel: Any) -> bool:
+    return len(channel) > 1 and channel.dtype is not None and np.dtype(channel.dtype).kind in "iufM"
+
+
 def _channel_column(file: Path, name: str, channel: Any, origin: Any) -> Column:
     samples = as_samples(channel[:], file, name)
+    unit = next((str(channel.properties[one]) for one in _UNIT_NAMES if channel.properties.get(one)), None)
+    unit = unit or split_heading(channel.name)[1] or unit_of_time(channel[:2])
     increment = channel.properties.get("wf_increment")
     if increment is None or not float(increment) > 0:
-        return Column(samples)
+        return Column(samples, unit=unit)
     start = float(channel.properties.get("wf_start_offset", 0.0))
     clock = channel.properties.get("wf_start_time")
     if clock is not None and origin is not None:
         start += float((np.datetime64(clock) - np.datetime64(origin)) / np.timedelta64(1, "us")) * 1e-6
-    return Column(samples, rate=1.0 / float(increment), start=start)
+    return Column(samples, rate=1.0 / float(increment), start=start, unit=unit)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from .._wording import listing
-from ._samples import Column, as_samples, find_channel
+from ._samples import Column, as_samples, find_channel, missing_extra
 
 _TIME_RESPONSE = (0, 1)  # function type "general" and "time response"
 _TIME_AXES = (0, 1, 17)  # abscissa "unknown", "general" and "time"; 18 is frequency
 
 
-def read_universal_columns(file: Path, names: Sequence[str]) -> dict[str, Column]:
+def read_universal_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
     """Gives the named time histories of a universal file.
 
     A channel is named by its first header line, its response entity, its ordinate label or "node:direction",
@@ -23,7 +23,7 @@ def read_universal_columns(file: Path, names: Sequence[str]) -> dict[str, Column
 
     Args:
         file: The file, ASCII or binary.
-        names: Channel names.
+        names: Channel names; None for all time histories.
 
     Returns:
         Name to column, with the rate and start time that the file states.
@@ -34,6 +34,9 @@ def read_universal_columns(file: Path, names: Sequence[str]) -> dict[str, Column
     """
     histories = _time_histories(file)
     labels = [_labels(one) for one in histories]
+    if names is None:
+        unique = [[one for one in own if sum(one in other for other in labels) == 1] for own in labels]
+        names = [own[0] for own in unique if own]
     return {name: _dataset_column(file, name, histories[find_channel(file, name, labels)]) for name in names}
 
 
@@ -41,7 +44,7 @@ def _time_histories(file: Path) -> list[dict[str, Any]]:
     try:
         import pyuff
     except ImportError as error:
-        raise ValueError(f"{file}: reading universal files needs pyuff; pip install isojax[io]") from error
+        raise missing_extra(file, "pyuff", "universal files") from error
     raw = file.read_bytes()
     if not raw.strip():
         raise ValueError(f"{file} is empty; expected a universal file with datasets 58")
@@ -98,4 +101,10 @@ def _dataset_column(file: Path, name: str, one: dict[str, Any]) -> Column:
             )
     if not step > 0:
         raise ValueError(f"{file}: channel `{name}` states a time step of {step} s; it must be above 0")
-    return Column(samples, rate=1.0 / step, start=start)
+    return Column(samples, rate=1.0 / step, start=start, unit=_unit(one))
+
+
+def _unit(one: dict[str, Any]) -> str | None:
+    """Gives the label of the ordinate's unit, where the file has one."""
+    written = str(one.get("ordinate_axis_units_lab") or "").strip()
+    return None if written in ("", "NONE") else written

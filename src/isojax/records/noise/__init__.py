@@ -13,3 +13,4 @@ from ._noise import estimate_noise as estimate_noise
 from ._noise_peak import NoisePeak as NoisePeak
 from ._noise_peak import noise_peak as noise_peak
 from ._spikes import Spikes as Spikes
+from ._spikes import find_spikes as find_spikes

@@ -2,12 +2,16 @@
 
 In: the path of a campaign.toml. Out: its checked `Declaration`, and from that the `Campaign` with its
 records. Read `_declaration.py` first, then `_read_measurements.py`. It uses `_record_channels.py` (with
-`_data_file.py`, `_channel_units.py`, `_time_base.py`, `_floor.py`), then `_reader_filter.py`, then
-`_schedule.py`, `_find_dwells.py` and `_excitation_kind.py`.
+`_data_file.py`, `_channel_factor.py`, `_channel_units.py`, `_time_base.py`, `_floor.py`), then
+`_reader_filter.py`, then `_schedule.py`, `_find_dwells.py` and `_excitation_kind.py`.
 """
 
+from ._data_file import READERS as READERS
+from ._data_file import find_reader as find_reader
 from ._declaration import Declaration as Declaration
 from ._declaration import read_declaration as read_declaration
 from ._excitation_kind import detect_kind as detect_kind
 from ._find_dwells import segment_dwells as segment_dwells
 from ._read_measurements import read_measurements as read_measurements
+from ._schedule import SCHEDULE_HEADINGS as SCHEDULE_HEADINGS
+from ._time_base import RATE_TOLERANCE as RATE_TOLERANCE

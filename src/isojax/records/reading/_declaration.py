@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
+
 from ..._show import shown
 from .._campaign import Hold, InputQuantity, OutputQuantity
 from .._record import Direction, ExcitationKind, Role
@@ -96,7 +98,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
     "input": {
         "quantity": _choice(*get_args(InputQuantity), required=True),
         "column": _text(required=True),
-        "unit": _text(required=True),
+        "unit": _text(),
         "gain": _factor(),
         "gain_free": _flag(),
         "offset_free": _flag(),
@@ -106,7 +108,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
     "output": {
         "quantity": _choice(*get_args(OutputQuantity), required=True),
         "column": _text(required=True),
-        "unit": _text(required=True),
+        "unit": _text(),
         "offset_free": _flag(),
         "noise": _positive(),
         "relative_error": _positive(default=1e-3),
@@ -114,10 +116,10 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
     "floor": {
         "quantity": _choice(*get_args(OutputQuantity), required=True),
         "column": _text(required=True),
-        "unit": _text(required=True),
+        "unit": _text(),
         "gain": _factor(),
     },
-    "sampling": {"rate": _positive(), "time": _text()},
+    "sampling": {"rate": _positive(), "time": _text(), "unit": _text()},
     "filter": {
         "kind": _choice("butterworth", default="butterworth"),
         "order": _count(at_least=1, required=True),
@@ -145,6 +147,10 @@ _ABSENT_SECTIONS = ("floor", "filter")
 """Sections that are None where the file has none; of the others every field is then at its default."""
 
 
+_IN_MEMORY = "declaration"
+"""Called so in errors where it is no file."""
+
+
 @shown
 @dataclass(frozen=True)
 class Declaration:
@@ -155,34 +161,46 @@ class Declaration:
         sections: Section name to field name to value; "filter" and "floor" are None where the
             file has none.
         records: One mapping per [[record]], in order.
+        data: What is in memory in place of data files, by the `file` of a record; None: they are files.
     """
 
     file: Path
     sections: Mapping[str, Any]
     records: tuple[Mapping[str, Any], ...]
+    data: Mapping[str, Any] | None = None
+
+    def given(self, record: Mapping[str, Any]) -> Any:
+        """Gives the data of a record that are in memory, or None."""
+        return None if self.data is None else self.data[record["file"]]
 
 
-def read_declaration(path: str | Path) -> Declaration:
-    """Gives the checked contents of a campaign.toml.
+def read_declaration(
+    source: str | Path | Mapping[str, Any], data: Mapping[str, Any] | None = None
+) -> Declaration:
+    """Gives the checked contents of a campaign.toml, or of a mapping of the same form.
 
     Args:
-        path: The .toml or the folder that holds a campaign.toml.
+        source: The .toml, the folder that holds a campaign.toml, or a mapping with its sections: "campaign",
+            "input", ..., and "record", a list. A field that is None counts as left out.
+        data: What is in memory in place of data files: of each record, by its `file`.
 
     Returns:
         The declaration.
 
     Raises:
         ValueError: If the file is missing, is not TOML, or holds a section, field or value that does not
-            belong.
+            belong; if `data` lacks a record.
     """
-    file = Path(path)
-    if file.is_dir():
-        file = file / "campaign.toml"
-    if not file.is_file():
-        raise ValueError(
-            f"{file} does not exist; expected a campaign .toml, or a folder with a campaign.toml"
-        )
-    table = _parse(file)
+    if isinstance(source, Mapping):
+        file, table = Path(_IN_MEMORY), _plain(source)
+    else:
+        file = Path(source)
+        file = file / "campaign.toml" if file.is_dir() else file
+        if not file.is_file():
+            raise ValueError(
+                f"{file} does not exist; expected a campaign .toml, or a folder with a campaign.toml"
+            )
+        table = _parse(file)
     _check_names(file, "the file", table, (*SECTIONS, "record"), "section")
     sections: dict[str, Any] = {}
     for name, fields in SECTIONS.items():
@@ -204,7 +222,22 @@ def read_declaration(path: str | Path) -> Declaration:
         _checked(file, f"[[record]] number {i + 1}", one, RECORD) for i, one in enumerate(entries)
     )
     _check_together(file, sections, records)
-    return Declaration(file, sections, records)
+    for number, record in enumerate(records if data is not None else (), start=1):
+        if record["file"] not in (data or {}):
+            raise ValueError(
+                f'{file}: [[record]] number {number} has file = "{record["file"]}", but argument `data` has '
+                f"{listing(map(str, data or {}))} only{nearest(record['file'], map(str, data or {}))}"
+            )
+    return Declaration(file, sections, records, data)
+
+
+def _plain(value: Any) -> Any:
+    """Gives mappings, sequences and NumPy numbers as a TOML file would hold them, without fields of None."""
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items() if one is not None}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _parse(file: Path) -> dict[str, Any]:
@@ -267,6 +300,11 @@ def _check_together(file: Path, sections: Mapping[str, Any], records: tuple[Mapp
             "says that the base itself is driven; its motion is the input"
         )
     _check_columns(file, sections)
+    if sections["sampling"]["unit"] is not None and sections["sampling"]["time"] is None:
+        raise ValueError(
+            f"{file}: [sampling] unit = {sections['sampling']['unit']!r} is that of the time column, but the "
+            "field `time`, its name, is missing; a rate is always in Hz"
+        )
     for number, record in enumerate(records, start=1):
         _check_kind(f"{file}: [[record]] number {number}", record)
     if not any(record["role"] == "fit" for record in records):

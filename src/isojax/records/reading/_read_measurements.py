@@ -1,6 +1,5 @@
 """The data files of a declaration as one `Campaign` in SI."""
 
-import filecmp
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 from .._campaign import TIME_DERIVATIVES, Campaign, Filter, FloorChannel, InputChannel, OutputChannel
 from .._record import Dwell, ExcitationKind, Record
 from ..spectrum import ringing_frequency
-from ._channel_units import si_factor
+from ._channel_factor import check_units
 from ._declaration import Declaration
 from ._excitation_kind import detect_kind
 from ._find_dwells import check_dwells, segment_dwells
@@ -19,13 +18,6 @@ from ._reader_filter import filter_channels
 from ._record_channels import RecordChannels, read_channels
 from ._schedule import read_schedule, scheduled_dwells
 from ._time_base import RATE_TOLERANCE
-
-_INPUT_MEASURES = {
-    "force": "force",
-    "base_acceleration": "acceleration",
-    "reaction_mass_acceleration": "acceleration",
-    "command": "command",
-}
 
 
 def read_measurements(declared: Declaration) -> Campaign:
@@ -46,19 +38,15 @@ def read_measurements(declared: Declaration) -> Campaign:
             found and what was expected.
     """
     file, sections = declared.file, declared.sections
-    drive = InputChannel(**sections["input"])
-    response = OutputChannel(**sections["output"])
-    floor = None if sections["floor"] is None else FloorChannel(**sections["floor"])
+    check_units(declared)
     reader_filter = None if sections["filter"] is None else Filter(**sections["filter"])
-    sign = -drive.moving_mass if drive.moving_mass is not None else 1.0
-    factors = (
-        sign * drive.gain * si_factor(drive.unit, _INPUT_MEASURES[drive.quantity], f"{file}: [input] unit"),
-        si_factor(response.unit, response.quantity, f"{file}: [output] unit"),
-        1.0 if floor is None else floor.gain * si_factor(floor.unit, floor.quantity, f"{file}: [floor] unit"),
-    )
     names = _record_names(declared)
-    records = tuple(
-        _read_record(declared, i, names[i], factors, reader_filter) for i in range(len(declared.records))
+    read = [_read_record(declared, i, names[i], reader_filter) for i in range(len(declared.records))]
+    records, units = tuple(record for record, _ in read), read[0][1]
+    drive = InputChannel(**{**sections["input"], "unit": units["input"]})
+    response = OutputChannel(**{**sections["output"], "unit": units["output"]})
+    floor = (
+        None if sections["floor"] is None else FloorChannel(**{**sections["floor"], "unit": units["floor"]})
     )
     _check_apart(declared, records)
     rate = records[0].rate
@@ -112,13 +100,13 @@ def _read_record(
     declared: Declaration,
     number: int,
     name: str,
-    factors: tuple[float, float, float],
     reader_filter: Filter | None,
-) -> Record:
+) -> tuple[Record, Mapping[str, str]]:
+    """Gives a record, and the units of its channels in the file."""
     entry = declared.records[number]
     where = f"{declared.file}: [[record]] number {number + 1}"
     file = declared.file.parent / entry["file"]
-    channels = read_channels(where, file, declared, entry, factors)
+    channels = read_channels(where, file, declared, entry)
     if reader_filter is not None:
         channels = filter_channels(where, declared.file, entry, reader_filter, channels)
     dwells, kind = _excitation(where, declared, entry, channels)
@@ -127,7 +115,7 @@ def _read_record(
             f"{file}: column `{declared.sections['input']['column']}` is 0 throughout, and the output does "
             'not decay; expected a force that varies, or kind = "free_decay"'
         )
-    return Record(
+    record = Record(
         name=name,
         file=file,
         time=np.arange(channels.stop - channels.start) / channels.rate,
@@ -147,6 +135,7 @@ def _read_record(
         start=channels.start,
         floor=channels.floor_acceleration(declared),
     )
+    return record, channels.units
 
 
 def _excitation(
@@ -196,7 +185,7 @@ def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:
                 declared.records[i]["start"] + record.time.size,
                 declared.records[j]["start"] + other.time.size,
             )
-            if first >= last or not _same_content(files[i], files[j]):
+            if first >= last or not (files[i] == files[j] or _same_samples(record, other, first, last)):
                 continue
             shared = (
                 f"[[record]] number {j + 1} and number {i + 1} share samples {first}:{last} of {record.file}"
@@ -209,6 +198,12 @@ def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:
             )
 
 
-def _same_content(first: Path, second: Path) -> bool:
-    """Says whether two paths lead to the same measurement: one file, or a copy under another name."""
-    return first == second or filecmp.cmp(first, second, shallow=False)
+def _same_samples(one: Record, other: Record, first: int, last: int) -> bool:
+    """Says whether two records are one measurement under two names: equal in samples [first, last)."""
+    return all(
+        np.array_equal(
+            getattr(one, channel)[first - one.start : last - one.start],
+            getattr(other, channel)[first - other.start : last - other.start],
+        )
+        for channel in ("raw_input", "raw_output")
+    )

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._wording import row
+from ._channel_factor import channel_factor
 from ._data_file import read_columns
 from ._declaration import Declaration
 from ._floor import floor_acceleration
@@ -33,6 +34,7 @@ class RecordChannels:
         input: Input after it.
         output: Output after it.
         floor: Measured motion of the floor after it, in SI, or None.
+        units: Units of the columns of input, output and floor in the file, as far as they are channels.
     """
 
     start: int
@@ -45,6 +47,7 @@ class RecordChannels:
     input: Float[np.ndarray, " time"]
     output: Float[np.ndarray, " time"]
     floor: Float[np.ndarray, " time"] | None
+    units: Mapping[str, str]
 
     def floor_acceleration(self, declared: Declaration) -> Float[np.ndarray, " time"] | None:
         """Gives the acceleration of the floor [m/s^2], or None."""
@@ -58,7 +61,6 @@ def read_channels(
     file: Path,
     declared: Declaration,
     entry: Mapping[str, Any],
-    factors: tuple[float, float, float],
 ) -> RecordChannels:
     """Gives the channels of a record as they were measured.
 
@@ -67,38 +69,40 @@ def read_channels(
         file: Its data file.
         declared: What the channels are called.
         entry: The [[record]] as declared.
-        factors: From the units of input, output and floor to SI.
 
     Returns:
         The channels; nothing is filtered yet.
 
     Raises:
-        ValueError: If the file, a channel or the span of the record is wrong.
+        ValueError: If the file, a channel, its unit or the span of the record is wrong.
     """
-    sections = declared.sections
-    drive, response, clock = (
-        sections["input"]["column"],
-        sections["output"]["column"],
-        sections["sampling"]["time"],
-    )
-    ground = None if sections["floor"] is None else sections["floor"]["column"]
-    columns = read_columns(file, list(dict.fromkeys(one for one in (drive, response, ground, clock) if one)))
-    total = columns[drive].samples.size
+    sections, clock = declared.sections, declared.sections["sampling"]["time"]
+    named: dict[str, str] = {
+        one: sections[one]["column"] for one in ("input", "output", "floor") if sections[one] is not None
+    }
+    wanted: list[str] = [*named.values(), clock] if clock else [*named.values()]
+    columns = read_columns(file, list(dict.fromkeys(wanted)), declared.given(entry))
+    total = columns[named["input"]].samples.size
     start, stop = _checked_span(where, file, entry, total)
-    raw_input = _finite(file, drive, columns[drive].samples[start:stop], start) * factors[0]
-    raw_output = _finite(file, response, columns[response].samples[start:stop], start) * factors[1]
-    floor = None
-    if ground is not None:
-        floor = _finite(file, ground, columns[ground].samples[start:stop], start) * factors[2]
-        _check_not_constant(file, ground, floor)
-    time = columns[clock].samples[start:stop] if clock else None
+    measured, units = {}, {}
+    for name, column in named.items():
+        unit, factor = channel_factor(declared, name, columns[column], file)
+        units[name] = unit
+        measured[name] = _finite(file, column, columns[column].samples[start:stop], start) * factor
+    raw_input, raw_output, floor = measured["input"], measured["output"], measured.get("floor")
+    if floor is not None:
+        _check_not_constant(file, named["floor"], floor)
+    time = None
+    if clock:
+        seconds = channel_factor(declared, "sampling", columns[clock], file)[1]
+        time = columns[clock].samples[start:stop] * seconds
     stated = next((column.rate for column in columns.values() if column.rate is not None), None)
     rate = find_rate(file, sections["sampling"]["rate"], stated, time, clock, start)
-    _check_not_constant(file, response, raw_output)
+    _check_not_constant(file, named["output"], raw_output)
     if np.ptp(raw_input) == 0.0 and raw_input[0] != 0.0:
-        _check_not_constant(file, drive, raw_input)
+        _check_not_constant(file, named["input"], raw_input)
     return RecordChannels(
-        start, stop, total, entry["settle"], rate, raw_input, raw_output, raw_input, raw_output, floor
+        start, stop, total, entry["settle"], rate, raw_input, raw_output, raw_input, raw_output, floor, units
     )
 
 

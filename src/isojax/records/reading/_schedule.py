@@ -7,9 +7,9 @@ from jaxtyping import Float
 
 from .._record import Dwell
 from .._wording import listing, nearest, row
-from ..formats import numbers, read_table
+from ..formats import read_table, split_heading
 
-_HEADINGS = ("start_s", "frequency_hz", "cycles")
+SCHEDULE_HEADINGS = ("start_s", "frequency_hz", "cycles")
 
 _SHORTEST_DWELL = 2.0
 """A dwell that the record cuts shorter is left out."""
@@ -24,14 +24,15 @@ def read_schedule(file: Path) -> Float[np.ndarray, "segment 3"]:
     """
     if not file.is_file():
         raise ValueError(f"{file} does not exist; it is the schedule of a record")
-    present, cells = read_table(file)
-    for heading in _HEADINGS:
+    table = read_table(file)
+    present = [split_heading(heading)[0] for heading in table.headings]
+    for heading in SCHEDULE_HEADINGS:
         if heading not in present:
             raise ValueError(
-                f"{file}: a schedule needs the headings {listing(_HEADINGS)}, but `{heading}` is not among "
-                f"{listing(present)}{nearest(heading, present)}"
+                f"{file}: a schedule needs the headings {listing(SCHEDULE_HEADINGS)}, but `{heading}` "
+                f"is not among {listing(present)}{nearest(heading, present)}"
             )
-    columns = [numbers(cells[present.index(heading)], file, heading) for heading in _HEADINGS]
+    columns = [table.numbers(present.index(heading)) for heading in SCHEDULE_HEADINGS]
     rows = np.stack(columns, axis=1).astype(np.float64)
     for i, (start, frequency, cycles) in enumerate(rows):
         if not (np.isfinite(start) and start >= 0):

@@ -2,11 +2,14 @@
 
 In: a closed loop with its data health, or a stability map. Out: report.html, result.json, model.json,
 tables for rich, map.npz with its pictures. Read `_summary.py` (terminal), `_result.py` (numbers),
-`_pictures.py` and `_page.py` (HTML), `_write.py` (files whole or not at all), then the two files on maps.
+`_pictures.py` and `_page.py` (HTML), `_write.py` (files whole or not at all), the two files on
+maps, and `_inspection.py`.
 """
 
+from ._inspection import inspection_summary as inspection_summary
 from ._map_files import folds_around as folds_around
 from ._map_files import map_arrays as map_arrays
+from ._map_files import png_bytes as png_bytes
 from ._map_files import write_map as write_map
 from ._map_summary import map_summary as map_summary
 from ._page import render_page as render_page

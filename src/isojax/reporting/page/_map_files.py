@@ -127,11 +127,11 @@ def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None
     np.savez_compressed(buffer, **map_arrays(smap))  # type: ignore[arg-type]
     contents = {
         "map.npz": buffer.getvalue(),
-        "map.png": _picture(plot_stability_map(smap, folds=folds)),
-        "response.png": _picture(plot_response_map(smap, folds=folds)),
+        "map.png": png_bytes(plot_stability_map(smap, folds=folds)),
+        "response.png": png_bytes(plot_response_map(smap, folds=folds)),
     }
     if folds is not None:
-        contents["folds.png"] = _picture(plot_fold_curve(folds, excitation=smap.model.excitation))
+        contents["folds.png"] = png_bytes(plot_fold_curve(folds, excitation=smap.model.excitation))
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in contents.items():
         write_whole(folder / name, content)
@@ -140,7 +140,8 @@ def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None
     return tuple(contents)
 
 
-def _picture(figure: Figure) -> bytes:
+def png_bytes(figure: Figure) -> bytes:
+    """Give a figure as the content of a PNG file."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DOTS)
     return buffer.getvalue()

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..._results import is_successful
@@ -76,7 +77,7 @@ def model_text(fit: Fit) -> str | None:
     return json.dumps(model_to_dict(fit.model), indent=1, allow_nan=False) + "\n"
 
 
-def write_texts(folder: Path, texts: dict[str, str | None]) -> None:
+def write_texts(folder: Path, texts: Mapping[str, str | bytes | None]) -> None:
     """Write files whole; the folder is made now that everything to write is ready.
 
     Args:
