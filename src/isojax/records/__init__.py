@@ -1,7 +1,8 @@
 """What was measured: campaign.toml, readers of data files, dwells, spectra and the noise estimate.
 
 In: the path of a campaign.toml. Out: a `Campaign` of `Record`s in SI, its noise and the health of its data.
-Read `_record.py` and `_campaign.py` first, then `reading/` (with `formats/`), `spectrum/` and `noise/`.
+Read `_record.py` and `_campaign.py` first, then `reading/` (with `formats/`), `spectrum/`, `noise/` and
+`sense/`.
 """
 
 from ._blow import driven_samples as driven_samples
@@ -26,6 +27,10 @@ from .reading import detect_kind as detect_kind
 from .reading import read_declaration as read_declaration
 from .reading import read_measurements as read_measurements
 from .reading import segment_dwells as segment_dwells
+from .sense import Cause as Cause
+from .sense import Suspicion as Suspicion
+from .sense import find_suspicions as find_suspicions
+from .sense import refuse_contradictions as refuse_contradictions
 from .spectrum import Band as Band
 from .spectrum import DwellHarmonics as DwellHarmonics
 from .spectrum import FilterComparison as FilterComparison

@@ -6,6 +6,7 @@ records. Read `_declaration.py` first, then `_read_measurements.py`. It uses `_r
 `_schedule.py`, `_find_dwells.py` and `_excitation_kind.py`.
 """
 
+from ._channel_units import si_factor as si_factor
 from ._declaration import Declaration as Declaration
 from ._declaration import read_declaration as read_declaration
 from ._excitation_kind import detect_kind as detect_kind

@@ -12,7 +12,7 @@ from .._wording import row
 from ._data_file import read_columns
 from ._declaration import Declaration
 from ._floor import floor_acceleration
-from ._time_base import find_rate
+from ._time_base import find_rate, time_jitter
 
 FEWEST_SAMPLES = 16
 """Samples without which a record is refused."""
@@ -33,6 +33,7 @@ class RecordChannels:
         input: Input after it.
         output: Output after it.
         floor: Measured motion of the floor after it, in SI, or None.
+        time_jitter: rms by which the time column departs from the even grid, beyond its rounding [s].
     """
 
     start: int
@@ -45,6 +46,7 @@ class RecordChannels:
     input: Float[np.ndarray, " time"]
     output: Float[np.ndarray, " time"]
     floor: Float[np.ndarray, " time"] | None
+    time_jitter: float = 0.0
 
     def floor_acceleration(self, declared: Declaration) -> Float[np.ndarray, " time"] | None:
         """Gives the acceleration of the floor [m/s^2], or None."""
@@ -97,9 +99,9 @@ def read_channels(
     _check_not_constant(file, response, raw_output)
     if np.ptp(raw_input) == 0.0 and raw_input[0] != 0.0:
         _check_not_constant(file, drive, raw_input)
-    return RecordChannels(
-        start, stop, total, entry["settle"], rate, raw_input, raw_output, raw_input, raw_output, floor
-    )
+    channels = raw_input, raw_output, raw_input, raw_output, floor
+    jitter = 0.0 if time is None else time_jitter(time)
+    return RecordChannels(start, stop, total, entry["settle"], rate, *channels, jitter)
 
 
 def _checked_span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:

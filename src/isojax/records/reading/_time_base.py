@@ -16,6 +16,15 @@ _GAP = 1.5
 _JITTER = 4.0
 """Jitters of the time steps by which a rounded time column may deviate from a uniform one."""
 
+_MOST_DECIMALS = 9
+"""Decimals of a written time at most."""
+
+_WHOLE_DIGIT = 1e-3
+"""Distance from a whole number, in units of the last decimal, within which a time ends there."""
+
+_ROUNDED = 1.5
+"""Rounding errors, by rms, that a time column may depart from an even grid by rounding alone."""
+
 _WHOLE_RATE = 1e-6
 """Relative distance from a whole number of samples per second below which a rate is rounded to it."""
 
@@ -105,3 +114,17 @@ def uniform_rate(file: Path, time: Float[np.ndarray, " time"], column: str, firs
         )
     rate = 1.0 / step
     return float(round(rate)) if abs(rate / max(round(rate), 1) - 1.0) < _WHOLE_RATE else rate
+
+
+def time_jitter(time: Float[np.ndarray, " time"]) -> float:
+    """Gives the rms by which times depart from an even grid, beyond the rounding of their digits [s]."""
+    place = np.arange(time.size) - 0.5 * (time.size - 1)
+    about = time - np.mean(time)
+    scatter = float(np.sqrt(np.mean((about - place * (place @ about) / (place @ place)) ** 2)))
+    # Times written with so many decimals scatter by a rounding error that is spread evenly.
+    for decimals in range(_MOST_DECIMALS + 1):
+        scaled = time * 10.0**decimals
+        if np.all(np.abs(scaled - np.round(scaled)) < _WHOLE_DIGIT):
+            rounding = 10.0**-decimals / np.sqrt(12.0)
+            return scatter if scatter > _ROUNDED * rounding else 0.0
+    return scatter

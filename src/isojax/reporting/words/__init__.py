@@ -5,6 +5,8 @@ plain dictionaries for result.json. Read `_quantities.py` (one number), `_senten
 the words on data health and on the remainder.
 """
 
+from ._check_first_words import check_first_dicts as check_first_dicts
+from ._check_first_words import check_first_words as check_first_words
 from ._health_words import budget_rows as budget_rows
 from ._health_words import budget_words as budget_words
 from ._health_words import dwell_words as dwell_words
