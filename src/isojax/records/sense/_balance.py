@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Int
 from scipy.optimize import minimize_scalar
 
 from ._lines import Lines
@@ -71,7 +71,7 @@ class Rows:
     velocity: Complex[np.ndarray, " line"]
     omega: Float[np.ndarray, " line"]
     middle: Float[np.ndarray, " line"]
-    group: Float[np.ndarray, " line"]
+    group: Int[np.ndarray, " line"]
     has_inertia: bool
 
     @cached_property
