@@ -56,7 +56,7 @@ def find_clipping(campaign: Campaign) -> list[Suspicion]:
     return found
 
 
-def _flat_tops(signals: list[Float[np.ndarray, " time"]]) -> tuple[float, int, float] | None:
+def _flat_tops(signals: list[Float[np.ndarray, " _"]]) -> tuple[float, int, float] | None:
     """Gives the level at which tops are flat, how many are, and the share of their time near it; or None."""
     cycles = [_half_cycles(signal) for signal in signals]
     if sum(tops.size for tops, _, _ in cycles) < _FEWEST_TOPS:

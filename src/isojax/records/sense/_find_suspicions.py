@@ -73,7 +73,7 @@ def find_suspicions(campaign: Campaign) -> tuple[Suspicion, ...]:
         campaign.input,
         campaign.output,
         campaign.elements,
-        tuple((record.name, record.role) for record in campaign.records),
+        campaign.records,
     )
     return campaign.records[0].once(("suspicions", declared), lambda: _find(campaign))
 
