@@ -298,6 +298,24 @@ def test_scattered_sample_times_are_a_doubt_and_rounded_ones_are_not(right, spoi
     assert "0.3 ms" in doubt.figure
 
 
+def test_noise_as_large_as_the_response_is_not_taken_for_a_mistake(tmp_path):
+    bench = rig.Bench(500.0, noise=0.5, anti_alias=False, tolerance=1e-6)
+    rig.write_campaign(tmp_path, LIGHT, rig.Multisine((2.0,), 5.0, 60.0, 4.0, 3), 3, "noisy", bench)
+    assert all(
+        one.check == "balance" and not one.contradicts for one in find_suspicions(read_campaign(tmp_path))
+    )
+
+
+def test_the_sign_of_a_blow_is_named(tmp_path):
+    bench = rig.Bench(2000.0, noise=1e-3, anti_alias=False, tolerance=1e-6)
+    plan = rig.Impulse((50.0, 100.0), 0.02, 3.0)
+    rig.write_campaign(tmp_path, LIGHT, plan, 3, "blows", bench)
+    assert find_suspicions(read_campaign(tmp_path)) == ()
+    file = tmp_path / "campaign.toml"
+    file.write_text(file.read_text().replace('unit = "N"', 'unit = "N"\ngain = -1.0'))
+    assert names(read_campaign(tmp_path)) == ["sign"]
+
+
 def test_free_decays_alone_say_nothing(tmp_path):
     bench = rig.Bench(500.0, noise=1e-3, anti_alias=False, tolerance=1e-6)
     rig.write_campaign(tmp_path, LIGHT, rig.FreeDecay((1e-3,), 2.0), 3, "released", bench)

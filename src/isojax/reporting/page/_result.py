@@ -30,8 +30,8 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
     return {
         "schema": SCHEMA,
         "campaign": loop.campaign.title,
-        "before": _fit_dict(loop.before),
         "check_first": check_first_dicts(loop.check_first),
+        "before": _fit_dict(loop.before),
         "verdict": loop.verdict,
         "findings": [_finding_dict(finding) for finding in loop.findings],
         "after": _fit_dict(loop.after),
