@@ -47,7 +47,7 @@ _MAP_STEPS = 200
 
 _EXIT_CODES = (
     "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
-    "argument or a file is bad, and nothing is written."
+    "argument or a file is bad, or the records contradict campaign.toml; nothing is written then."
 )
 
 
