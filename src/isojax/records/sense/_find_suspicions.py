@@ -97,11 +97,13 @@ def _has_scale(campaign: Campaign) -> bool:
 
 def _is_right(campaign: Campaign, one: Balance) -> bool:
     """Says whether a balance is that of a passive isolator of the declared mass."""
-    if not one.power > 0.0:
-        return False
     if np.isnan(one.inertia):
-        return True
-    return one.inertia > 0.0 and (not _has_scale(campaign) or 1.0 / _WRONG_MASS < one.inertia < _WRONG_MASS)
+        return one.power > -_FED_BACK
+    return (
+        one.power > 0.0
+        and one.inertia > 0.0
+        and (not _has_scale(campaign) or 1.0 / _WRONG_MASS < one.inertia < _WRONG_MASS)
+    )
 
 
 def _balance_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
