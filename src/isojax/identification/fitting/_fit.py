@@ -79,7 +79,9 @@ def fit(
     places = free_places(model, fixed, free, campaign.mass_free)
     _check_excitation(model, campaign)
     if not anyway:
-        refuse_contradictions(campaign)
+        # A delay or a skew that the model stands for contradicts nothing.
+        named = tuple(element.name for element in model.elements)
+        refuse_contradictions(dataclasses.replace(campaign, elements=named))
     # Held-out records must not even weigh the others.
     noise = estimate_noise(dataclasses.replace(campaign, records=campaign.fit_records))
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):

@@ -114,6 +114,8 @@ def _balance_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
     if check is None:
         return []
     causes = _causes(campaign, rows, balance)
+    if causes and _LAGGED.get(causes[0].name) in campaign.elements:
+        return []
     if not causes and check == "inertia" and balance.unexplained > _UNBALANCED:
         check = "balance"  # noise in the response makes the apparent mass too small
     if not causes and check == "balance" and balance.unexplained < _UNRELATED:
@@ -178,7 +180,7 @@ def _causes(campaign: Campaign, rows: Rows, balance: Balance) -> tuple[Cause, ..
                 tried.append((one.unexplained, (cause,)))
     for reading in late_readings(campaign):
         name, factor = ("clock skew", reading.skew) if reading.skew else ("delay", reading.delay)
-        other = None if _LAGGED[name] in campaign.elements else rows_read(campaign, reading)
+        other = rows_read(campaign, reading)
         if other is not None:
             one = find_balance(other, _declared_mass(campaign, reading.based))
             if _is_right(campaign, one) and one.unexplained < _CLOSES * balance.unexplained:

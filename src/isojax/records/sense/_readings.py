@@ -8,10 +8,10 @@ from scipy.interpolate import CubicSpline
 
 from .._campaign import TIME_DERIVATIVES, Campaign, InputQuantity, OutputQuantity
 from .._record import Record
-from ..reading import si_factor
 from ._balance import Rows, find_lag, rows_of
 from ._lines import lines_of
 from ._suspicion import Cause
+from ._unit_factor import unit_factor
 
 _SHORTEST = 64
 """Samples without which a record is left out: its integrals are all margin."""
@@ -104,9 +104,9 @@ def other_readings(campaign: Campaign) -> Iterator[tuple[Reading, Cause]]:
     """
     drive, output, declared = campaign.input, campaign.output, declared_reading(campaign)
     measured = drive.quantity if drive.quantity in ("force", "command") else "acceleration"
-    si = si_factor(drive.unit, measured, "")
+    si = unit_factor(drive.unit, measured)
     whole = si * drive.gain * (-drive.moving_mass if drive.moving_mass is not None else 1.0)
-    response = si_factor(output.unit, output.quantity, "")
+    response = unit_factor(output.unit, output.quantity)
     yield (
         replace(declared, swapped=True, drive_factor=whole / response, response_factor=response / whole),
         Cause(
@@ -141,7 +141,7 @@ def other_readings(campaign: Campaign) -> Iterator[tuple[Reading, Cause]]:
     if not declared.has_inertia:
         yield replace(declared, response_factor=-1.0), sign_cause(campaign)
         for unit in ("m/s^2", "g", "mm/s^2", "mg"):
-            factor = si_factor(unit, "acceleration", "") / response
+            factor = unit_factor(unit, "acceleration") / response
             if factor != 1.0:
                 yield (
                     replace(declared, response_factor=factor),
@@ -151,7 +151,7 @@ def other_readings(campaign: Campaign) -> Iterator[tuple[Reading, Cause]]:
                         f'[output] unit = "{unit}"',
                     ),
                 )
-            own = si_factor(unit, "acceleration", "") / si
+            own = unit_factor(unit, "acceleration") / si
             if own != 1.0:
                 yield (
                     replace(declared, drive_factor=own),

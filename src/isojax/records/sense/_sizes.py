@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._campaign import TIME_DERIVATIVES, Campaign
-from ..reading import si_factor
 from ._balance import Rows
 from ._suspicion import Cause
+from ._unit_factor import unit_factor
 
 _USUAL = {
     "displacement": (-3.5, 1.2),
@@ -140,11 +140,11 @@ def _unit_causes(campaign: Campaign, sizes: Sizes, inertia: float, order: int) -
         ("input", measured, drive.unit, 1.0 / inertia),
         ("output", output.quantity, output.unit, inertia),
     ):
-        one = si_factor(declared, quantity, "")
+        one = unit_factor(declared, quantity)
         if "V" in declared:
             continue
         for unit in _UNITS[quantity]:
-            factor = si_factor(unit, quantity, "") / one
+            factor = unit_factor(unit, quantity) / one
             if factor == 1.0 or not _alike(factor, needed, _ALIKE):
                 continue
             after = (
