@@ -255,3 +255,15 @@ def test_demo_finds_the_friction_that_was_put_in(demo):
     assert "6 records read" in messages
     assert "chi2/dof" in messages
     assert len(messages.splitlines()) < 12
+
+
+@pytest.mark.parametrize("command", ["fit", "close-loop"])
+def test_records_that_contradict_their_declaration_end_with_code_two(command, tmp_path, capsys):
+    folder = shutil.copytree(campaign_folder(), tmp_path / "flipped")
+    file = folder / "campaign.toml"
+    file.write_text(file.read_text(encoding="utf-8").replace('unit = "N"', 'unit = "N"\ngain = -1.0'))
+    assert main([command, str(folder), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert "wrong sign" in said
+    assert "--anyway" in said
+    assert not (tmp_path / "out").exists()

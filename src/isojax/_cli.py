@@ -23,9 +23,17 @@ from ._stage_lines import stage_lines, step_lines
 from .demo import campaign_folder
 from .identification import Fit, classical_guess, fit, read_campaign, silent
 from .models import load_model
-from .records import Campaign, draft_campaign, find_data_files, inspect_file
+from .records import (
+    Campaign,
+    draft_campaign,
+    find_data_files,
+    find_suspicions,
+    inspect_file,
+    refuse_contradictions,
+)
 from .reporting import (
     catalogue_table,
+    check_first_words,
     check_folder,
     close_loop,
     compile_seconds,
@@ -49,7 +57,7 @@ _MAP_STEPS = 200
 
 _EXIT_CODES = (
     "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
-    "argument or a file is bad, and nothing is written."
+    "argument or a file is bad, or the records contradict campaign.toml; nothing is written then."
 )
 
 
@@ -153,12 +161,15 @@ def _parser() -> argparse.ArgumentParser:
     demo = commands.add_parser("demo", help="close-loop on the campaign in the package")
     demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
     _shown(demo)
-    demo.set_defaults(run=_close_loop, campaign=campaign_folder())
+    demo.set_defaults(run=_close_loop, campaign=campaign_folder(), anyway=False)
     return parser
 
 
 def _campaign(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder")
+    parser.add_argument(
+        "--anyway", action="store_true", help="fit even where the records contradict their declaration"
+    )
 
 
 def _shown(parser: argparse.ArgumentParser) -> None:
@@ -222,7 +233,7 @@ def _close_loop(asked: argparse.Namespace) -> int:
     begin, folder = time.perf_counter(), check_folder(asked.out)
     with _progress(asked) as progress:
         measured = _read(asked.campaign, progress)
-        loop = close_loop(measured, progress=progress)
+        loop = close_loop(measured, progress=progress, anyway=asked.anyway)
         progress(Stage("report"))
         loop.report(folder)
     console = _results()
@@ -243,13 +254,15 @@ def _fit(asked: argparse.Namespace) -> int:
     folder = None if asked.out is None else check_folder(asked.out)
     with _progress(asked) as progress:
         measured = _read(asked.campaign, progress)
+        if not asked.anyway:
+            refuse_contradictions(measured)
         progress(Stage("classical guess"))
         guess = classical_guess(measured)
         progress(KeyFigure(" ".join(guess.notes)))
         progress(Stage("fit of the declared model"))
-        fitted = fit(guess.model, measured, progress=progress)
+        fitted = fit(guess.model, measured, progress=progress, anyway=asked.anyway)
         progress(KeyFigure(f"chi2/dof {fitted.stats.chi2 / fitted.stats.dof:.4g}"))
-    report = str(fitted)
+    report = "\n".join((*check_first_words(find_suspicions(measured)), str(fitted)))
     if folder is not None:
         write_texts(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
     print(report)

@@ -27,7 +27,17 @@ def is_number_or_none(value):
 
 def check_schema(result):
     """Schema 1 of result.json, written out by hand."""
-    keys = ["schema", "campaign", "before", "verdict", "findings", "after", "bounds", "seconds"]
+    keys = [
+        "schema",
+        "campaign",
+        "check_first",
+        "before",
+        "verdict",
+        "findings",
+        "after",
+        "bounds",
+        "seconds",
+    ]
     assert list(result) == keys
     assert result["schema"] == 1
     assert result["verdict"] in ("none", "found", "partly_explained", "unexplained")

@@ -15,7 +15,7 @@ from .._results import RESULTS, is_successful
 from .._show import Row, number, shown
 from ..elements import CATALOGUE
 from ..models import Isolator
-from ..records import Campaign
+from ..records import Campaign, Suspicion, find_suspicions, refuse_contradictions
 from ._rules import Rules
 from .diagnosis import (
     Extension,
@@ -70,6 +70,11 @@ class Loop:
     def findings(self) -> tuple[Finding, ...]:
         """The effects found, in the order of discovery; not those that a later one contains."""
         return findings_in(self.after.model, self.extensions)
+
+    @property
+    def check_first(self) -> tuple[Suspicion, ...]:
+        """What in the records does not agree with their declaration; contradictions first."""
+        return find_suspicions(self.campaign)
 
     @cached_property
     def doubt(self) -> Doubt:
@@ -140,6 +145,7 @@ def close_loop(
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
+    anyway: bool = False,
 ) -> Loop:
     """Fit the declared model, add the effect that it lacks, and repeat until nothing significant is missing.
 
@@ -153,13 +159,14 @@ def close_loop(
         solver: an optimistix least-squares solver.
         progress: receives a `Stage` and a `KeyFigure` for each stage, and a line for each of its steps.
         rules: the numbers that decide verdicts.
+        anyway: whether records that contradict their declaration are fitted all the same.
 
     Returns:
         The loop: fits before and after, the findings, and the verdict over all.
 
     Raises:
-        ValueError: if `max_iterations` is negative, if `excluded` holds what is no catalogue name, or as
-            `classical_guess` and `fit` raise it.
+        ValueError: if `max_iterations` is negative, if `excluded` holds what is no catalogue name, if the
+            records contradict their declaration, or as `classical_guess` and `fit` raise it.
     """
     if max_iterations < 0:
         raise ValueError(f"Argument `max_iterations` must be 0 or more, but is {max_iterations}.")
@@ -167,10 +174,12 @@ def close_loop(
     if unknown:
         raise ValueError(f"Argument `excluded` must hold catalogue names, but {unknown[0]!r} is none.")
     start, campaign = time.perf_counter(), as_campaign(campaign)
+    if not anyway:
+        refuse_contradictions(campaign)
     progress(Stage("classical guess"))
     guess = classical_guess(campaign)
     progress(Stage("fit of the declared model"))
-    before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules)
+    before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     extensions, verdict = search_effects(
         before, search_of(campaign, rules, solver, progress), max_iterations, excluded

@@ -1,8 +1,8 @@
 """What was measured: campaign.toml, readers of data files, dwells, spectra and the noise estimate.
 
 In: the path of a campaign.toml. Out: a `Campaign` of `Record`s in SI, its noise and the health of its data.
-Read `_record.py` and `_campaign.py` first, then `reading/` (with `formats/`), `spectrum/` and `noise/`.
-`inspection/` is for files that no campaign.toml describes yet.
+Read `_record.py` and `_campaign.py` first, then `reading/` (with `formats/`), `spectrum/`, `noise/` and
+`sense/`. `inspection/` is for files that no campaign.toml describes yet.
 """
 
 from ._blow import driven_samples as driven_samples
@@ -35,6 +35,10 @@ from .reading import find_reader as find_reader
 from .reading import read_declaration as read_declaration
 from .reading import read_measurements as read_measurements
 from .reading import segment_dwells as segment_dwells
+from .sense import Cause as Cause
+from .sense import Suspicion as Suspicion
+from .sense import find_suspicions as find_suspicions
+from .sense import refuse_contradictions as refuse_contradictions
 from .spectrum import Band as Band
 from .spectrum import DwellHarmonics as DwellHarmonics
 from .spectrum import FilterComparison as FilterComparison

@@ -67,6 +67,8 @@ class Record:
         clock: Start and end of the record as shares of the whole test, 0 to 1.
         start: Sample of its file with which the record starts; the clocks of the channels ran from sample 0.
         floor: Measured acceleration of the floor about its mean [m/s^2], or None.
+        time_jitter: rms by which its time column departs from the even grid, beyond its rounding [s]; 0 where
+            it has none.
     """
 
     name: str
@@ -88,6 +90,7 @@ class Record:
     clock: tuple[float, float] = (0.0, 1.0)
     start: int = 0
     floor: Float[np.ndarray, " time"] | None = None
+    time_jitter: float = 0.0
     _kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def once(self, question: Hashable, work: Callable[[], _Answer]) -> _Answer:

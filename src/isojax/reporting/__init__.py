@@ -27,3 +27,4 @@ from .page import verdict_summary as verdict_summary
 from .page import write_map as write_map
 from .page import write_report as write_report
 from .page import write_texts as write_texts
+from .words import check_first_words as check_first_words

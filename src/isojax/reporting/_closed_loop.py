@@ -125,6 +125,7 @@ def close_loop(
     solver: Any = DEFAULT_SOLVER,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
+    anyway: bool = False,
 ) -> ClosedLoop:
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 
@@ -135,13 +136,15 @@ def close_loop(
         solver: an optimistix least-squares solver.
         progress: receives a line a step.
         rules: the numbers that decide verdicts.
+        anyway: whether records that contradict their declaration are fitted all the same.
 
     Returns:
         The closed loop; `.report(folder)` writes it, `print` shows it.
 
     Raises:
         ValueError: if the campaign has no record to fit, or names an effect that is not in the catalogue;
-            if `excluded` holds what is no catalogue name.
+            if `excluded` holds what is no catalogue name; if the records contradict their declaration, as
+            `isojax.records.refuse_contradictions` says it.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Example:
@@ -159,5 +162,6 @@ def close_loop(
         solver=solver,
         progress=progress,
         rules=rules,
+        anyway=anyway,
     )
     return ClosedLoop(loop)

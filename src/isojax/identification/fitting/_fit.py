@@ -11,7 +11,7 @@ from ..._parameters import element_names, list_parameters, replace_parameters
 from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator, check_integrator
-from ...records import Campaign, NoiseEstimate, estimate_noise
+from ...records import Campaign, NoiseEstimate, estimate_noise, refuse_contradictions
 from .._rules import Rules
 from ..guess import as_campaign, classical_guess
 from ._build_problem import build_problem
@@ -35,6 +35,7 @@ def fit(
     max_steps: int = MOST_EVALUATIONS,
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
+    anyway: bool = False,
 ) -> Fit:
     """Fit the coefficients of a model to the time histories of all fitting records together.
 
@@ -57,6 +58,7 @@ def fit(
         max_steps: simulations with derivatives after which the search gives up.
         progress: receives a line a step.
         rules: when a search is over, and what counts as scatter of the stiffness.
+        anyway: whether records that contradict their declaration are fitted all the same.
 
     Returns:
         The fit. Where the search failed, `result` says why and every error is NaN.
@@ -64,7 +66,8 @@ def fit(
     Raises:
         ValueError: if a name is no parameter of the model, `integrator` cannot simulate records, the model is
             not driven as the campaign's isolator is, records differ in sampling rate, or their noise is
-            neither declared nor to be estimated.
+            neither declared nor to be estimated; if the records contradict their declaration, as
+            `refuse_contradictions` says it.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Example:
@@ -85,6 +88,10 @@ def fit(
         check_integrator(integrator)
     places = free_places(model, fixed, free, campaign.mass_free)
     _check_excitation(model, campaign)
+    if not anyway:
+        # A delay or a skew that the model stands for contradicts nothing.
+        named = tuple(element.name for element in model.elements)
+        refuse_contradictions(dataclasses.replace(campaign, elements=named))
     # Held-out records must not even weigh the others.
     noise = estimate_noise(dataclasses.replace(campaign, records=campaign.fit_records))
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):

@@ -6,6 +6,7 @@ records. Read `_declaration.py` first, then `_read_measurements.py`. It uses `_r
 `_reader_filter.py`, then `_schedule.py`, `_find_dwells.py` and `_excitation_kind.py`.
 """
 
+from ._channel_units import si_factor as si_factor
 from ._data_file import READERS as READERS
 from ._data_file import find_reader as find_reader
 from ._declaration import Declaration as Declaration

@@ -134,6 +134,7 @@ def _read_record(
         kind=kind,
         start=channels.start,
         floor=channels.floor_acceleration(declared),
+        time_jitter=channels.time_jitter,
     )
     return record, channels.units
 

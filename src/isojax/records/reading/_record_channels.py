@@ -13,7 +13,7 @@ from ._channel_factor import channel_factor
 from ._data_file import read_columns
 from ._declaration import Declaration
 from ._floor import floor_acceleration
-from ._time_base import find_rate
+from ._time_base import find_rate, time_jitter
 
 FEWEST_SAMPLES = 16
 """Samples without which a record is refused."""
@@ -35,6 +35,7 @@ class RecordChannels:
         output: Output after it.
         floor: Measured motion of the floor after it, in SI, or None.
         units: Units of the columns of input, output and floor in the file, as far as they are channels.
+        time_jitter: rms by which the time column departs from the even grid, beyond its rounding [s].
     """
 
     start: int
@@ -48,6 +49,7 @@ class RecordChannels:
     output: Float[np.ndarray, " time"]
     floor: Float[np.ndarray, " time"] | None
     units: Mapping[str, str]
+    time_jitter: float = 0.0
 
     def floor_acceleration(self, declared: Declaration) -> Float[np.ndarray, " time"] | None:
         """Gives the acceleration of the floor [m/s^2], or None."""
@@ -101,9 +103,9 @@ def read_channels(
     _check_not_constant(file, named["output"], raw_output)
     if np.ptp(raw_input) == 0.0 and raw_input[0] != 0.0:
         _check_not_constant(file, named["input"], raw_input)
-    return RecordChannels(
-        start, stop, total, entry["settle"], rate, raw_input, raw_output, raw_input, raw_output, floor, units
-    )
+    channels = raw_input, raw_output, raw_input, raw_output, floor
+    jitter = 0.0 if time is None else time_jitter(time)
+    return RecordChannels(start, stop, total, entry["settle"], rate, *channels, units, jitter)
 
 
 def _checked_span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:
