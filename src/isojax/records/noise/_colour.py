@@ -1,0 +1,138 @@
+"""The colour of the noise: an autoregressive law of what settled records leave without their harmonics."""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.signal
+import scipy.stats
+from jaxtyping import Float
+
+from ..spectrum import Rest
+
+MOST_ORDERS = 64
+"""Highest order of the law. Noise of density 1/f needs all of them, a single time constant needs one."""
+
+_LAGS_A_WINDOW = 0.25
+"""Share of the shortest window that the lags may reach."""
+
+_FALSE_COLOUR = 1e-3
+"""Chance that white noise is taken for coloured."""
+
+_AGREED = 1e-4
+"""Change of the density, over itself, at which expectation and maximisation agree ..."""
+
+_MOST_ROUNDS = 50
+"""... and rounds after which they have to: each leaves at most a half of the error."""
+
+
+class Piece(NamedTuple):
+    """Noise of one window.
+
+    Attributes:
+        rest: what the window leaves, and the frequencies of the basis signals that took a share of the noise.
+        kept: share of the noise of all frequencies that is left; 1 - 1/n of n periods less their mean.
+    """
+
+    rest: Rest
+    kept: float = 1.0
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the mean square."""
+        return self.kept * self.rest.signal.size - self.rest.taken.size
+
+
+class Colour(NamedTuple):
+    """An autoregressive law `n_t + a_1 n_(t-1) + ... + a_p n_(t-p) = e_t` of noise, with white e.
+
+    Attributes:
+        whitening: a_1 to a_p; none where the noise is white.
+        innovation: rms of e.
+        sigma: rms of n.
+    """
+
+    whitening: tuple[float, ...]
+    innovation: float
+    sigma: float
+
+
+def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
+    """Gives the autoregressive law of noise, or None where it is not significantly coloured.
+
+    The autocorrelations are those of the pooled windows. What the harmonics took with them is put back with
+    the density that the law itself has there, and the law is estimated again until both agree (expectation
+    and maximisation); else every harmonic would leave a notch in the spectrum. The law counts where that of
+    least BIC, which takes no order by chance, has a likelihood ratio against white noise that is significant
+    at 0.001. Its order is then that of least AICc, because 1/f noise has no finite one.
+
+    Args:
+        pieces: windows that hold noise alone.
+        rate: samples per second [Hz].
+
+    Returns:
+        The law; its whitening filter has minimum phase.
+
+    Source: Dempster, Laird & Rubin 1977 (EM); Durbin 1960 (recursion over the order); Schwarz 1978 (BIC);
+        Shibata 1980, Ann. Stat. 8:147 (AIC predicts best where the order is not finite).
+    """
+    freedom = sum(piece.freedom for piece in pieces)
+    shortest = min((piece.rest.signal.size for piece in pieces), default=0)
+    most = min(MOST_ORDERS, int(_LAGS_A_WINDOW * shortest))
+    if most < 1 or freedom <= most or not any(np.any(piece.rest.signal) for piece in pieces):
+        return None
+    lags = np.arange(most + 1)
+    seen = np.sum([_products(piece.rest.signal, most) / piece.kept for piece in pieces], axis=0)
+    size = np.sum([piece.rest.signal.size - lags for piece in pieces], axis=0)
+    # Basis signals of one frequency take alike: those of all windows together.
+    # A window does not show noise slower than itself, so that the density there is that of its first line.
+    lines = [np.maximum(piece.rest.taken, rate / piece.rest.signal.size) for piece in pieces]
+    taken, count = np.unique(np.concatenate(lines), return_counts=True)
+    angle = 2.0 * np.pi * np.outer(taken / rate, lags)
+    turns = np.cos(angle) - 1j * np.sin(angle)
+    # Each window lacks what its lags cut off at its end; all of them together do so on average.
+    back = np.cos(angle).T * count * (size / size[0])[:, None]
+    density, laws, errors = np.full(taken.size, seen[0] / freedom), [np.zeros(0)], np.zeros(1)
+    for _ in range(_MOST_ROUNDS):
+        laws, errors = _levinson((seen + back @ density) / size)
+        known = density
+        density = errors[-1] / np.abs(1.0 + turns[:, 1 : laws[-1].size + 1] @ laws[-1]) ** 2
+        if np.all(np.abs(density - known) <= _AGREED * known):
+            break
+    misfit, orders = freedom * np.log(errors), np.arange(errors.size)
+    sure = int(np.argmin(misfit + orders * np.log(freedom)))
+    if sure == 0 or scipy.stats.chi2.sf(misfit[0] - misfit[sure], sure) > _FALSE_COLOUR:
+        return None
+    order = int(np.argmin(misfit + 2.0 * orders * freedom / np.maximum(freedom - orders - 2.0, 1.0)))
+    # Each coefficient of the law takes a degree of freedom.
+    innovation = errors[order] * freedom / (freedom - order)
+    return Colour(tuple(laws[order].tolist()), float(np.sqrt(innovation)), float(np.sqrt(errors[0])))
+
+
+def whitened_square(piece: Piece, colour: Colour) -> tuple[float, float]:
+    """Gives the mean square of a window's innovations and its degrees of freedom."""
+    order = len(colour.whitening)
+    white = np.asarray(scipy.signal.lfilter([1.0, *colour.whitening], [1.0], piece.rest.signal))[order:]
+    freedom = piece.freedom - order
+    return float(white @ white) / max(freedom, 1.0), max(freedom, 1.0)
+
+
+def _products(signal: Float[np.ndarray, " time"], most: int) -> Float[np.ndarray, " lag"]:
+    """Gives the sums of products of a signal with itself, at lags from 0 on."""
+    length = signal.size + most + 1
+    power = np.abs(np.fft.rfft(signal, length)) ** 2
+    return np.fft.irfft(power, length)[: most + 1]
+
+
+def _levinson(
+    correlation: Float[np.ndarray, " lag"],
+) -> tuple[list[Float[np.ndarray, " _"]], Float[np.ndarray, " order"]]:
+    """Gives the laws of all orders and their mean squared errors; it ends where no law has minimum phase."""
+    law, laws, errors = np.zeros(0), [np.zeros(0)], [float(correlation[0])]
+    for order in range(1, correlation.size):
+        reflection = -(correlation[order] + law @ correlation[order - 1 : 0 : -1]) / errors[-1]
+        if not abs(reflection) < 1.0:
+            break
+        law = np.append(law + reflection * law[::-1], reflection)
+        laws.append(law)
+        errors.append(errors[-1] * float(1.0 - reflection**2))
+    return laws, np.array(errors)

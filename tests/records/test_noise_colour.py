@@ -1,0 +1,136 @@
+"""The colour of the noise against autoregressive noise that was put in."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jaxtyping import Float
+from scipy.signal import lfilter
+
+from isojax.records import Campaign, Dwell, Filter, InputChannel, OutputChannel, Record, estimate_noise
+
+RATE, SIGMA = 250.0, 0.01
+FREQUENCIES = (4.0, 4.4, 4.9, 5.3, 5.7, 6.2)
+
+
+def noise_of(draw: np.random.Generator, count: int, share: float) -> Float[np.ndarray, " time"]:
+    """Draw `n_t = share n_(t-1) + e_t` of rms `SIGMA`."""
+    white = draw.standard_normal(count + 500) * np.sqrt(1.0 - share**2)
+    return SIGMA * lfilter([1.0], [1.0, -share], white)[500:]
+
+
+def stepped(name: str, seed: int, share: float) -> Record:
+    """Dwells with twelve harmonics, all of them far above the noise."""
+    parts, dwells, start = [], [], 0
+    for frequency in FREQUENCIES:
+        size = round(20 * RATE / frequency)
+        angle = 2.0 * np.pi * frequency * np.arange(size) / RATE
+        parts.append(sum(np.cos(order * angle + order) / order for order in range(1, 13)))
+        dwells.append(Dwell(start, start + size, frequency, 20.0))
+        start += size
+    drive = np.concatenate(parts)
+    output = drive + noise_of(np.random.default_rng(seed), drive.size, share)
+    time = np.arange(drive.size) / RATE
+    held = drive, output, drive, output
+    return Record(name, Path(name), time, RATE, *held, dwells=tuple(dwells), kind="stepped_sine")
+
+
+def periodic(seed: int, share: float) -> Record:
+    drive = np.tile(np.random.default_rng(99).standard_normal(1000), 8)
+    output = drive + noise_of(np.random.default_rng(seed), drive.size, share)
+    held = drive, output, drive, output
+    return Record(
+        "p", Path("p"), np.arange(drive.size) / RATE, RATE, *held, period=1000, settle=0, kind="periodic"
+    )
+
+
+def campaign_of(*records: Record, noise: float | None = None, low: Filter | None = None) -> Campaign:
+    return Campaign(
+        title="made",
+        file=Path("campaign.toml"),
+        mass=1.0,
+        mass_free=False,
+        input=InputChannel("force", "f", "N"),
+        output=OutputChannel("displacement", "x", "m", noise=noise),
+        filter=low,
+        rate=RATE,
+        stiffness=(),
+        damping=(),
+        elements=(),
+        records=records,
+    )
+
+
+def density_of(whitening: tuple[float, ...], innovation: float, frequency: np.ndarray) -> np.ndarray:
+    turns = np.exp(-2j * np.pi * np.outer(frequency / RATE, np.arange(1, len(whitening) + 1)))
+    return innovation**2 / np.abs(1.0 + turns @ np.array(whitening)) ** 2
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, -0.6])
+@pytest.mark.parametrize("kind", ["dwells", "periods"])
+def test_the_density_is_that_of_the_noise_though_harmonics_were_removed(kind: str, share: float) -> None:
+    frequency = np.linspace(2.0, 120.0, 60)
+    true = SIGMA * np.sqrt(1.0 - share**2)
+    ratios = []
+    for seed in range(6):
+        made = (
+            [periodic(seed, share)]
+            if kind == "periods"
+            else [stepped(f"r{k}", 10 * seed + k, share) for k in (1, 2)]
+        )
+        noise = estimate_noise(campaign_of(*made))
+        assert noise.whitening
+        assert noise.white == pytest.approx(true, rel=0.06)
+        assert noise.sigma == pytest.approx(SIGMA, rel=0.25)
+        found = density_of(noise.whitening, noise.innovation, frequency)
+        ratios.append(found / density_of((-share,), true, frequency))
+    # Two records of six dwells hold some 2000 samples of noise each time.
+    assert np.all(np.abs(np.mean(ratios, axis=0) - 1.0) < 0.15)
+
+
+def test_density_that_falls_as_one_over_f_is_followed_over_the_band_of_the_dwells() -> None:
+    lines = np.arange(1, 2**15 + 1)
+    frequency = np.geomspace(3.0, 120.0, 12)
+    ratios = []
+    for seed in range(4):
+        draw = np.random.default_rng(seed)
+        records = []
+        for name in ("1", "2", "3", "4"):
+            record = stepped(name, 0, 0.0)
+            spectrum = np.fft.rfft(draw.standard_normal(2**16))
+            spectrum[1:] /= np.sqrt(lines / lines[-1])
+            spectrum[0] = 0.0
+            noise = SIGMA * np.fft.irfft(spectrum)[: record.output.size]
+            records.append(replace(record, output=record.input + noise))
+        noise = estimate_noise(campaign_of(*records))
+        found = density_of(noise.whitening, noise.innovation, frequency)
+        ratios.append(found / (SIGMA**2 * 0.5 * RATE / frequency))
+    assert np.all(np.abs(np.log(np.mean(ratios, axis=0))) < 0.3)
+
+
+def test_white_noise_is_rarely_called_coloured() -> None:
+    found = [estimate_noise(campaign_of(stepped("a", seed, 0.0))) for seed in range(60)]
+    # BIC takes one coefficient of white noise by chance with probability below 1e-3, given these samples.
+    assert sum(bool(noise.whitening) for noise in found) <= 1
+    white = [noise for noise in found if not noise.whitening]
+    assert all(noise.white == noise.sigma and noise.note == "" for noise in white)
+
+
+def test_declared_and_filtered_noise_count_as_white() -> None:
+    record = stepped("a", 1, 0.9)
+    declared = estimate_noise(campaign_of(record, noise=0.02))
+    filtered = estimate_noise(campaign_of(record, low=Filter("butterworth", 4, 60.0)))
+    assert declared.whitening == filtered.whitening == ()
+
+
+def test_a_dwell_that_never_settles_does_not_colour_the_noise() -> None:
+    record = stepped("a", 3, 0.0)
+    dwell = record.dwells[2]
+    own = slice(dwell.start, dwell.stop)
+    size = dwell.stop - dwell.start
+    beat = 20 * SIGMA * np.sin(2 * np.pi * 1.37 * dwell.frequency * np.arange(size) / RATE)
+    output = record.output.copy()
+    output[own] += beat
+    noise = estimate_noise(campaign_of(replace(record, output=output)))
+    assert noise.whitening == ()
