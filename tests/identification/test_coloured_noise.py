@@ -1,5 +1,6 @@
 """Fits and score tests under coloured noise against generalised least squares by SciPy."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -17,7 +18,7 @@ from isojax.identification.fitting._problem import one_hot
 from isojax.identification.fitting._simulator import Simulator
 from isojax.identification.jacobian import find_whitening, whiten
 from isojax.models import Integrator, Isolator
-from isojax.records import Dwell, Record
+from isojax.records import Campaign, Dwell, InputChannel, OutputChannel, Record, estimate_noise
 
 RATE, SIGMA, SHARE, REPEATS = 250.0, 0.004, 0.9, 60
 STIFFNESS, DAMPING, MASS = 1.0e6, 1.0e4, 800.0
@@ -74,7 +75,27 @@ def noise_of(seed: int, count: int) -> Float[np.ndarray, " time"]:
     return SIGMA * lfilter([1.0], [1.0, -SHARE], white)[500:]
 
 
-def over_repeats(whitening: tuple[float, ...], noise: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def made_campaign(noise: list[Float[np.ndarray, " time"]]) -> Campaign:
+    record = made_record()
+    return Campaign(
+        title="made",
+        file=Path("campaign.toml"),
+        mass=MASS,
+        mass_free=False,
+        input=InputChannel("force", "f", "N"),
+        output=OutputChannel("acceleration", "a", "m/s^2"),
+        filter=None,
+        rate=RATE,
+        stiffness=(),
+        damping=(),
+        elements=(),
+        records=tuple(replace(record, output=record.output + one) for one in noise),
+    )
+
+
+def over_repeats(
+    whitening: tuple[float, ...], noise: float, share: float = 1.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Deviations of the coefficients and scores of absent effects, over standard errors, and chi2/dof."""
     record = made_record()
     clean = record.output.copy()
@@ -86,6 +107,7 @@ def over_repeats(whitening: tuple[float, ...], noise: float) -> tuple[np.ndarray
         noise=noise,
         integrator=Integrator(substeps=2),
         whitening=whitening,
+        share=share,
     )
     full = MODEL.with_elements(*ABSENT)
     # Mass first; then one strength an element.
@@ -113,6 +135,14 @@ def test_intervals_and_scores_under_coloured_noise_are_right_where_it_is_whitene
     assert 105 <= np.sum(np.abs(coefficients) < 1.96) <= 120
     assert np.all((np.mean(scores**2, axis=0) > 0.5) & (np.mean(scores**2, axis=0) < 1.65))
     assert np.mean(fits) == pytest.approx(1.0, abs=0.02)
+
+
+def test_they_stay_right_where_the_quiet_band_is_trusted_no_more_than_under_white_noise():
+    noise = estimate_noise(made_campaign([noise_of(1000 + k, made_record().output.size) for k in range(8)]))
+    coefficients, scores, fits = over_repeats(noise.whitening, noise.white, noise.share)
+    assert 105 <= np.sum(np.abs(coefficients) < 1.96) <= 120
+    assert np.all((np.mean(scores**2, axis=0) > 0.4) & (np.mean(scores**2, axis=0) < 1.65))
+    assert np.mean(fits) == pytest.approx(1.0, abs=0.1)
 
 
 def test_they_are_wrong_where_it_counts_as_white():

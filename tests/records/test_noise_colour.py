@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from jaxtyping import Float
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfilt
 
 from isojax.records import Campaign, Dwell, Filter, InputChannel, OutputChannel, Record, estimate_noise
 
@@ -62,9 +62,9 @@ def campaign_of(*records: Record, noise: float | None = None, low: Filter | None
     )
 
 
-def density_of(whitening: tuple[float, ...], innovation: float, frequency: np.ndarray) -> np.ndarray:
-    turns = np.exp(-2j * np.pi * np.outer(frequency / RATE, np.arange(1, len(whitening) + 1)))
-    return innovation**2 / np.abs(1.0 + turns @ np.array(whitening)) ** 2
+def density_of(law: tuple[float, ...], innovation: float, frequency: np.ndarray) -> np.ndarray:
+    turns = np.exp(-2j * np.pi * np.outer(frequency / RATE, np.arange(1, len(law) + 1)))
+    return innovation**2 / np.abs(1.0 + turns @ np.array(law)) ** 2
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, -0.6])
@@ -80,10 +80,10 @@ def test_the_density_is_that_of_the_noise_though_harmonics_were_removed(kind: st
             else [stepped(f"r{k}", 10 * seed + k, share) for k in (1, 2)]
         )
         noise = estimate_noise(campaign_of(*made))
-        assert noise.whitening
-        assert noise.white == pytest.approx(true, rel=0.06)
+        assert noise.colour is not None
+        assert noise.colour.innovation == pytest.approx(true, rel=0.06)
         assert noise.sigma == pytest.approx(SIGMA, rel=0.25)
-        found = density_of(noise.whitening, noise.innovation, frequency)
+        found = density_of(noise.law, noise.colour.innovation, frequency)
         ratios.append(found / density_of((-share,), true, frequency))
     # Two records of six dwells hold some 2000 samples of noise each time.
     assert np.all(np.abs(np.mean(ratios, axis=0) - 1.0) < 0.15)
@@ -104,16 +104,43 @@ def test_density_that_falls_as_one_over_f_is_followed_over_the_band_of_the_dwell
             noise = SIGMA * np.fft.irfft(spectrum)[: record.output.size]
             records.append(replace(record, output=record.input + noise))
         noise = estimate_noise(campaign_of(*records))
-        found = density_of(noise.whitening, noise.innovation, frequency)
+        assert noise.colour is not None
+        found = density_of(noise.law, noise.colour.innovation, frequency)
         ratios.append(found / (SIGMA**2 * 0.5 * RATE / frequency))
     assert np.all(np.abs(np.log(np.mean(ratios, axis=0))) < 0.3)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, -0.6])
+def test_no_band_is_trusted_more_than_under_white_noise_of_the_same_rms(share: float) -> None:
+    noise = estimate_noise(campaign_of(*(stepped(f"r{k}", k, share) for k in (1, 2, 3))))
+    assert noise.colour is not None
+    frequency = np.linspace(0.0, 0.5 * RATE, 2001)
+    weighing = density_of(noise.whitening, noise.white, frequency)
+    own = density_of(noise.law, noise.colour.innovation, frequency)
+    assert np.min(weighing) > 0.85 * noise.sigma**2
+    assert np.mean(np.abs(np.log(weighing / np.maximum(own, noise.sigma**2)))) < 0.05
+    # What noise leaves of a sample behind the filter, from noise that was drawn by its true law.
+    drawn = noise_of(np.random.default_rng(9), 400_000, share)
+    left = lfilter([1.0, *noise.whitening], [1.0], drawn) / noise.white
+    assert np.mean(left**2) == pytest.approx(noise.share, rel=0.1)
+    assert noise.share < 0.7
+
+
+def test_noise_behind_a_filter_that_is_not_declared_keeps_weight_off_nothing_beyond_its_edge() -> None:
+    record, low = stepped("a", 5, 0.0), butter(4, 60.0, fs=RATE, output="sos")
+    noise = estimate_noise(campaign_of(replace(record, output=np.asarray(sosfilt(low, record.output)))))
+    assert noise.colour is not None
+    weighing = density_of(noise.whitening, noise.white, np.linspace(80.0, 120.0, 50))
+    own = density_of(noise.law, noise.colour.innovation, np.linspace(80.0, 120.0, 50))
+    assert np.all(own < 0.1 * noise.sigma**2)
+    assert np.all(weighing > 0.8 * noise.sigma**2)
 
 
 def test_white_noise_is_rarely_called_coloured() -> None:
     found = [estimate_noise(campaign_of(stepped("a", seed, 0.0))) for seed in range(60)]
     # BIC takes one coefficient of white noise by chance with probability below 1e-3, given these samples.
-    assert sum(bool(noise.whitening) for noise in found) <= 1
-    white = [noise for noise in found if not noise.whitening]
+    assert sum(noise.colour is not None for noise in found) <= 1
+    white = [noise for noise in found if noise.colour is None]
     assert all(noise.white == noise.sigma and noise.note == "" for noise in white)
 
 
@@ -121,7 +148,7 @@ def test_declared_and_filtered_noise_count_as_white() -> None:
     record = stepped("a", 1, 0.9)
     declared = estimate_noise(campaign_of(record, noise=0.02))
     filtered = estimate_noise(campaign_of(record, low=Filter("butterworth", 4, 60.0)))
-    assert declared.whitening == filtered.whitening == ()
+    assert declared.colour is filtered.colour is None
 
 
 def test_a_dwell_that_never_settles_does_not_colour_the_noise() -> None:
@@ -133,4 +160,4 @@ def test_a_dwell_that_never_settles_does_not_colour_the_noise() -> None:
     output = record.output.copy()
     output[own] += beat
     noise = estimate_noise(campaign_of(replace(record, output=output)))
-    assert noise.whitening == ()
+    assert noise.colour is None

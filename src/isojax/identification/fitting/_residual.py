@@ -21,7 +21,7 @@ class Residual(NamedTuple):
             record each.
         lags: the lags [samples].
         autocorrelation: of each record's residual at the lags; where the noise is coloured, of the residual
-            that its whitening filter leaves.
+            that the law of the noise leaves.
         cross_correlation: of the same with the drive at the lags.
         band: half width of the 99 % band of each record.
     """
@@ -69,7 +69,7 @@ def residual(fit: Fit) -> Residual:
     values, own, cross, band, white = [], [], [], [], []
     for run in runs:
         left = run.residual[run.counted > 0.0]
-        left = np.asarray(signal.lfilter([1.0, *fit.noise.whitening], [1.0], left))
+        left = np.asarray(signal.lfilter([1.0, *fit.noise.law], [1.0], left))
         drive = run.record.input[run.counted > 0.0]
         values.append(run.residual)
         own.append(_correlate(left, left))

@@ -239,9 +239,9 @@ def _noise_motion(
     campaign: Campaign, record: Record, motion: Motion, noise: NoiseEstimate, seed: tuple[int, int]
 ) -> tuple[Array, ...]:
     """Give displacement, velocity and acceleration of simulated noise of the output alone."""
-    values = noise.white * np.random.default_rng(seed).standard_normal(record.output.size)
-    if noise.whitening:
-        values = np.asarray(lfilter([1.0], [1.0, *noise.whitening], values))
+    rms = noise.white if noise.colour is None else noise.colour.innovation
+    values = rms * np.random.default_rng(seed).standard_normal(record.output.size)
+    values = np.asarray(lfilter([1.0], [1.0, *noise.law], values))
     alone = dataclasses.replace(record, output=values)
     band = motion.band
     stray = measured_state(alone, campaign.output.quantity, band.lowest, band.highest)

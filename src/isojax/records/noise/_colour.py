@@ -24,6 +24,9 @@ _AGREED = 1e-4
 _MOST_ROUNDS = 50
 """... and rounds after which they have to: each leaves at most a half of the error."""
 
+_LINES = 4096
+"""Lines of the density up to half the rate: finer than what the orders can distinguish."""
+
 
 class Piece(NamedTuple):
     """Noise of one window.
@@ -45,15 +48,26 @@ class Piece(NamedTuple):
 class Colour(NamedTuple):
     """An autoregressive law `n_t + a_1 n_(t-1) + ... + a_p n_(t-p) = e_t` of noise, with white e.
 
+    Its density weighs the samples, but no band counts more than under white noise of the same rms. Where the
+    noise is quieter than that, what a model leaves out is soon louder: the edge of a filter that nobody
+    declared, for one.
+
     Attributes:
-        whitening: a_1 to a_p; none where the noise is white.
+        law: a_1 to a_p.
         innovation: rms of e.
         sigma: rms of n.
+        whitening: b_1 to b_q of the filter that weighs the samples: it makes noise white whose density is
+            the larger of the two.
+        level: rms of what such noise leaves behind the filter.
+        share: chi-square that n leaves of a sample behind the filter, in units of `level`; 1 at most.
     """
 
-    whitening: tuple[float, ...]
+    law: tuple[float, ...]
     innovation: float
     sigma: float
+    whitening: tuple[float, ...]
+    level: float
+    share: float
 
 
 def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
@@ -70,7 +84,7 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
         rate: samples per second [Hz].
 
     Returns:
-        The law; its whitening filter has minimum phase.
+        The law, with the filter that weighs; both have minimum phase.
 
     Source: Dempster, Laird & Rubin 1977 (EM); Durbin 1960 (recursion over the order); Schwarz 1978 (BIC);
         Shibata 1980, Ann. Stat. 8:147 (AIC predicts best where the order is not finite).
@@ -102,16 +116,42 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     sure = int(np.argmin(misfit + orders * np.log(freedom)))
     if sure == 0 or scipy.stats.chi2.sf(misfit[0] - misfit[sure], sure) > _FALSE_COLOUR:
         return None
-    order = int(np.argmin(misfit + 2.0 * orders * freedom / np.maximum(freedom - orders - 2.0, 1.0)))
+    order = _best_order(errors, freedom)
     # Each coefficient of the law takes a degree of freedom.
     innovation = errors[order] * freedom / (freedom - order)
-    return Colour(tuple(laws[order].tolist()), float(np.sqrt(innovation)), float(np.sqrt(errors[0])))
+    return _weighed(laws[order], float(innovation), float(errors[0]), freedom)
+
+
+def _best_order(errors: Float[np.ndarray, " order"], freedom: float) -> int:
+    """Gives the order of least AICc."""
+    orders = np.arange(errors.size)
+    penalty = 2.0 * orders * freedom / np.maximum(freedom - orders - 2.0, 1.0)
+    return int(np.argmin(freedom * np.log(errors) + penalty))
+
+
+def _weighed(law: Float[np.ndarray, " order"], innovation: float, square: float, freedom: float) -> Colour:
+    """Gives a law with the filter that weighs by its density, raised to that of white noise of its rms."""
+    turns = np.exp(-1j * np.pi / _LINES * np.outer(np.arange(_LINES + 1), np.arange(MOST_ORDERS + 1)))
+    density = innovation / np.abs(1.0 + turns[:, 1 : law.size + 1] @ law) ** 2
+    raised = np.fft.irfft(np.maximum(density, square))
+    laws, errors = _levinson(raised[: MOST_ORDERS + 1])
+    order = _best_order(errors, freedom)
+    filtered = density * np.abs(1.0 + turns[:, 1 : order + 1] @ laws[order]) ** 2
+    share = np.fft.irfft(filtered)[0] / errors[order]
+    return Colour(
+        law=tuple(law.tolist()),
+        innovation=float(np.sqrt(innovation)),
+        sigma=float(np.sqrt(square)),
+        whitening=tuple(laws[order].tolist()),
+        level=float(np.sqrt(errors[order])),
+        share=float(share),
+    )
 
 
 def whitened_square(piece: Piece, colour: Colour) -> tuple[float, float]:
     """Gives the mean square of a window's innovations and its degrees of freedom."""
-    order = len(colour.whitening)
-    white = np.asarray(scipy.signal.lfilter([1.0, *colour.whitening], [1.0], piece.rest.signal))[order:]
+    order = len(colour.law)
+    white = np.asarray(scipy.signal.lfilter([1.0, *colour.law], [1.0], piece.rest.signal))[order:]
     freedom = piece.freedom - order
     return float(white @ white) / max(freedom, 1.0), max(freedom, 1.0)
 

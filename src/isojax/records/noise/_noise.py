@@ -56,10 +56,8 @@ class NoiseEstimate:
         bandwidth_hz: Frequency up to which the noise reaches [Hz]: half the rate, or the [filter]'s cut-off.
         note: What the reader must know, or "".
         share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
-            independent.
-        whitening: a_1 to a_p of the filter `e_t = n_t + sum a_k n_(t-k)` that makes the noise n white; none
-            where it is not significantly coloured.
-        innovation: rms of e; NaN without a filter.
+            independent. Of coloured noise it is `Colour.share`.
+        colour: The law of coloured noise; None where the noise is not significantly coloured.
     """
 
     sigma: float
@@ -69,18 +67,27 @@ class NoiseEstimate:
     bandwidth_hz: float
     note: str = ""
     share: float = 1.0
-    whitening: tuple[float, ...] = ()
-    innovation: float = float("nan")
+    colour: Colour | None = None
 
     @property
     def white(self) -> float:
         """The rms of white noise with the density that this noise has inside its band: sigma / sqrt(share).
 
         It sets the uncertainty of a coefficient, and not the smaller rms of the filtered noise: the motion
-        lies inside the band, where a filter leaves the noise as it is. Of coloured noise it is that of what
-        the whitening filter leaves.
+        lies inside the band, where a filter leaves the noise as it is. Of coloured noise it is what the
+        filter that weighs the samples leaves of noise of the weighing density.
         """
-        return self.innovation if self.whitening else self.sigma / float(np.sqrt(self.share))
+        return self.sigma / float(np.sqrt(self.share)) if self.colour is None else self.colour.level
+
+    @property
+    def whitening(self) -> tuple[float, ...]:
+        """The coefficients of the filter that weighs the samples of coloured noise, see `Colour`."""
+        return () if self.colour is None else self.colour.whitening
+
+    @property
+    def law(self) -> tuple[float, ...]:
+        """The coefficients of the law of coloured noise, see `Colour`."""
+        return () if self.colour is None else self.colour.law
 
 
 def estimate_noise(campaign: Campaign) -> NoiseEstimate:
@@ -94,8 +101,8 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     repeats move the harmonics, and not the scatter about them.
 
     Settled dwells and periods also show the spectrum of the noise. Where it is significantly coloured, the
-    estimate holds the filter that whitens it. Declared noise and noise behind a [filter] count as white
-    inside their band; repeats and the floor of a spectrum show no colour.
+    estimate holds its law and the filter that weighs the samples. Declared noise and noise behind a [filter]
+    count as white inside their band; repeats and the floor of a spectrum show no colour.
 
     Args:
         campaign: The campaign.
@@ -138,9 +145,8 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
         methods=tuple(method if keep else common for (_, method), keep in zip(found, kept, strict=True)),
         bandwidth_hz=band.highest,
         note=note,
-        share=band.share,
-        whitening=() if colour is None else colour.whitening,
-        innovation=float("nan") if colour is None else colour.innovation,
+        share=band.share if colour is None else colour.share,
+        colour=colour,
     )
 
 
@@ -196,8 +202,8 @@ def _piece_scatter(piece: Piece, colour: Colour | None) -> tuple[float, float]:
 def _words_of(colour: Colour) -> str:
     """Gives what a reader must know of the colour of the noise."""
     return (
-        "the noise is coloured: its samples are correlated, and an autoregressive filter of order "
-        f"{len(colour.whitening)} that leaves white noise of {colour.innovation:.3g} rms weighs the residual"
+        "the noise is coloured: its samples are correlated, and its spectrum (an autoregressive law of order "
+        f"{len(colour.law)}) weighs the residual; no band counts more than under white noise of that rms"
     )
 
 
