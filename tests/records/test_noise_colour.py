@@ -144,6 +144,28 @@ def test_white_noise_is_rarely_called_coloured() -> None:
     assert all(noise.white == noise.sigma and noise.note == "" for noise in white)
 
 
+def test_short_windows_whose_fundamentals_lie_side_by_side_show_no_peak_there() -> None:
+    # Between them the removed fundamentals and their drifts take nearly all of the noise from 4.6 to 6.4 Hz.
+    for seed in range(20):
+        draw, parts, dwells, start = np.random.default_rng(seed), [], [], 0
+        for frequency in np.arange(4.6, 6.5, 0.3):
+            size = round(15 * 500.0 / frequency)
+            parts.append(np.cos(2.0 * np.pi * frequency * np.arange(size) / 500.0))
+            dwells.append(Dwell(start, start + size, float(frequency), 15.0))
+            start += size
+        drive = np.concatenate(parts)
+        records = []
+        for name in ("a", "b"):
+            output = drive + SIGMA * draw.standard_normal(drive.size)
+            held = drive, output, drive, output
+            time = np.arange(drive.size) / 500.0
+            own = {"dwells": tuple(dwells), "kind": "stepped_sine"}
+            records.append(Record(name, Path(name), time, 500.0, *held, **own))
+        noise = estimate_noise(replace(campaign_of(*records), rate=500.0))
+        assert noise.colour is None
+        assert noise.sigma == pytest.approx(SIGMA, rel=0.05)
+
+
 def test_declared_and_filtered_noise_count_as_white() -> None:
     record = stepped("a", 1, 0.9)
     declared = estimate_noise(campaign_of(record, noise=0.02))

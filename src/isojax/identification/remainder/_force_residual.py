@@ -238,10 +238,12 @@ def _filter_to_band(
 def _noise_motion(
     campaign: Campaign, record: Record, motion: Motion, noise: NoiseEstimate, seed: tuple[int, int]
 ) -> tuple[Array, ...]:
-    """Give displacement, velocity and acceleration of simulated noise of the output alone."""
-    rms = noise.white if noise.colour is None else noise.colour.innovation
-    values = rms * np.random.default_rng(seed).standard_normal(record.output.size)
-    values = np.asarray(lfilter([1.0], [1.0, *noise.law], values))
+    """Give displacement, velocity and acceleration of simulated noise of the output alone.
+
+    Its density is that by which the fit weighs the samples.
+    """
+    values = noise.white * np.random.default_rng(seed).standard_normal(record.output.size)
+    values = np.asarray(lfilter([1.0], [1.0, *noise.whitening], values))
     alone = dataclasses.replace(record, output=values)
     band = motion.band
     stray = measured_state(alone, campaign.output.quantity, band.lowest, band.highest)

@@ -25,14 +25,14 @@ _MOST_ROUNDS = 50
 """... and rounds after which they have to: each leaves at most a half of the error."""
 
 _LINES = 4096
-"""Lines of the density up to half the rate: finer than what the orders can distinguish."""
+"""Lines of the density up to half the rate, at least: finer than what the orders can distinguish."""
 
 
 class Piece(NamedTuple):
     """Noise of one window.
 
     Attributes:
-        rest: what the window leaves, and the frequencies of the basis signals that took a share of the noise.
+        rest: what the window leaves, and the share of the noise that the removed signals took of each line.
         kept: share of the noise of all frequencies that is left; 1 - 1/n of n periods less their mean.
     """
 
@@ -97,19 +97,14 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     lags = np.arange(most + 1)
     seen = np.sum([_products(piece.rest.signal, most) / piece.kept for piece in pieces], axis=0)
     size = np.sum([piece.rest.signal.size - lags for piece in pieces], axis=0)
-    # Basis signals of one frequency take alike: those of all windows together.
-    # A window does not show noise slower than itself, so that the density there is that of its first line.
-    lines = [np.maximum(piece.rest.taken, rate / piece.rest.signal.size) for piece in pieces]
-    taken, count = np.unique(np.concatenate(lines), return_counts=True)
-    angle = 2.0 * np.pi * np.outer(taken / rate, lags)
-    turns = np.cos(angle) - 1j * np.sin(angle)
-    # Each window lacks what its lags cut off at its end; all of them together do so on average.
-    back = np.cos(angle).T * count * (size / size[0])[:, None]
-    density, laws, errors = np.full(taken.size, seen[0] / freedom), [np.zeros(0)], np.zeros(1)
+    longest = max(piece.rest.signal.size for piece in pieces)
+    steps = max(_LINES, longest)
+    density, laws, errors = np.full(steps + 1, seen[0] / freedom), [np.zeros(0)], np.zeros(1)
     for _ in range(_MOST_ROUNDS):
-        laws, errors = _levinson((seen + back @ density) / size)
-        known = density
-        density = errors[-1] / np.abs(1.0 + turns[:, 1 : laws[-1].size + 1] @ laws[-1]) ** 2
+        correlation = np.fft.irfft(density)[:longest]
+        back = np.sum([_taken_products(piece.rest, correlation, most) for piece in pieces], axis=0)
+        laws, errors = _levinson((seen + back) / size)
+        known, density = density, _density(laws[-1], errors[-1], steps)
         if np.all(np.abs(density - known) <= _AGREED * known):
             break
     misfit, orders = freedom * np.log(errors), np.arange(errors.size)
@@ -129,15 +124,34 @@ def _best_order(errors: Float[np.ndarray, " order"], freedom: float) -> int:
     return int(np.argmin(freedom * np.log(errors) + penalty))
 
 
+def _density(law: Float[np.ndarray, " order"], innovation: float, steps: int) -> Float[np.ndarray, " line"]:
+    """Gives the density of a law at so many steps up to half the rate, in variance per sample."""
+    return innovation / np.abs(np.fft.rfft([1.0, *law], 2 * steps)) ** 2
+
+
+def _taken_products(
+    rest: Rest, correlation: Float[np.ndarray, " time"], most: int
+) -> Float[np.ndarray, " lag"]:
+    """Gives the products that a window's harmonics took from noise of known autocorrelation.
+
+    A window does not distinguish lines closer than its own, so that it counts with their mean, which also
+    keeps what is put back from growing from one round to the next.
+    """
+    if not np.any(rest.removed):
+        return np.zeros(most + 1)
+    length = rest.signal.size
+    part = correlation[:length] * (1.0 - np.arange(length) / length)
+    line = 2.0 * np.fft.rfft(part).real - part[0]
+    return np.fft.irfft(line * rest.removed, length)[: most + 1] * length
+
+
 def _weighed(law: Float[np.ndarray, " order"], innovation: float, square: float, freedom: float) -> Colour:
     """Gives a law with the filter that weighs by its density, raised to that of white noise of its rms."""
-    turns = np.exp(-1j * np.pi / _LINES * np.outer(np.arange(_LINES + 1), np.arange(MOST_ORDERS + 1)))
-    density = innovation / np.abs(1.0 + turns[:, 1 : law.size + 1] @ law) ** 2
+    density = _density(law, innovation, _LINES)
     raised = np.fft.irfft(np.maximum(density, square))
     laws, errors = _levinson(raised[: MOST_ORDERS + 1])
     order = _best_order(errors, freedom)
-    filtered = density * np.abs(1.0 + turns[:, 1 : order + 1] @ laws[order]) ** 2
-    share = np.fft.irfft(filtered)[0] / errors[order]
+    share = np.fft.irfft(density / _density(laws[order], float(errors[order]), _LINES))[0]
     return Colour(
         law=tuple(law.tolist()),
         innovation=float(np.sqrt(innovation)),

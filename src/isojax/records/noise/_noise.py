@@ -156,7 +156,7 @@ def _common_colour(records: list[Record], method: NoiseMethod, band: NoiseBand) 
         periods = [_settled_periods(record) for record in records]
         return noise_colour(
             [
-                Piece(Rest(row, np.zeros(0)), 1.0 - 1.0 / len(rows))
+                Piece(Rest(row, np.zeros(0), np.zeros(row.size // 2 + 1)), 1.0 - 1.0 / len(rows))
                 for rows in periods
                 for row in rows - np.mean(rows, axis=0)
             ],
@@ -275,7 +275,7 @@ def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float,
     if window is None:
         return None
     lines = tuple(line.frequency for line in hum_lines(record))
-    rest, frequencies = dwell_rest(record, dwell, window, lines)
+    rest, frequencies, _ = dwell_rest(record, dwell, window, lines)
     taken = float(np.sum(band.power_gain(frequencies)))
     # Noise of a narrow band has fewer degrees of freedom than samples, and the harmonics use some of them.
     freedom = window * band.share - taken
