@@ -28,7 +28,7 @@ ABSENT = (CubicStiffness(0.0), SensorOffset(0.0))
 
 def correlation(law: tuple[float, ...], count: int) -> Float[np.ndarray, " lag"]:
     """Autocorrelation of noise with innovations of variance 1, from its impulse response."""
-    response = lfilter([1.0], [1.0, *law], np.r_[1.0, np.zeros(4000)])
+    response = np.asarray(lfilter([1.0], [1.0, *law], np.r_[1.0, np.zeros(4000)]))
     return np.array([response[: response.size - lag] @ response[lag:] for lag in range(count)])
 
 
@@ -72,7 +72,7 @@ def made_record() -> Record:
 
 def noise_of(seed: int, count: int) -> Float[np.ndarray, " time"]:
     white = np.random.default_rng(seed).standard_normal(count + 500) * np.sqrt(1.0 - SHARE**2)
-    return SIGMA * lfilter([1.0], [1.0, -SHARE], white)[500:]
+    return SIGMA * np.asarray(lfilter([1.0], [1.0, -SHARE], white))[500:]
 
 
 def made_campaign(noise: list[Float[np.ndarray, " time"]]) -> Campaign:

@@ -17,7 +17,7 @@ FREQUENCIES = (4.0, 4.4, 4.9, 5.3, 5.7, 6.2)
 def noise_of(draw: np.random.Generator, count: int, share: float) -> Float[np.ndarray, " time"]:
     """Draw `n_t = share n_(t-1) + e_t` of rms `SIGMA`."""
     white = draw.standard_normal(count + 500) * np.sqrt(1.0 - share**2)
-    return SIGMA * lfilter([1.0], [1.0, -share], white)[500:]
+    return SIGMA * np.asarray(lfilter([1.0], [1.0, -share], white))[500:]
 
 
 def stepped(name: str, seed: int, share: float) -> Record:
@@ -121,7 +121,7 @@ def test_no_band_is_trusted_more_than_under_white_noise_of_the_same_rms(share: f
     assert np.mean(np.abs(np.log(weighing / np.maximum(own, noise.sigma**2)))) < 0.05
     # What noise leaves of a sample behind the filter, from noise that was drawn by its true law.
     drawn = noise_of(np.random.default_rng(9), 400_000, share)
-    left = lfilter([1.0, *noise.whitening], [1.0], drawn) / noise.white
+    left = np.asarray(lfilter([1.0, *noise.whitening], [1.0], drawn)) / noise.white
     assert np.mean(left**2) == pytest.approx(noise.share, rel=0.1)
     assert noise.share < 0.7
 
