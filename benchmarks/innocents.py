@@ -162,6 +162,7 @@ def run_one(seed: int, flaw: str) -> Row:
             "z": [[entry.effect, round(entry.z, 2)] for entry in loop.last.ranking[:3]],
             "chi2_per_dof": held.stats.chi2 / held.stats.dof,
             "method": held.noise.method,
+            "order": len(held.noise.whitening),
             "reported": bool(health.noise_peak or health.unsettled or health.brief_blows),
             "off": {
                 name: (float(held.model[name]) - float(truth[name])) / error for name, error in errors.items()

@@ -100,7 +100,12 @@ def find_separating_experiment(
     if not finding.indistinguishable:
         return nothing
     question = _question(extension, campaign_scales(campaign))
-    fine = extension.before.model.substeps > 1 or any(probe.channels for probe in question.probes)
+    # The filter that whitens coloured noise is one of the campaign's samples.
+    fine = (
+        extension.before.model.substeps > 1
+        or any(probe.channels for probe in question.probes)
+        or bool(problem.whitening)
+    )
     steps = problem.integrator.record_steps(extension.before.model)
     outline = find_test_outline(campaign, steps, every_sample=fine)
     if outline is None:

@@ -20,6 +20,7 @@ def build_problem(
     noise: float,
     integrator: Integrator,
     share: float = 1.0,
+    whitening: tuple[float, ...] = (),
 ) -> Problem:
     """Cut records into segments for a model.
 
@@ -32,9 +33,11 @@ def build_problem(
         model: the isolator, for its decay time.
         quantity: what the sensor measures.
         hold: what the drive does between samples.
-        noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
+        noise: rms of white noise that has the density of the noise inside its band, or of what the whitening
+            filter leaves [SI unit of the output].
         integrator: solver and steps.
         share: share of the samples of which the noise is independent.
+        whitening: coefficients of the filter that whitens coloured noise; none where it is white.
 
     Returns:
         The problem.
@@ -51,4 +54,6 @@ def build_problem(
     segments = cut_segments(records, model)
     whole = slowest_decay(model) == 0.0 and not any(record.dwells for record in records)
     heads = head_segments(records) if whole else ()
-    return Problem(records, segments, quantity, hold, noise, integrator, heads, share=share)
+    return Problem(
+        records, segments, quantity, hold, noise, integrator, heads, share=share, whitening=whitening
+    )

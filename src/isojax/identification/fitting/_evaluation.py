@@ -65,6 +65,7 @@ class Evaluation:
             hold=fitted.hold,
             noise=fitted.noise,
             share=fitted.share,
+            whitening=fitted.whitening,
             integrator=fitted.integrator,
         )
 

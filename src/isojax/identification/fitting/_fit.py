@@ -157,6 +157,7 @@ def simulator_for(
         hold=campaign.input.hold,
         noise=noise.white,
         share=noise.share,
+        whitening=noise.whitening,
         integrator=Integrator() if integrator is None else integrator,
     )
     if integrator is None:

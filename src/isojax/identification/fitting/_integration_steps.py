@@ -1,9 +1,10 @@
 """The coarsest integration steps that the noise allows, by step doubling."""
 
+import jax.numpy as jnp
 import numpy as np
 
 from ...models import Integrator, Isolator
-from ..jacobian import readings
+from ..jacobian import readings, whiten
 from ._problem import Problem
 from ._simulator import Simulator
 
@@ -39,6 +40,9 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     difference = (outcomes[0] - outcomes[1]) * weight
     if not np.all(np.isfinite(difference)):
         return float("inf")
+    if prepared.whitening is not None:
+        rows = whiten(jnp.asarray(difference)[:, None], jnp.asarray(weight), prepared.whitening)
+        difference = np.asarray(rows[:, 0])
     return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise)
 
 

@@ -24,12 +24,14 @@ class Problem(NamedTuple):
         segments: pieces of them.
         quantity: what the sensor measures.
         hold: what the drive does between samples.
-        noise: rms of white noise that has the density of the noise inside its band [SI unit of the output].
+        noise: rms of white noise that has the density of the noise inside its band, or of what the whitening
+            filter leaves [SI unit of the output].
         integrator: solver and steps.
         heads: the first samples of each record, where records are left whole and only these may set the
             initial states; empty where every segment settles its own.
         step_error: rms error of the integration over the noise of a sample.
         share: share of the samples of which the noise is independent; below 1 where a filter has limited it.
+        whitening: coefficients of the filter that whitens coloured noise; none where it is white.
     """
 
     records: tuple[Record, ...]
@@ -41,6 +43,7 @@ class Problem(NamedTuple):
     heads: tuple[Segment, ...] = ()
     step_error: float = float("nan")
     share: float = 1.0
+    whitening: tuple[float, ...] = ()
 
 
 @shown

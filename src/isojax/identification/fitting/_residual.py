@@ -23,8 +23,9 @@ class Residual(NamedTuple):
         whiteness: share of lags within +-25 (0 left out) whose autocorrelation stays in the 99 % band, a
             record each.
         lags: the lags [samples].
-        autocorrelation: of each record's residual at the lags.
-        cross_correlation: of each record's residual with the drive at the lags.
+        autocorrelation: of each record's residual at the lags; where the noise is coloured, of the residual
+            that the law of the noise leaves.
+        cross_correlation: of the same with the drive at the lags.
         band: half width of the 99 % band of each record.
     """
 
@@ -88,6 +89,7 @@ def residual(fit: Fit | Fitted) -> Residual:
     values, own, cross, band, white = [], [], [], [], []
     for run in runs:
         left = run.residual[run.counted > 0.0]
+        left = np.asarray(signal.lfilter([1.0, *fit.noise.law], [1.0], left))
         drive = run.record.input[run.counted > 0.0]
         values.append(run.residual)
         own.append(_correlate(left, left))

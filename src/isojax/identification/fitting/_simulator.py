@@ -69,6 +69,7 @@ class Simulator:
                 channels=tuple(sorted(channels | known)),
                 room=self._segments,
                 integrator=problem.integrator,
+                whitening=problem.whitening,
             )
         return self._prepared[key]
 

@@ -3,9 +3,9 @@
 In: a model and records cut into segments. Out: information matrices J'J with J'r, one a segment.
 Read `_segments` (where records are cut) and `_batch` (segments side by side), then `_information` (the
 matrices of a model, and the one choice between `_fixed_steps`, RK4 under a scan, and `_solved_steps`, a
-diffrax solver with its tolerances) with `_unknowns`, `_families`, `_internal_states` and `_channels`, then
-`_score_columns` (the columns of absent effects) with `_effect_inputs`, `_slopes`, `_transitions` and
-`_propagation`.
+diffrax solver with its tolerances) with `_whitening`, `_unknowns`, `_families`, `_internal_states` and
+`_channels`, then `_score_columns` (the columns of absent effects) with `_effect_inputs`, `_slopes`,
+`_transitions` and `_propagation`.
 """
 
 from ._batch import Prepared as Prepared
@@ -31,3 +31,6 @@ from ._unknowns import STIFFNESS_SCALE_UNIT as STIFFNESS_SCALE_UNIT
 from ._unknowns import Unknowns as Unknowns
 from ._unknowns import has_stiffness_scale as has_stiffness_scale
 from ._unknowns import scaled_model as scaled_model
+from ._whitening import Whitening as Whitening
+from ._whitening import find_whitening as find_whitening
+from ._whitening import whiten as whiten

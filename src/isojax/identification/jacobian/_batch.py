@@ -16,6 +16,7 @@ from ...models import Instant, Integrator, Isolator, Quantity
 from ...records import Record, measured_state
 from ._channels import channel_table, drive_table
 from ._segments import Segment
+from ._whitening import Whitening, find_whitening
 
 
 class Batch(eqx.Module):
@@ -67,6 +68,7 @@ class Prepared(NamedTuple):
         samples: samples that count in each record.
         integrator: what simulates the segments.
         jumps: whether the drive jumps at the samples.
+        whitening: what makes the noise in the rows of a lane white, or None where it is.
     """
 
     batches: tuple[Batch, ...]
@@ -79,6 +81,7 @@ class Prepared(NamedTuple):
     samples: Float[np.ndarray, " record"]
     integrator: Integrator
     jumps: bool
+    whitening: Whitening | None = None
 
 
 def coordinate_motion(
@@ -121,6 +124,7 @@ def prepare(
     channels: tuple[str, ...] = (),
     room: tuple[Segment, ...] = (),
     integrator: Integrator | None = None,
+    whitening: tuple[float, ...] = (),
 ) -> Prepared:
     """Lay segments side by side.
 
@@ -136,6 +140,7 @@ def prepare(
         channels: names of the signals of the records that are wanted beside the drive.
         room: segments for which there shall be room, too: tables of one shape share their compiled code.
         integrator: what simulates the segments; RK4, which takes the steps given above, if omitted.
+        whitening: coefficients of the filter that whitens the noise, see `find_whitening`.
 
     Returns:
         The batches and what belongs to their lanes.
@@ -205,4 +210,5 @@ def prepare(
         count,
         Integrator() if integrator is None else integrator,
         hold == "zero_order",
+        find_whitening(whitening),
     )

@@ -26,6 +26,7 @@ from ...models import (
 from ._batch import Batch
 from ._slopes import steps_of
 from ._unknowns import movable, scaled_model, unit_changes
+from ._whitening import Whitening, whitened_products
 
 
 def _sampler(
@@ -61,14 +62,18 @@ def fixed_information(
     batch: Batch,
     quantity: Quantity,
     sample_time: float,
+    whitening: Whitening | None,
 ) -> Float[Array, "column column lanes"]:
-    """Accumulate A^T W A over the samples of each lane; A holds the columns and, last, the residual."""
+    """Accumulate A^T W A over the samples of each lane; A holds the columns and, last, the residual.
+
+    White noise weighs each sample by itself, so that no row need be kept.
+    """
     known, with_moved = movable(model, moving)
     sample = _sampler(model, quantity, sample_time)
     changes = unit_changes(model, directions, columns, state_scales)
     total, lanes = changes.scale.shape
 
-    def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
+    def body(carry: tuple, table: tuple) -> tuple[tuple, Array | None]:
         state, tangent, gram, pending = carry
         acting, measured, weight = table
         stages = split_stages(acting)
@@ -88,13 +93,17 @@ def fixed_information(
         if pending is not None:
             rows, pending = rows + pending, jnp.concatenate([change[2], -after[None]])
         rows = rows * weight[None]
+        if whitening is not None:
+            return (state, change[1], gram, pending), rows
         return (state, change[1], gram + rows[:, None] * rows[None], pending), None
 
     silent = jnp.zeros((total + 1, lanes)) if model.splits else None
     start = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
     tables = (batch.acting, batch.measured, batch.weight)
-    carry, _ = jax.lax.scan(body, start, tables)
-    return carry[2]
+    carry, rows = jax.lax.scan(body, start, tables)
+    if whitening is None or rows is None:
+        return carry[2]
+    return whitened_products(rows, batch.weight, whitening)
 
 
 @eqx.filter_jit

@@ -87,6 +87,7 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
             prepared.batches[part].following(model),
             prepared.quantity,
             prepared.sample_time,
+            prepared.whitening,
         )
         return np.moveaxis(np.asarray(result), -1, 0)
 

@@ -28,6 +28,7 @@ from ._propagation import propagate, respond
 from ._slopes import Change, Slopes, impulse_at_samples, slopes_along
 from ._transitions import Transitions, transitions_along
 from ._unknowns import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale
+from ._whitening import whitened_products
 
 _ENTRIES = 2e7
 """Numbers that one table of columns along the motion may hold."""
@@ -57,6 +58,9 @@ class _Layout(NamedTuple):
     moving: tuple[int, ...]
     units: tuple[float, ...]
     places: tuple[tuple[int, ...], tuple[int, ...]]
+
+
+_weigh = jax.jit(whitened_products)
 
 
 def _layout(unknowns: Unknowns, carried: int) -> _Layout:
@@ -156,6 +160,9 @@ def _block(
         if group.is_full:
             group.solve(table)
     group.solve(table)
+    if prepared.whitening is not None:
+        rows = jnp.asarray(table.transpose(2, 1, 0))
+        return np.moveaxis(np.asarray(_weigh(rows, batch.weight, prepared.whitening)), -1, 0)
     # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
         return table @ np.swapaxes(table, 1, 2)

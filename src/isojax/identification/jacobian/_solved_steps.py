@@ -10,6 +10,7 @@ from ..._parameters import list_parameters
 from ...models import Instant, Integrator, Isolator, Quantity, State, solve_record
 from ._batch import Batch
 from ._unknowns import movable, scaled_model, unit_changes
+from ._whitening import Whitening, whitened_products
 
 
 def _solve_lanes(
@@ -49,6 +50,7 @@ def solved_information(
     batch: Batch,
     quantity: Quantity,
     sample_time: float,
+    whitening: Whitening | None,
 ) -> Float[Array, "column column lanes"]:
     """Differentiate the solver's readings forward, and multiply out A^T W A; see `fixed_information`."""
     known, with_moved = movable(model, moving)
@@ -63,6 +65,8 @@ def solved_information(
 
     reading, slopes = jax.vmap(along, out_axes=(None, 0))(*changes)
     rows = jnp.concatenate([slopes, (batch.measured - reading)[None]]) * batch.weight[None]
+    if whitening is not None:
+        return whitened_products(rows.swapaxes(0, 1), batch.weight, whitening)
     return jnp.einsum("itl,jtl->ijl", rows, rows)
 
 

@@ -9,13 +9,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from ..._parameters import list_parameters
 from ...elements import Channels
 from ...excitations import Hold
 from ...models import RK4, Instant, Isolator, State, share_internal
-from ...records import Band, Campaign, Record, measured_state
+from ...records import Band, Campaign, NoiseEstimate, Record, measured_state
 from ...records.spectrum import shift_order
 from ..fitting import Fit, Run
 from ..guess import Motion, is_absolute, measured_motion
@@ -197,7 +197,7 @@ def _force_residual(
     # The share of the noise: the same computation with noise of the same density added to the motion.
     noise = []
     for draw in range(_NOISE_DRAWS):
-        stray = _noise_motion(campaign, record, motion, fit.noise.white, (seed, draw))
+        stray = _noise_motion(campaign, record, motion, fit.noise, (seed, draw))
         shaken = missing(x + stray[0], v + stray[1], a + stray[2]) - force
         noise.append(_filter_to_band(np.asarray(shaken), record.rate, lowest, highest))
     return ForceResidual(
@@ -236,10 +236,14 @@ def _filter_to_band(
 
 
 def _noise_motion(
-    campaign: Campaign, record: Record, motion: Motion, noise: float, seed: tuple[int, int]
+    campaign: Campaign, record: Record, motion: Motion, noise: NoiseEstimate, seed: tuple[int, int]
 ) -> tuple[Array, ...]:
-    """Give displacement, velocity and acceleration of simulated noise of the output alone."""
-    values = noise * np.random.default_rng(seed).standard_normal(record.output.size)
+    """Give displacement, velocity and acceleration of simulated noise of the output alone.
+
+    Its density is that by which the fit weighs the samples.
+    """
+    values = noise.white * np.random.default_rng(seed).standard_normal(record.output.size)
+    values = np.asarray(lfilter([1.0], [1.0, *noise.whitening], values))
     alone = dataclasses.replace(record, output=values)
     band = motion.band
     stray = measured_state(alone, campaign.output.quantity, band.lowest, band.highest)

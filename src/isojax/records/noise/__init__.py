@@ -1,8 +1,9 @@
 """The noise of the output channel, and the health of the data.
 
-In: a `Campaign`. Out: the rms of its output noise, and what the reader must know of the data: dwells that
-never settled, brief blows, differences between repeats, a resonance peak in the scatter, spikes.
-Read `_noise.py` first, then `_repeats.py`; `_noise_peak.py`, `_spikes.py` and `_health.py` after them.
+In: a `Campaign`. Out: the rms and colour of its output noise, and what the reader must know of the
+data: dwells that never settled, brief blows, differences between repeats, a resonance peak in the scatter,
+spikes. Read `_noise.py` first, then `_colour.py` and `_repeats.py`; `_noise_peak.py`, `_spikes.py` and
+`_health.py` after them.
 """
 
 from ._health import DataHealth as DataHealth

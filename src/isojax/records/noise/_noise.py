@@ -6,13 +6,14 @@ from typing import Literal
 
 import numpy as np
 import scipy.stats
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ..._show import number, shown
 from .._blow import ring_down
 from .._campaign import Campaign
 from .._record import Dwell, Record
-from ..spectrum import NoiseBand, dwell_rest, dwell_window, hum_lines, spectral_floor
+from ..spectrum import NoiseBand, Rest, dwell_rest, dwell_window, hum_lines, spectral_floor
+from ._colour import Colour, Piece, noise_colour, whitened_square
 from ._repeats import repeat_difference, repeat_groups
 
 NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency"]
@@ -37,6 +38,9 @@ _WHOLE_SPAN = (0.4, 0.95)
 _EQUAL_FLOORS = 3.0
 """Standard errors within which two floors count as equal."""
 
+_SELECTIONS = 3
+"""Times that the settled dwells are chosen anew with the colour that the last choice showed."""
+
 _TRIMMED = 6
 """From so many records on, the pooled noise comes from the inner half: one bad record does not count."""
 
@@ -54,7 +58,8 @@ class NoiseEstimate:
         bandwidth_hz: Frequency up to which the noise reaches [Hz]: half the rate, or the [filter]'s cut-off.
         note: What the reader must know, or "".
         share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
-            independent.
+            independent. Of coloured noise it is `Colour.share`.
+        colour: The law of coloured noise; None where the noise is not significantly coloured.
     """
 
     sigma: float
@@ -64,15 +69,27 @@ class NoiseEstimate:
     bandwidth_hz: float
     note: str = ""
     share: float = 1.0
+    colour: Colour | None = None
 
     @property
     def white(self) -> float:
         """The rms of white noise with the density that this noise has inside its band: sigma / sqrt(share).
 
         It sets the uncertainty of a coefficient, and not the smaller rms of the filtered noise: the motion
-        lies inside the band, where a filter leaves the noise as it is.
+        lies inside the band, where a filter leaves the noise as it is. Of coloured noise it is what the
+        filter that weighs the samples leaves of noise of the weighing density.
         """
-        return self.sigma / float(np.sqrt(self.share))
+        return self.sigma / float(np.sqrt(self.share)) if self.colour is None else self.colour.level
+
+    @property
+    def whitening(self) -> tuple[float, ...]:
+        """The coefficients of the filter that weighs the samples of coloured noise, see `Colour`."""
+        return () if self.colour is None else self.colour.whitening
+
+    @property
+    def law(self) -> tuple[float, ...]:
+        """The coefficients of the law of coloured noise, see `Colour`."""
+        return () if self.colour is None else self.colour.law
 
     def _headline(self) -> str:
         known = f"{number(self.sigma)} rms up to {number(self.bandwidth_hz)} Hz"
@@ -88,6 +105,10 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     band. Where the building's floor was measured only the last applies, since a model can explain the scatter
     that the floor causes. Stepped sines never need the repeats: forces and stiffness that change between
     repeats move the harmonics, and not the scatter about them.
+
+    Settled dwells and periods also show the spectrum of the noise. Where it is significantly coloured, the
+    estimate holds its law and the filter that weighs the samples. Declared noise and noise behind a [filter]
+    count as white inside their band; repeats and the floor of a spectrum show no colour.
 
     Args:
         campaign: The campaign.
@@ -117,6 +138,12 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     # All records share one channel: a spectral floor does not count where other records show the noise
     # itself.
     kept = [np.isfinite(value) and method in (*seen, common) for value, method in found]
+    colour = None
+    if campaign.filter is None:
+        chosen = [record for record, (_, method) in zip(records, found, strict=True) if method == common]
+        colour = _common_colour(chosen, common, band)
+    if colour is not None:
+        sigma, note = colour.sigma, _words_of(colour)
     return NoiseEstimate(
         sigma=sigma,
         method=common,
@@ -124,7 +151,65 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
         methods=tuple(method if keep else common for (_, method), keep in zip(found, kept, strict=True)),
         bandwidth_hz=band.highest,
         note=note,
-        share=band.share,
+        share=band.share if colour is None else colour.share,
+        colour=colour,
+    )
+
+
+def _common_colour(records: list[Record], method: NoiseMethod, band: NoiseBand) -> Colour | None:
+    """Gives the autoregressive law of the noise that records show; None where it is white or unknown."""
+    if method == "periods":
+        periods = [_settled_periods(record) for record in records]
+        return noise_colour(
+            [
+                Piece(Rest(row, np.zeros(0), np.zeros(row.size // 2 + 1)), 1.0 - 1.0 / len(rows))
+                for rows in periods
+                for row in rows - np.mean(rows, axis=0)
+            ],
+            band.rate,
+        )
+    if method != "cycle_scatter":
+        return None
+    pieces = [
+        [piece for dwell in record.dwells if (piece := _dwell_piece(record, dwell))] for record in records
+    ]
+    colour: Colour | None = None
+    # Which dwells have settled is judged by white innovations: the scatter of coloured noise itself varies
+    # more, and with the frequency of the dwell.
+    for _ in range(_SELECTIONS):
+        settled = []
+        for own in pieces:
+            scatters = np.array([_piece_scatter(piece, colour) for piece in own]).reshape(-1, 2)
+            if scatters.size:
+                kept = _settled_level(*scatters.T)[1]
+                settled += [piece for piece, keep in zip(own, kept, strict=True) if keep]
+        colour = noise_colour(settled, band.rate)
+        if colour is None:
+            return None
+    return colour
+
+
+def _dwell_piece(record: Record, dwell: Dwell) -> Piece | None:
+    """Gives what the end of a dwell leaves; None if it is too short."""
+    window = dwell_window(record, dwell)
+    if window is None:
+        return None
+    piece = Piece(dwell_rest(record, dwell, window, tuple(line.frequency for line in hum_lines(record))))
+    return None if piece.freedom < piece.rest.taken.size else piece
+
+
+def _piece_scatter(piece: Piece, colour: Colour | None) -> tuple[float, float]:
+    """Gives mean square and degrees of freedom of a window's noise, or of its innovations."""
+    if colour is not None:
+        return whitened_square(piece, colour)
+    return float(piece.rest.signal @ piece.rest.signal) / piece.freedom, piece.freedom
+
+
+def _words_of(colour: Colour) -> str:
+    """Gives what a reader must know of the colour of the noise."""
+    return (
+        "the noise is coloured: its samples are correlated, and its spectrum (an autoregressive law of order "
+        f"{len(colour.law)}) weighs the residual; no band counts more than under white noise of that rms"
     )
 
 
@@ -172,13 +257,20 @@ def cycle_scatter(record: Record, band: NoiseBand) -> float:
     scatters = np.array([one for one in found if one is not None]).reshape(-1, 2)
     if not scatters.size:
         return float("nan")
-    squares, freedom = scatters.T
+    return float(np.sqrt(_settled_level(*scatters.T)[0]))
+
+
+def _settled_level(
+    squares: Float[np.ndarray, " dwell"], freedom: Float[np.ndarray, " dwell"]
+) -> tuple[float, Bool[np.ndarray, " dwell"]]:
+    """Gives the mean square of the dwells that have settled, and which ones have."""
     quantile = _SETTLED_QUANTILE if squares.size >= _FEWEST_DWELLS else 0.5
     level = np.quantile(squares * freedom / scipy.stats.chi2.ppf(quantile, freedom), quantile)
+    limit = scipy.stats.chi2.isf(_UNSETTLED, freedom)
     for _ in range(3):
-        settled = squares * freedom <= level * scipy.stats.chi2.isf(_UNSETTLED, freedom)
+        settled = squares * freedom <= level * limit
         level = np.average(squares[settled], weights=freedom[settled]) if np.any(settled) else level
-    return float(np.sqrt(level))
+    return float(level), squares * freedom <= level * limit
 
 
 def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float, float] | None:
@@ -189,7 +281,7 @@ def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float,
     if window is None:
         return None
     lines = tuple(line.frequency for line in hum_lines(record))
-    rest, frequencies = dwell_rest(record, dwell, window, lines)
+    rest, frequencies, _ = dwell_rest(record, dwell, window, lines)
     taken = float(np.sum(band.power_gain(frequencies)))
     # Noise of a narrow band has fewer degrees of freedom than samples, and the harmonics use some of them.
     freedom = window * band.share - taken
@@ -204,14 +296,20 @@ def period_scatter(record: Record) -> float:
     Only whole periods after the settle samples count. With three and more the first ones are left out as long
     as they scatter clearly more than the others (a transient).
     """
+    periods = _settled_periods(record)
+    return float(np.sqrt(_variance_of_periods(periods))) if len(periods) else float("nan")
+
+
+def _settled_periods(record: Record) -> Float[np.ndarray, "period time"]:
+    """Gives the periods that count; none without two."""
     periods = record.periods
     if len(periods) < 2:
-        return float("nan")
+        return periods[:0]
     squares = [_variance_of_periods(periods[first:]) for first in range(max(1, len(periods) - 1))]
-    chosen = squares[-1]
-    for square in reversed(squares):
-        chosen = square if square < _TRANSIENT * chosen else chosen
-    return float(np.sqrt(chosen))
+    chosen = len(squares) - 1
+    for first in range(len(squares) - 1, -1, -1):
+        chosen = first if squares[first] < _TRANSIENT * squares[chosen] else chosen
+    return periods[chosen:]
 
 
 def high_frequency_floor(record: Record, band: NoiseBand) -> float:

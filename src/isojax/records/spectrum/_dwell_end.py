@@ -24,10 +24,13 @@ class Rest(NamedTuple):
     Attributes:
         signal: Samples, in the output's unit.
         taken: Frequencies of the basis signals that were removed [Hz].
+        removed: Share of the noise of each line that they took, from 0 to 1; line k of n samples lies at
+            k rate/n.
     """
 
     signal: Float[np.ndarray, " time"]
     taken: Float[np.ndarray, " column"]
+    removed: Float[np.ndarray, " line"]
 
 
 def dwell_window(record: Record, dwell: Dwell) -> int | None:
@@ -55,7 +58,9 @@ def dwell_rest(record: Record, dwell: Dwell, window: int, lines: tuple[float, ..
     def rest() -> Rest:
         design, inverse, taken = drifting_harmonics(window, record.rate, dwell.frequency, orders, lines)
         signal = record.output[dwell.stop - window : dwell.stop]
-        return Rest(signal - design @ (inverse @ (design.T @ signal)), taken)
+        lines_of_design = np.fft.rfft(design, axis=0)
+        removed = np.sum((lines_of_design @ inverse) * lines_of_design.conj(), axis=1).real / window
+        return Rest(signal - design @ (inverse @ (design.T @ signal)), taken, removed)
 
     # The bases of all dwells are too large for the processor's cache to compute them twice.
     return record.once(("dwell rest", dwell, window, orders, lines), rest)
