@@ -48,7 +48,7 @@ from .reporting import (
 )
 from .stability import stability_map
 
-_WIDTH = 120
+_TERMINAL = 120
 
 _NOT_CONVERGED = 1
 
@@ -200,7 +200,7 @@ def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Ca
 
 def _results() -> Console:
     """Give what shows results; where no terminal reports its width, wide enough for every table."""
-    return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
+    return Console(highlight=False, width=None if sys.stdout.isatty() else _TERMINAL)
 
 
 def _inspect(asked: argparse.Namespace) -> int:

@@ -26,6 +26,7 @@ GUARDS = {
     "STEP_SHARES",
     "SMALLEST_LAW",
     "WIDTH_95",
+    "CANDIDATES_SHOWN",
 }
 """Numbers of the diagnosis that set the accuracy of a computation or the start of a search: no decision."""
 

@@ -276,7 +276,7 @@ def test_a_command_has_no_scale(right, spoiled):
 def test_clipped_tops_are_a_doubt(right, spoiled):
     clip = lambda channels: {**channels, "acceleration": np.clip(channels["acceleration"], -0.2, 0.2)}  # noqa: E731
     (doubt,) = find_suspicions(read_campaign(spoiled(right("dwells", "acceleration"), data=clip)))
-    assert (doubt.check, doubt.contradicts) == ("clipping", False)
+    assert (doubt.check, doubt.contradicts) == ("flat tops", False)
     assert "0.2" in doubt.figure
 
 

@@ -16,7 +16,7 @@ Hold = Literal["band_limited", "linear", "zero_order"]
 TIME_DERIVATIVES: Mapping[OutputQuantity, int] = {"displacement": 0, "velocity": 1, "acceleration": 2}
 """How often the displacement is differentiated to give each quantity."""
 
-_LISTED = 16
+_RECORDS_SHOWN = 16
 """Records of a campaign that are shown one by one."""
 
 
@@ -179,7 +179,7 @@ class Campaign:
         ]
 
     def _lines(self) -> list[str]:
-        first = self.records[:_LISTED]
+        first = self.records[:_RECORDS_SHOWN]
         more = len(self.records) - len(first)
         return [f"  {headline(record)}" for record in first] + (
             [f"  and {more} records more"] if more else []

@@ -11,7 +11,7 @@ from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
 
-_LISTED = 8
+_CANDIDATES_SHOWN = 8
 """Candidates of a ranking that are shown."""
 
 
@@ -203,5 +203,5 @@ def _ranked(ranking: tuple[Candidate, ...]) -> list[Row]:
     """Give the best candidates, a row each."""
     return [
         Row(one.effect, f"z = {one.z:.3g}, p {_chance(one.p_value)}, {one.strength_words}", one.words)
-        for one in ranking[:_LISTED]
+        for one in ranking[:_CANDIDATES_SHOWN]
     ]

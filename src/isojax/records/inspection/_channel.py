@@ -5,13 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import shown
 from ..noise import find_spikes
 from ..spectrum import NoiseBand, spectral_floor
 
-_TOP = 0.02
+_EXTREME = 0.02
 """Share of the range, or so many steps of the converter, in which samples near an end are counted ..."""
 
-_STEPS = 8
+_LEVELS = 8
 _CLIPPED = 0.5
 """... of which more than this share stands at the end itself where a channel clips; a sine has less."""
 
@@ -24,6 +25,7 @@ _FLOOR = (0.4, 0.95)
 """Section of the band, as shares of half the rate, whose median density is taken for the noise floor."""
 
 
+@shown
 @dataclass(frozen=True, eq=False)
 class ChannelInspection:
     """One channel of a file, in the file's own unit.
@@ -109,9 +111,9 @@ def clipped_share(samples: Float[np.ndarray, " time"]) -> float:
     clipping.
     """
     levels = np.unique(samples)
-    if levels.size < 2 * _STEPS:
+    if levels.size < 2 * _LEVELS:
         return 0.0
-    near = max(_TOP * float(levels[-1] - levels[0]), _STEPS * float(np.min(np.diff(levels))))
+    near = max(_EXTREME * float(levels[-1] - levels[0]), _LEVELS * float(np.min(np.diff(levels))))
     share = 0.0
     for end in (levels[0], levels[-1]):
         at = int(np.count_nonzero(samples == end))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from ..._show import shown
 from .._record import Direction, Dwell, ExcitationKind
 from ..formats import Column, channel_unit, columns_of, split_heading, uniform_rate
 from ..reading import RATE_TOLERANCE, detect_kind, find_reader
@@ -16,13 +17,14 @@ from ._channel import ChannelInspection, inspect_channel
 from ._guess import drive_and_response, guess_quantity, is_time
 from ._period import find_period
 
-_FEWEST = 16
+_FEWEST_ROWS = 16
 """Values without which a column is no channel."""
 
 _PARTS = 8
 """Parts of a sweep whose frequencies are compared."""
 
 
+@shown
 @dataclass(frozen=True, eq=False)
 class FileInspection:
     """What is in a data file.
@@ -96,9 +98,9 @@ def inspect_file(file: str | Path, rate: float | None = None, data: Any = None) 
     """
     path = Path(file)
     columns = find_reader(path)(path, None) if data is None else columns_of(data, path, None)
-    sizes = [one.samples.size for one in columns.values() if one.samples.size >= _FEWEST]
+    sizes = [one.samples.size for one in columns.values() if one.samples.size >= _FEWEST_ROWS]
     if not sizes:
-        raise ValueError(f"{path} holds no channel; expected columns of at least {_FEWEST} numbers")
+        raise ValueError(f"{path} holds no channel; expected columns of at least {_FEWEST_ROWS} numbers")
     size = max(sizes, key=lambda one: (sizes.count(one), one))
     held = {name: one for name, one in columns.items() if one.samples.size == size}
     time = next(

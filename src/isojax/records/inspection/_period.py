@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.fft import next_fast_len
 
-_SHORTEST = 16
+_SHORTEST_PERIOD = 16
 """Samples below which a repetition is a sine rather than a period."""
 
-_ALIKE = 0.9
+_REPEATS = 0.9
 """Correlation of a signal with itself, a period later, below which it is not periodic."""
 
 _AS_GOOD = 1.5
@@ -30,7 +30,7 @@ def find_period(signal: Float[np.ndarray, " time"]) -> int | None:
     """
     centred = signal - np.mean(signal)
     size = centred.size
-    if size < 2 * _SHORTEST or not np.any(centred):
+    if size < 2 * _SHORTEST_PERIOD or not np.any(centred):
         return None
     length = cast(int, next_fast_len(2 * size, real=True))
     spectrum = np.abs(np.fft.rfft(centred, length)) ** 2
@@ -42,11 +42,11 @@ def find_period(signal: Float[np.ndarray, " time"]) -> int | None:
     away = np.flatnonzero(correlation < 0.5)
     if not away.size:
         return None
-    first = max(int(away[0]), _SHORTEST)
+    first = max(int(away[0]), _SHORTEST_PERIOD)
     if first >= lags.size:
         return None
     best = float(np.max(correlation[first:]))
-    if best < _ALIKE:
+    if best < _REPEATS:
         return None
     least = 1.0 - _AS_GOOD * (1.0 - best) - 1e-9
     good = first + np.flatnonzero(correlation[first:] >= least)

@@ -24,7 +24,7 @@ _AGREED = 1e-4
 _MOST_ROUNDS = 50
 """... and rounds after which they have to: each leaves at most a half of the error."""
 
-_LINES = 4096
+_FREQUENCIES = 4096
 """Lines of the density up to half the rate, at least: finer than what the orders can distinguish."""
 
 
@@ -98,7 +98,7 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     seen = np.sum([_products(piece.rest.signal, most) / piece.kept for piece in pieces], axis=0)
     size = np.sum([piece.rest.signal.size - lags for piece in pieces], axis=0)
     longest = max(piece.rest.signal.size for piece in pieces)
-    steps = max(_LINES, longest)
+    steps = max(_FREQUENCIES, longest)
     density, laws, errors = np.full(steps + 1, seen[0] / freedom), [np.zeros(0)], np.zeros(1)
     for _ in range(_MOST_ROUNDS):
         correlation = np.fft.irfft(density)[:longest]
@@ -147,11 +147,11 @@ def _taken_products(
 
 def _weighed(law: Float[np.ndarray, " order"], innovation: float, square: float, freedom: float) -> Colour:
     """Gives a law with the filter that weighs by its density, raised to that of white noise of its rms."""
-    density = _density(law, innovation, _LINES)
+    density = _density(law, innovation, _FREQUENCIES)
     raised = np.fft.irfft(np.maximum(density, square))
     laws, errors = _levinson(raised[: MOST_ORDERS + 1])
     order = _best_order(errors, freedom)
-    share = np.fft.irfft(density / _density(laws[order], float(errors[order]), _LINES))[0]
+    share = np.fft.irfft(density / _density(laws[order], float(errors[order]), _FREQUENCIES))[0]
     return Colour(
         law=tuple(law.tolist()),
         innovation=float(np.sqrt(innovation)),

@@ -23,7 +23,7 @@ _FEWEST_TOPS = 12
 _COMMON = 0.03
 """And their smallest share of all half cycles."""
 
-_FEWEST_SAMPLES = 6.0
+_FEWEST_AT_TOP = 6.0
 """Samples of a half cycle, at least, that show a shape."""
 
 
@@ -51,8 +51,8 @@ def find_clipping(campaign: Campaign) -> list[Suspicion]:
             "the last tenth"
         )
         line = '[model] elements = ["clipping"]' if section == "output" else "measure again, with more range"
-        cause = Cause("clipping", f"the {section} left the range of its channel", line)
-        found.append(Suspicion("clipping", f'"{column}"', figure, "43 %, as of a sine", (cause,), False))
+        cause = Cause("flat tops", f"the {section} left the range of its channel", line)
+        found.append(Suspicion("flat tops", f'"{column}"', figure, "43 %, as of a sine", (cause,), False))
     return found
 
 
@@ -65,7 +65,7 @@ def _flat_tops(signals: list[Float[np.ndarray, " _"]]) -> tuple[float, int, floa
     level = float(np.quantile(tops, 1.0 - 0.5 * _COMMON))
     at = np.abs(tops / level - 1.0) < _SPREAD
     count = int(np.count_nonzero(at))
-    if count < max(_FEWEST_TOPS, _COMMON * tops.size) or np.mean(above[at]) < _FEWEST_SAMPLES:
+    if count < max(_FEWEST_TOPS, _COMMON * tops.size) or np.mean(above[at]) < _FEWEST_AT_TOP:
         return None
     share = float(np.sum(near[at]) / np.sum(above[at]))
     return (level, count, share) if share > _FLAT else None

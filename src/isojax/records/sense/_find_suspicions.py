@@ -45,10 +45,10 @@ _SLOWEST = 0.05
 """Frequency [Hz] below which no isolator is tested; suspensions of seismometers lie above."""
 
 _JITTERED = 1e-3
-"""Error of a sample, over the response, that uneven times may make: what `Rules.response_error` allows."""
+"""Error of a sample, over the response, that uneven times may make."""
 
-_LAGGED = {"delay": "input_delay", "clock skew": "clock_skew"}
-"""Mistakes of time, and the effect of the catalogue that a model may declare for each."""
+_LAGGED = {"delay": '[model] elements = ["input_delay"]', "clock skew": '[model] elements = ["clock_skew"]'}
+"""Mistakes of time, and the line of campaign.toml that declares each as part of the model."""
 
 
 def find_suspicions(campaign: Campaign) -> tuple[Suspicion, ...]:
@@ -114,7 +114,7 @@ def _balance_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
     if check is None:
         return []
     causes = _causes(campaign, rows, balance)
-    if causes and _LAGGED.get(causes[0].name) in campaign.elements:
+    if causes and any(f'"{name}"' in causes[0].line for name in campaign.elements):
         return []
     if not causes and check == "inertia" and balance.unexplained > _UNBALANCED:
         check = "balance"  # noise in the response makes the apparent mass too small
@@ -200,7 +200,7 @@ def _lag_cause(campaign: Campaign, name: str, factor: float) -> Cause:
     else:
         words = f"the clocks of the channels differ by {1e6 * abs(factor):.3g} ppm"
         line = "resample one channel, or record both with one clock"
-    return Cause(name, words, f'{line}; a small one: [model] elements = ["{_LAGGED[name]}"]')
+    return Cause(name, words, f"{line}; a small one: {_LAGGED[name]}")
 
 
 def _size_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:

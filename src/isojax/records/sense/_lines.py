@@ -18,7 +18,7 @@ _PERIODS = 6.0
 _MOST_LINES = 48
 """Lines of a window that count at most: those that are driven hardest."""
 
-_DRIVEN = 0.03
+_DRIVEN_SHARE = 0.03
 """Amplitude of the drive, over its largest in the window, below which a line is not driven."""
 
 _MARGIN_PERIODS = 3.0
@@ -105,7 +105,7 @@ def _window_lines(
         spectrum, lines = np.fft.rfft(part, axis=0), np.fft.rfftfreq(size, 1.0 / rate)
         driven = np.abs(spectrum[:, 1]) * ((lines >= band[0]) & (lines <= band[1]))
         hardest = np.argsort(-driven)[:_MOST_LINES]
-        kept = np.sort(hardest[driven[hardest] > _DRIVEN * np.max(driven)])
+        kept = np.sort(hardest[driven[hardest] > _DRIVEN_SHARE * np.max(driven)])
         spectrum, lines = spectrum[kept], lines[kept]
     return spectrum, 2 * np.pi * lines, np.full(lines.size, (start + 0.5 * size) / rate)
 

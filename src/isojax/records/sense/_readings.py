@@ -13,7 +13,7 @@ from ._lines import lines_of
 from ._suspicion import Cause
 from ._unit_factor import unit_factor
 
-_SHORTEST = 64
+_SHORTEST_RECORD = 64
 """Samples without which a record is left out: its integrals are all margin."""
 
 _PASSES = 2
@@ -73,7 +73,7 @@ def rows_read(campaign: Campaign, reading: Reading) -> Rows | None:
     records = [
         record
         for record in campaign.fit_records
-        if record.kind != "free_decay" and record.time.size >= _SHORTEST
+        if record.kind != "free_decay" and record.time.size >= _SHORTEST_RECORD
     ]
     lines = [lines_of(_read(record, reading), reading.response, reading.based) for record in records]
     return rows_of(lines, reading.has_inertia)

@@ -34,10 +34,10 @@ _MASSES = {"grams": 1e-3, "tonnes": 1e3, "pounds": 0.45359237}
 _RATES = (2.0, 0.5, 1e3, 1e-3)
 """Ratios by which a rate is mistaken; a thousand where milliseconds are read as seconds."""
 
-_ALIKE = 1.08
+_SAME_SIZE = 1.08
 """Factor within which a named one is meant: a pound is half a kilogram within 1.1."""
 
-_ALIKE_RATE = 1.05
+_SAME_SIZE_RATE = 1.05
 """The same for rates, which are round."""
 
 _SIZES_NAMED = 2
@@ -145,7 +145,7 @@ def _unit_causes(campaign: Campaign, sizes: Sizes, inertia: float, order: int) -
             continue
         for unit in _UNITS[quantity]:
             factor = unit_factor(unit, quantity) / one
-            if factor == 1.0 or not _alike(factor, needed, _ALIKE):
+            if factor == 1.0 or not _alike(factor, needed, _SAME_SIZE):
                 continue
             after = (
                 sizes.scaled(factor, 1.0, 1.0, 1.0, order)
@@ -156,7 +156,7 @@ def _unit_causes(campaign: Campaign, sizes: Sizes, inertia: float, order: int) -
             found.append((after.oddness(), Cause(f"{section} unit", words, f'[{section}] unit = "{unit}"')))
     if drive.quantity != "base_acceleration":
         for unit, factor in _MASSES.items():
-            if _alike(factor, inertia, _ALIKE):
+            if _alike(factor, inertia, _SAME_SIZE):
                 after = sizes.scaled(1.0, 1.0, factor, 1.0, order)
                 line = f"[campaign] mass = {campaign.mass * factor:.4g}"
                 found.append((after.oddness(), Cause("mass unit", f"the mass is written in {unit}", line)))
@@ -167,7 +167,7 @@ def _rate_causes(campaign: Campaign, sizes: Sizes, inertia: float, order: int) -
     return [
         (after.oddness(), rate_cause(campaign, factor))
         for factor in _RATES
-        if order < 2 and _alike(factor ** (2 - order), inertia, _ALIKE_RATE)
+        if order < 2 and _alike(factor ** (2 - order), inertia, _SAME_SIZE_RATE)
         for after in (sizes.scaled(1.0, 1.0, 1.0, factor, order),)
     ]
 

@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 from typing import Literal
 
-CheckName = Literal["power", "inertia", "balance", "sizes", "clipping", "sample times"]
+from ..._show import shown
+
+CheckName = Literal["power", "inertia", "balance", "sizes", "flat tops", "sample times"]
 
 
+@shown
 @dataclass(frozen=True)
 class Cause:
     """A mistake that explains what was seen.
@@ -21,6 +24,7 @@ class Cause:
     line: str
 
 
+@shown
 @dataclass(frozen=True)
 class Suspicion:
     """Something in the records that does not agree with their declaration.

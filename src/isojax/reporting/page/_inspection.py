@@ -9,7 +9,7 @@ from rich.text import Text
 from ...records import ChannelInspection, FileInspection
 from ._summary import _table
 
-_FEWEST_CLIPPED = 1e-4
+_CLIPPED_SHARE = 1e-4
 """Share of clipped samples from which it is worth a word."""
 
 
@@ -63,7 +63,7 @@ def _flaws(one: ChannelInspection) -> str:
         found.append(f"{one.missing} missing")
     if one.rms == 0.0:
         found.append("constant")
-    if one.clipped > _FEWEST_CLIPPED:
+    if one.clipped > _CLIPPED_SHARE:
         found.append(f"{100.0 * one.clipped:.2g} % clipped")
     if one.spikes:
         found.append(f"{one.spikes} spikes")
