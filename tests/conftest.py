@@ -93,7 +93,6 @@ _WORTH_OPTIMISING = (
     "test_bifurcation_diagram.py",
     "test_fold_curve.py",
     "test_paper.py",
-    "test_blind_sample.py",
     "02_the_papers_map",
 )
 """Tests that run longer than they compile: maps, attractors, many curves or campaigns of one shape."""
