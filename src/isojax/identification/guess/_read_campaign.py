@@ -50,8 +50,8 @@ def read_campaign(
         ...     "record": [{"file": "run", "role": "fit"}],
         ... }
         >>> force = np.random.default_rng(0).normal(size=400)
-        >>> campaign = ij.read_campaign(declared, data={"run": {"force [kN]": force, "a": 0.5 * force}})
-        >>> campaign.input.unit, campaign.records[0].rate
+        >>> noisy = ij.read_campaign(declared, data={"run": {"force [kN]": force, "a": 0.5 * force}})
+        >>> noisy.input.unit, noisy.records[0].rate
         ('kN', 200.0)
     """
     declared = read_declaration(source, data)
