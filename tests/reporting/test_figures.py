@@ -124,6 +124,24 @@ def test_a_window_past_the_end_of_a_record_is_refused(found):
         isojax.plot.record(record, found.campaign, window=(1e3, 2e3))
 
 
+def test_an_inspected_file_shows_drive_response_and_spectra(tmp_path):
+    phase = 2.0 * np.pi * 5.0 * np.arange(2000) / 200.0
+    rng = np.random.default_rng(1)
+    columns = {
+        "force": np.sin(phase),
+        "acceleration": 3.0 * np.sin(phase - 1.0) + 0.01 * rng.normal(size=2000),
+    }
+    np.savez(tmp_path / "run.npz", **columns)
+    figure = isojax.plot.inspection([isojax.records.inspect_file(tmp_path / "run.npz", 200.0)])
+    drive, response, spectra = figure.axes
+    assert drive.lines or drive.collections
+    assert response.lines or response.collections
+    strongest = max(spectra.lines, key=lambda line: line.get_ydata().size)
+    assert strongest.get_xdata()[np.argmax(strongest.get_ydata())] == pytest.approx(5.0, abs=0.2)
+    with pytest.raises(ValueError, match="must hold at least one inspected file"):
+        isojax.plot.inspection([])
+
+
 def test_every_picture_stands_under_plot_and_is_drawn_by_a_test():
     drawn = {name: plot for name, plot in vars(isojax.plot).items() if inspect.isfunction(plot)}
     del drawn["show"]  # it chooses among the others
@@ -133,5 +151,6 @@ def test_every_picture_stands_under_plot_and_is_drawn_by_a_test():
     for name, plot in drawn.items():
         assert f"plot.{name}(" in tests, f"no test draws {name}"
         signature = inspect.signature(plot)
-        assert signature.parameters["ax"].default is None, name
+        # A row of three axes a file is a figure of its own.
+        assert name == "inspection" or signature.parameters["ax"].default is None, name
         assert signature.return_annotation is Figure, name
