@@ -20,6 +20,7 @@ from .inspection import draft_campaign as draft_campaign
 from .inspection import find_data_files as find_data_files
 from .inspection import find_period as find_period
 from .inspection import inspect_file as inspect_file
+from .noise import Colour as Colour
 from .noise import DataHealth as DataHealth
 from .noise import NoiseEstimate as NoiseEstimate
 from .noise import NoisePeak as NoisePeak

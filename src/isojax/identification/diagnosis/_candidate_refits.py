@@ -12,7 +12,7 @@ from ..guess import find_balance_start
 from ._admissibility import find_violation
 from ._evidence import by_evidence
 from ._imitations import find_simpler_pair
-from ._refit import Refit, follows_freely, least_difference, refit_candidate, refit_from
+from ._refit import Refit, follows_freely, is_determined, least_difference, refit_candidate, refit_from
 from ._score import Score, ScoreTest
 
 
@@ -120,6 +120,8 @@ def _violation(case: Case, found: Estimate, score: Score) -> str | None:
         return "its search came no nearer to that of another effect"
     if found.result != RESULTS.successful or found.excess >= fitted.excess:
         return "its refit did not converge"
+    if not is_determined(found, score):
+        return "its strength is not determined"
     element = found.model.element(score.element.name)
     if element is not None and not element.signed and float(getattr(element, element.strength)) < 0.0:
         return "its refit ends at a strength below zero"

@@ -7,7 +7,7 @@ from ..._results import RESULTS
 from ...models import Isolator
 from ..fitting import Estimate, Search
 from ._admissibility import find_violation
-from ._refit import Refit, bic, follows_freely, refit_candidate, refit_from
+from ._refit import Refit, bic, follows_freely, is_determined, refit_candidate, refit_from
 from ._score import absent_effects, score_test
 
 
@@ -40,6 +40,7 @@ def _best_addition(found: Estimate, excluded: str, opponent: _Opponent, search: 
             pair.result == RESULTS.successful
             and len(pair.places) <= len(other.places)
             and opponent.gained(pair) > rules.close_bic
+            and is_determined(pair, score)
             and find_violation(pair.model, pair.problem.records, pair.problem.quantity) is None
             and follows_freely(found, pair)
         ):

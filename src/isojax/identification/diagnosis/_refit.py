@@ -22,6 +22,7 @@ from ..fitting import (
     run_freely,
 )
 from ..jacobian import has_stiffness_scale
+from ._bounds import WIDTH_95
 from ._score import Score, ScoreTest
 
 STEP_SHARES = (1.0, 0.3, 0.03)
@@ -208,6 +209,14 @@ def with_own_shape(found: Estimate, name: str, search: Search) -> Estimate:
     inflation = max(1.0, freed.chi2 / freed.dof)
     clear = bic(found, inflation) - bic(freed, inflation) > search.rules.close_bic
     return freed if freed.result == RESULTS.successful and clear else found
+
+
+def is_determined(found: Estimate, score: Score) -> bool:
+    """Say whether the 95 % interval of a refitted strength leaves zero out."""
+    place = strength_place(found, score)
+    error = float(found.uncertainty.standard_error[place])
+    strength = float(list_parameters(found.model)[found.places[place]].value)
+    return abs(strength) > WIDTH_95 * error
 
 
 def strength_place(found: Estimate, score: Score) -> int:

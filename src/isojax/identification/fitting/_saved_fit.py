@@ -11,7 +11,7 @@ from jaxtyping import Float
 from ..._results import RESULTS, name_of_result, result_named
 from ..._show import Row, shown
 from ...models import Isolator, model_from_dict, model_to_dict, write_whole
-from ...records import NoiseEstimate
+from ...records import Colour, NoiseEstimate
 from ._coefficients import Coefficient, Coefficients
 from ._errors import Errors
 
@@ -194,6 +194,7 @@ def load_fit(path: str | Path) -> SavedFit:
 
     try:
         noise = {key: tuple(one) if isinstance(one, list) else one for key, one in content["noise"].items()}
+        colour = noise.pop("colour")
         return SavedFit(
             content["campaign"],
             model_from_dict(content["model"], path),
@@ -204,7 +205,7 @@ def load_fit(path: str | Path) -> SavedFit:
             ),
             np.array(content["covariance"], dtype=float).reshape((len(content["free"]),) * 2),
             Statistics(**_numbers(content["statistics"])),
-            NoiseEstimate(**_numbers(noise)),
+            NoiseEstimate(**_numbers(noise), colour=_colour(colour)),
             {
                 role: None if one is None else Errors(**_numbers(one))
                 for role, one in content["errors"].items()
@@ -224,6 +225,11 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     return int(value) if isinstance(value, np.integer) else value
+
+
+def _colour(saved: tuple[Any, ...] | None) -> Colour | None:
+    """Give the law of coloured noise again."""
+    return None if saved is None else Colour(*(tuple(one) if isinstance(one, list) else one for one in saved))
 
 
 def _numbers(fields: dict[str, Any]) -> dict[str, Any]:

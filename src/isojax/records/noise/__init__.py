@@ -6,6 +6,7 @@ spikes. Read `_noise.py` first, then `_colour.py` and `_repeats.py`; `_noise_pea
 `_health.py` after them.
 """
 
+from ._colour import Colour as Colour
 from ._health import DataHealth as DataHealth
 from ._health import brief_blows as brief_blows
 from ._health import data_health as data_health

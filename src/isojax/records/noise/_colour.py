@@ -7,6 +7,7 @@ import scipy.signal
 import scipy.stats
 from jaxtyping import Float
 
+from ..._show import shown
 from ..spectrum import Rest
 
 MOST_ORDERS = 64
@@ -45,6 +46,7 @@ class Piece(NamedTuple):
         return self.kept * self.rest.signal.size - self.rest.taken.size
 
 
+@shown
 class Colour(NamedTuple):
     """An autoregressive law `n_t + a_1 n_(t-1) + ... + a_p n_(t-p) = e_t` of noise, with white e.
 

@@ -201,7 +201,10 @@ def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:
 
 def _same_samples(one: Record, other: Record, first: int, last: int) -> bool:
     """Says whether two records are one measurement under two names: equal in samples [first, last)."""
-    return all(
+    # Where a filter is taken out, samples at either end are lost.
+    first = max(first, one.start, other.start)
+    last = min(last, one.start + one.raw_input.size, other.start + other.raw_input.size)
+    return first < last and all(
         np.array_equal(
             getattr(one, channel)[first - one.start : last - one.start],
             getattr(other, channel)[first - other.start : last - other.start],

@@ -184,6 +184,8 @@ def _causes(campaign: Campaign, rows: Rows, balance: Balance) -> tuple[Cause, ..
         if other is not None:
             one = find_balance(other, _declared_mass(campaign, reading.based))
             if _is_right(campaign, one) and one.unexplained < _CLOSES * balance.unexplained:
+                if 0.0 < abs(reading.delay) * campaign.rate < 1.0:
+                    return ()  # how the drive is held between two samples, which the model may lack
                 tried.append((one.unexplained, (_lag_cause(campaign, name, factor),)))
     best = min((unexplained for unexplained, _ in tried), default=np.inf)
     if best > max(_CLOSES * balance.unexplained, _UNBALANCED):
