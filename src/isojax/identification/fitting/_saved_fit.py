@@ -193,8 +193,9 @@ def load_fit(path: str | Path) -> SavedFit:
         return None if one is None else Errors(**_numbers(one))
 
     try:
-        noise = {key: tuple(one) if isinstance(one, list) else one for key, one in content["noise"].items()}
-        colour = noise.pop("colour")
+        saved = dict(content["noise"])
+        colour = saved.pop("colour")
+        noise = {key: tuple(one) if isinstance(one, list) else one for key, one in saved.items()}
         return SavedFit(
             content["campaign"],
             model_from_dict(content["model"], path),
@@ -227,9 +228,12 @@ def _plain(value: Any) -> Any:
     return int(value) if isinstance(value, np.integer) else value
 
 
-def _colour(saved: tuple[Any, ...] | None) -> Colour | None:
+def _colour(saved: list[Any] | None) -> Colour | None:
     """Give the law of coloured noise again."""
-    return None if saved is None else Colour(*(tuple(one) if isinstance(one, list) else one for one in saved))
+    if saved is None:
+        return None
+    colour = Colour(*saved)
+    return colour._replace(law=tuple(colour.law), whitening=tuple(colour.whitening))
 
 
 def _numbers(fields: dict[str, Any]) -> dict[str, Any]:
