@@ -21,7 +21,7 @@ from ._progress import KeyFigure, Stage
 from ._results import is_successful
 from ._stage_lines import stage_lines, step_lines
 from .demo import campaign_folder
-from .identification import Fit, classical_guess, fit, read_campaign, silent
+from .identification import Fit, classical_guess, fit, fit_report, read_campaign, silent
 from .models import load_model
 from .records import (
     Campaign,
@@ -262,7 +262,7 @@ def _fit(asked: argparse.Namespace) -> int:
         progress(Stage("fit of the declared model"))
         fitted = fit(guess.model, measured, progress=progress, anyway=asked.anyway)
         progress(KeyFigure(f"chi2/dof {fitted.stats.chi2 / fitted.stats.dof:.4g}"))
-    report = "\n".join((*check_first_words(find_suspicions(measured)), str(fitted)))
+    report = "\n".join((*check_first_words(find_suspicions(measured)), fit_report(fitted)))
     if folder is not None:
         write_texts(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
     print(report)

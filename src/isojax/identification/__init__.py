@@ -35,6 +35,7 @@ from .fitting import Uncertainty as Uncertainty
 from .fitting import as_fit as as_fit
 from .fitting import drift_budget as drift_budget
 from .fitting import fit as fit
+from .fitting import fit_report as fit_report
 from .fitting import load_fit as load_fit
 from .fitting import plain_unit as plain_unit
 from .fitting import residual as residual
