@@ -143,7 +143,8 @@ def test_fit_shows_a_line_a_stage_and_verbose_its_steps_as_well(tmp_path, capsys
         assert main(["fit", str(campaign), *option]) in (0, 1)
         shown = capsys.readouterr().err.splitlines()
         names = [line.split(" s  ")[1].split(":")[0] for line in shown]
-        assert {"reading of the campaign", "classical guess", "fit of the declared model"} <= set(names)
+        stages = ("reading of the campaign", "classical guess", "fit of the declared model")
+        assert {f"[{place}/3] {stage}" for place, stage in enumerate(stages, 1)} <= set(names)
         assert ("step 1" not in names) == stages_only
         assert (len(shown) == 3) == stages_only
 
