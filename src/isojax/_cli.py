@@ -20,7 +20,7 @@ from . import plot
 from ._compiling import compile_quickly
 from ._interrupt import INTERRUPTED, prompt_interrupt
 from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
-from ._progress import KeyFigure, Stage, before, watched
+from ._progress import KeyFigure, Notice, Stage, before, watched
 from ._results import is_successful
 from ._stage_lines import stage_lines
 from .demo import campaign_folder
@@ -295,7 +295,7 @@ def _close_loop(asked: argparse.Namespace) -> int:
     with output_folder(asked.out) as folder, _progress(asked) as progress:
         kept = kept_file(folder)
         if asked.resume and not kept.exists():
-            progress(f"no unfinished run is kept in {folder}: beginning anew")
+            progress(Notice(f"no unfinished run is kept in {folder}: beginning anew"))
         if not asked.resume:
             discard(folder)
         progress(Stage("reading of the campaign", _READING, (*LOOP_SHARES, _REPORT)))

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ._progress import Resumed
+from ._progress import Notice, Resumed
 
 _FORMAT = "isojax-answers"
 
@@ -66,7 +66,7 @@ def kept_answers(
         held = _read_header(file)
         if held is not None and held != identity:
             other = " and ".join(name for name in identity if held.get(name) != identity[name])
-            progress(f"what was kept belongs to another {other}: beginning anew")
+            progress(Notice(f"what was kept belongs to another {other}: beginning anew"))
         if held != identity:
             file.seek(0)
             file.truncate()
@@ -107,7 +107,7 @@ class _Answers:
             try:
                 _write_entry(self._file, key, answer)
             except OSError as error:
-                self._progress(f"nothing more can be kept ({error.strerror}): going on without")
+                self._progress(Notice(f"nothing more can be kept ({error.strerror}): going on without"))
                 self._file.seek(place)
                 self._file.truncate()
                 self._file = None

@@ -31,7 +31,11 @@ class KeyFigure(str):
     """A line that gives the result of the stage before it is over, such as "chi2/dof 1.02"."""
 
 
-class Resumed(str):
+class Notice(str):
+    """A line that stays to be read, such as "what was kept belongs to another campaign"."""
+
+
+class Resumed(Notice):
     """A line that says that what came before was not computed but kept: its time says nothing of the rest."""
 
 

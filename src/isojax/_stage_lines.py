@@ -9,7 +9,7 @@ from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextCol
 from rich.table import Column
 from rich.text import Text
 
-from ._progress import KeyFigure, Resumed, Stage
+from ._progress import KeyFigure, Notice, Resumed, Stage
 
 
 def _seconds(elapsed: float) -> str:
@@ -144,7 +144,7 @@ def stage_lines(console: Console, steps: bool = False) -> Iterator[Callable[[str
                 if isinstance(line, Resumed):
                     pace.forget()
                 live.update(task, step=line, refresh=True)
-            if steps or isinstance(line, Resumed):
+            if steps or isinstance(line, Notice):
                 leave(line, begin)
 
         yield show
