@@ -3,7 +3,7 @@
 Run `python benchmarks/kill_and_resume.py [--kills 20] [--seed 0] [--campaign FOLDER]`; without a campaign,
 two records of the demo, cut after their second dwells. The command runs once undisturbed. Then it is started
 again and again with `--resume` and killed after a time that is uniform over that of the undisturbed run; one
-that ends before is compared and begun anew. Printed for each kill: when, how much was kept, and the last stage
+that ends before is compared and begun anew. Printed for each kill: when, how much was kept, the last stage
 that was over. The exit status is 1 if a result.json differs by a digit of anything but its times, or if an
 output of isojax stood in the folder after a kill.
 """
