@@ -293,34 +293,42 @@ def _say(console: Console, words: str) -> None:
 def _close_loop(asked: argparse.Namespace) -> int:
     begin = time.perf_counter()
     with output_folder(asked.out) as folder, _progress(asked) as progress:
-        kept = kept_file(folder)
-        if asked.resume and not kept.exists():
-            progress(Notice(f"no unfinished run is kept in {folder}: beginning anew"))
-        if not asked.resume:
-            discard(folder)
         progress(Stage("reading of the campaign", _READING, (*LOOP_SHARES, _REPORT)))
         measured = _read(asked.campaign, progress)
-        asked.kept = lambda: (
-            f"what is finished is kept in {folder}; --resume goes on from there"
-            if kept.exists()
-            else "nothing is written"
-        )
+        if not asked.anyway:
+            refuse_contradictions(measured)
+        kept = _kept(asked, folder, progress)
         try:
-            loop = close_loop(
-                measured, progress=before(progress, _REPORT), anyway=asked.anyway, checkpoint=kept
-            )
+            loop = close_loop(measured, progress=before(progress, _REPORT), anyway=True, checkpoint=kept)
         except ValueError:
-            discard(folder)
+            discard(folder)  # the same would be refused again
             raise
         progress(Stage("report", _REPORT))
         with watched(progress):
             loop.report(folder)
         discard(folder)
+        asked.kept = lambda: f"the results are in {folder}"
     console = _results(asked)
     console.print(loop_summary(loop.loop))
     _say(console, f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}")
     _print_json(asked, lambda: result_dict(loop.loop, loop.health))
     return _exit_code(loop.after)
+
+
+def _kept(asked: argparse.Namespace, folder: Path, progress: Callable[[str], None]) -> Path:
+    """Give the file in which the loop keeps its answers; those of an earlier run only where asked for."""
+    kept = kept_file(folder)
+    if asked.resume and not kept.exists():
+        progress(Notice(f"no unfinished run is kept in {folder}: beginning anew"))
+    if kept.exists() and not asked.resume:
+        progress(Notice(f"what an unfinished run kept in {folder} is not used without --resume"))
+        discard(folder)
+    asked.kept = lambda: (
+        f"what is finished is kept in {folder}; --resume goes on from there"
+        if kept.exists()
+        else "nothing is written"
+    )
+    return kept
 
 
 def _read(campaign: str | Path, progress: Callable[[str], None]) -> Campaign:

@@ -1,8 +1,8 @@
 """Ctrl-C: one line and the end, also where threads compute or compile that cannot be stopped."""
 
-import contextlib
 import os
 import signal
+import socket
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -31,19 +31,19 @@ def prompt_interrupt(words: Callable[[], str]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard, telling = os.pipe()
-    os.set_blocking(telling, False)
+    heard, telling = socket.socketpair()
+    telling.setblocking(False)
     over = threading.Event()
 
     def listen() -> None:
-        while (told := os.read(heard, 1)) and told[0] != signal.SIGINT:
+        while (told := heard.recv(1)) and told[0] != signal.SIGINT:
             pass
         if told and not over.wait(_PATIENCE):
             start = _CURSOR if sys.stderr.isatty() else ""
             os.write(2, f"{start}isojax: {words()}\n".encode())
             os._exit(INTERRUPTED)
 
-    before = signal.set_wakeup_fd(telling, warn_on_full_buffer=False)
+    before = signal.set_wakeup_fd(telling.fileno(), warn_on_full_buffer=False)
     listener = threading.Thread(target=listen, daemon=True)
     listener.start()
     try:
@@ -51,7 +51,6 @@ def prompt_interrupt(words: Callable[[], str]) -> Iterator[None]:
     finally:
         over.set()
         signal.set_wakeup_fd(before)
-        os.close(telling)
+        telling.close()
         listener.join()
-        with contextlib.suppress(OSError):
-            os.close(heard)
+        heard.close()
