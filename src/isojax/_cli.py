@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import json
 import math
 import os
 import sys
@@ -17,12 +18,14 @@ from rich.text import Text
 
 from . import plot
 from ._compiling import compile_quickly
-from ._progress import KeyFigure, Stage
+from ._interrupt import INTERRUPTED, prompt_interrupt
+from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
+from ._progress import KeyFigure, Notice, Stage, before, watched
 from ._results import is_successful
-from ._stage_lines import stage_lines, step_lines
+from ._stage_lines import stage_lines
 from .demo import campaign_folder
-from .identification import Fit, classical_guess, fit, fit_report, read_campaign, silent
-from .models import load_model
+from .identification import LOOP_SHARES, Fit, classical_guess, fit, fit_report, read_campaign, silent
+from .models import load_model, write_whole
 from .records import (
     Campaign,
     draft_campaign,
@@ -33,18 +36,21 @@ from .records import (
 )
 from .reporting import (
     catalogue_table,
+    check_first_dicts,
     check_first_words,
-    check_folder,
     close_loop,
     compile_seconds,
     folds_around,
+    inspection_dict,
     inspection_summary,
     loop_summary,
+    map_dict,
     map_summary,
     model_text,
     png_bytes,
+    result_dict,
     write_map,
-    write_texts,
+    write_model_files,
 )
 from .stability import stability_map
 
@@ -52,12 +58,19 @@ _TERMINAL = 120
 
 _NOT_CONVERGED = 1
 
+_WRITTEN_ELSEWHERE = 3
+
+_READING, _REPORT = 2.0, 30.0
+"""Usual shares of the time of a loop, beside `LOOP_SHARES`."""
+
 _MAP_STEPS = 200
 """Values along each side of a map, if omitted."""
 
 _EXIT_CODES = (
     "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
-    "argument or a file is bad, or the records contradict campaign.toml; nothing is written then."
+    "argument or a file is bad, or the records contradict campaign.toml; nothing is written then; 3 the "
+    "results could not be written where they were asked for, and the message says which folder has them; 130 "
+    "interrupted."
 )
 
 
@@ -69,7 +82,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit code: 0, 1 where the fit or every cell of the map did not converge (what was found is written all
-        the same), or 2 where an argument or a file is bad.
+        the same), 2 where an argument or a file is bad, 3 where the results had to be written elsewhere, 130
+        after Ctrl-C.
     """
     jax.config.update("jax_enable_x64", True)
     compile_quickly()
@@ -77,11 +91,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if cache:
         jax.config.update("jax_compilation_cache_dir", cache)
     asked = _parser().parse_args(arguments)
+    asked.kept = lambda: "nothing is written"
     try:
-        return asked.run(asked)
+        with prompt_interrupt(lambda: f"interrupted; {asked.kept()}"):
+            return asked.run(asked)
     except (ValueError, OSError) as error:
         print(f"isojax: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+        return _WRITTEN_ELSEWHERE if isinstance(error, KeptElsewhereError) else 2
+    except KeyboardInterrupt:
+        print(f"isojax: interrupted; {asked.kept()}", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -111,6 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     seen.add_argument(
         "--draft", metavar="PATH", help="write a campaign.toml there, each guess of it marked `# guessed`"
     )
+    _json(seen, "what is in the files")
     seen.set_defaults(run=_inspect)
 
     loop = commands.add_parser("close-loop", help="fit, name what is missing, add it, report")
@@ -119,8 +139,11 @@ def _parser() -> argparse.ArgumentParser:
         "--out",
         required=True,
         metavar="DIR",
-        help="where report.html, result.json and model.json go (no model after a failed fit)",
+        help="where report.html, result.json and model.json go (no model after a failed fit); what an "
+        "earlier run of isojax wrote there goes, other files stay",
     )
+    _resume(loop)
+    _json(loop, "the content of result.json")
     _shown(loop)
     loop.set_defaults(run=_close_loop)
 
@@ -129,6 +152,7 @@ def _parser() -> argparse.ArgumentParser:
     single.add_argument(
         "--out", metavar="DIR", help="where model.json (not after a failed fit) and fit.txt go"
     )
+    _json(single, "the fit as `fit.save` writes it")
     _shown(single)
     single.set_defaults(run=_fit)
 
@@ -152,6 +176,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="keep finished chunks here; a run that was killed goes on from them",
     )
+    _json(plane, "grid, count of orbits and largest multiplier of each cell, folds")
     _shown(plane)
     plane.set_defaults(run=_map)
 
@@ -160,6 +185,8 @@ def _parser() -> argparse.ArgumentParser:
 
     demo = commands.add_parser("demo", help="close-loop on the campaign in the package")
     demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
+    _resume(demo)
+    _json(demo, "the content of result.json")
     _shown(demo)
     demo.set_defaults(run=_close_loop, campaign=campaign_folder(), anyway=False)
     return parser
@@ -169,6 +196,21 @@ def _campaign(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder")
     parser.add_argument(
         "--anyway", action="store_true", help="fit even where the records contradict their declaration"
+    )
+
+
+def _resume(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on from what an interrupted or killed run into the same folder has finished; the result is "
+        "the same, digit for digit",
+    )
+
+
+def _json(parser: argparse.ArgumentParser, words: str) -> None:
+    parser.add_argument(
+        "--json", action="store_true", help=f"print {words} as JSON on stdout; all words go to stderr"
     )
 
 
@@ -192,15 +234,24 @@ def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
 
 def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Callable[[str], None]]:
     """Give what shows progress on stderr: a line a stage, every step of it, or nothing."""
-    console = Console(stderr=True, highlight=False)
     if asked.quiet:
         return contextlib.nullcontext(silent)
-    return step_lines(console) if asked.verbose else stage_lines(console)
+    return stage_lines(Console(stderr=True, highlight=False), steps=asked.verbose)
 
 
-def _results() -> Console:
-    """Give what shows results; where no terminal reports its width, wide enough for every table."""
-    return Console(highlight=False, width=None if sys.stdout.isatty() else _TERMINAL)
+def _results(asked: argparse.Namespace) -> Console:
+    """Give what shows results; where no terminal reports its width, wide enough for every table.
+
+    Where the result itself is printed words go to stderr, or nowhere where they are not wanted.
+    """
+    out = sys.stderr if asked.json else sys.stdout
+    quiet = asked.json and getattr(asked, "quiet", False)
+    return Console(file=out, highlight=False, width=None if out.isatty() else _TERMINAL, quiet=quiet)
+
+
+def _print_json(asked: argparse.Namespace, content: Callable[[], object]) -> None:
+    if asked.json:
+        print(json.dumps(content(), indent=1, allow_nan=False))
 
 
 def _inspect(asked: argparse.Namespace) -> int:
@@ -213,70 +264,116 @@ def _inspect(asked: argparse.Namespace) -> int:
         raise ValueError(f"--draft {asked.draft} exists already; it is not overwritten.")
     found, schedules = find_data_files(asked.files)
     files = [inspect_file(file, asked.rate) for file in found]
-    _results().print(inspection_summary(files))
+    console = _results(asked)
+    console.print(inspection_summary(files))
+    _print_json(asked, lambda: [inspection_dict(one) for one in files])
     if asked.draft is not None:
         draft = Path(asked.draft)
-        write_texts(draft.parent, {draft.name: draft_campaign(files, draft.parent, schedules)})
+        drafted = draft_campaign(files, draft.parent, schedules)
+        draft.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(draft, drafted)
         try:
-            measured = read_campaign(draft)
-            print(f"{draft}: {len(measured.records)} records are read by it. Check what it says was guessed.")
+            count = len(read_campaign(draft).records)
+            _say(console, f"{draft}: {count} records are read by it. Check what it says was guessed.")
         except ValueError as error:
-            print(f"{draft} is written, but must be mended: {error}")
+            _say(console, f"{draft} is written, but must be mended: {error}")
     if asked.picture is not None:
         picture = Path(asked.picture)
-        write_texts(picture.parent, {picture.name: png_bytes(plot.inspection(files))})
-        print(f"see {asked.picture}")
+        drawn = png_bytes(plot.inspection(files))
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(picture, drawn)
+        _say(console, f"see {asked.picture}")
     return 0
 
 
+def _say(console: Console, words: str) -> None:
+    console.print(Text(words), soft_wrap=True)
+
+
 def _close_loop(asked: argparse.Namespace) -> int:
-    begin, folder = time.perf_counter(), check_folder(asked.out)
-    with _progress(asked) as progress:
+    begin = time.perf_counter()
+    with output_folder(asked.out) as folder, _progress(asked) as progress:
+        progress(Stage("reading of the campaign", _READING, (*LOOP_SHARES, _REPORT)))
         measured = _read(asked.campaign, progress)
-        loop = close_loop(measured, progress=progress, anyway=asked.anyway)
-        progress(Stage("report"))
-        loop.report(folder)
-    console = _results()
+        if not asked.anyway:
+            refuse_contradictions(measured)
+        kept = _kept(asked, folder, progress)
+        try:
+            loop = close_loop(measured, progress=before(progress, _REPORT), anyway=True, checkpoint=kept)
+        except ValueError:
+            discard(folder)  # the same would be refused again
+            raise
+        progress(Stage("report", _REPORT))
+        with watched(progress):
+            loop.report(folder)
+        discard(folder)
+        asked.kept = lambda: f"the results are in {folder}"
+    console = _results(asked)
     console.print(loop_summary(loop.loop))
-    console.print(Text(f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}"))
+    _say(console, f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}")
+    _print_json(asked, lambda: result_dict(loop.loop, loop.health))
     return _exit_code(loop.after)
 
 
+def _kept(asked: argparse.Namespace, folder: Path, progress: Callable[[str], None]) -> Path:
+    """Give the file in which the loop keeps its answers; those of an earlier run only where asked for."""
+    kept = kept_file(folder)
+    if asked.resume and not kept.exists():
+        progress(Notice(f"no unfinished run is kept in {folder}: beginning anew"))
+    if kept.exists() and not asked.resume:
+        progress(Notice(f"what an unfinished run kept in {folder} is not used without --resume"))
+        discard(folder)
+    asked.kept = lambda: (
+        f"what is finished is kept in {folder}; --resume goes on from there"
+        if kept.exists()
+        else "nothing is written"
+    )
+    return kept
+
+
 def _read(campaign: str | Path, progress: Callable[[str], None]) -> Campaign:
-    progress(Stage("reading of the campaign"))
     measured = read_campaign(campaign)
     progress(KeyFigure(f"{len(measured.records)} records read"))
     return measured
 
 
 def _fit(asked: argparse.Namespace) -> int:
-    begin = time.perf_counter()
-    folder = None if asked.out is None else check_folder(asked.out)
-    with _progress(asked) as progress:
+    begin, guessing, fitting = time.perf_counter(), *LOOP_SHARES[:2]
+    where = contextlib.nullcontext(None) if asked.out is None else output_folder(asked.out)
+    with where as folder, _progress(asked) as progress:
+        progress(Stage("reading of the campaign", _READING, (guessing, fitting)))
         measured = _read(asked.campaign, progress)
         if not asked.anyway:
             refuse_contradictions(measured)
-        progress(Stage("classical guess"))
+        progress(Stage("classical guess", guessing, (fitting,)))
         guess = classical_guess(measured)
         progress(KeyFigure(" ".join(guess.notes)))
-        progress(Stage("fit of the declared model"))
+        progress(Stage("fit of the declared model", fitting))
         fitted = fit(guess.model, measured, progress=progress, anyway=asked.anyway)
         progress(KeyFigure(f"chi2/dof {fitted.stats.chi2 / fitted.stats.dof:.4g}"))
-    report = "\n".join((*check_first_words(find_suspicions(measured)), fit_report(fitted)))
-    if folder is not None:
-        write_texts(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
-    print(report)
-    print(f"{time.perf_counter() - begin:.1f} s with compiling")
+        report = "\n".join((*check_first_words(find_suspicions(measured)), fit_report(fitted)))
+        if folder is not None:
+            write_model_files(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
+    console = _results(asked)
+    _say(console, report)
+    _say(console, f"{time.perf_counter() - begin:.1f} s with compiling")
+    _print_json(
+        asked, lambda: {"check_first": check_first_dicts(find_suspicions(measured))} | fitted.to_dict()
+    )
     return _exit_code(fitted)
 
 
 def _map(asked: argparse.Namespace) -> int:
-    folder, model = check_folder(asked.out), load_model(asked.model)
+    model = load_model(asked.model)
     amplitudes = _values("--amplitudes", asked.amplitudes)
     frequencies = _values("--frequencies", asked.frequencies)
     seconds, watch = {}, _stopwatch()
-    with _progress(asked) as progress:
-        progress(Stage("periodic orbits over drive amplitude and frequency"))
+    with output_folder(asked.out) as folder, _progress(asked) as progress:
+        if asked.checkpoint is not None:
+            asked.kept = lambda: (
+                f"finished chunks are kept in {asked.checkpoint}; the same command goes on from them"
+            )
+        progress(Stage("periodic orbits over drive amplitude and frequency", to_come=(0.0,)))
         smap = stability_map(
             model,
             amplitudes,
@@ -290,14 +387,16 @@ def _map(asked: argparse.Namespace) -> int:
         seconds["map"] = watch()
         folds = None
         if several:
-            progress(Stage("folds around the cells with several orbits"))
+            progress(Stage("folds around the cells with several orbits", to_come=(0.0,)))
             folds = folds_around(smap)
             seconds["folds"] = watch()
         progress(Stage("pictures"))
         written = write_map(smap, folder, folds=folds)
         seconds["pictures"] = watch()
-    print(map_summary(smap, folds=folds, seconds=seconds))
-    print(f"see {', '.join(str(folder / name) for name in written)}")
+    console = _results(asked)
+    _say(console, map_summary(smap, folds=folds, seconds=seconds))
+    _say(console, f"see {', '.join(str(folder / name) for name in written)}")
+    _print_json(asked, lambda: map_dict(smap, folds))
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
 
 
@@ -333,5 +432,5 @@ def _exit_code(fitted: Fit) -> int:
 
 
 def _effects() -> int:
-    _results().print(catalogue_table())
+    Console(highlight=False, width=None if sys.stdout.isatty() else _TERMINAL).print(catalogue_table())
     return 0

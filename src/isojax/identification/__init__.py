@@ -7,6 +7,7 @@ Read the rooms in the order of an analysis: `guess` (start values), `fitting` (c
 and their exact derivatives. `_rules.py` holds the numbers by which fit and diagnosis decide.
 """
 
+from ._close_loop import LOOP_SHARES as LOOP_SHARES
 from ._close_loop import Loop as Loop
 from ._close_loop import close_loop as close_loop
 from ._close_loop import extend as extend

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import scipy.stats
 
+from .._kept import digest, kept_answers, package_digest
 from .._progress import KeyFigure, Stage
 from .._results import RESULTS, is_successful
 from .._show import Row, number, shown
@@ -32,6 +33,13 @@ from .experiment import with_separating_experiment
 from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of, silent
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Remainder, explain_remainder
+
+_GUESS, _FIT, _DIAGNOSIS, _NEXT, _REPLACE, _EXPERIMENT, _RUNS = 5.0, 8.0, 60.0, 12.0, 12.0, 3.0, 8.0
+"""Usual shares of the time of a loop: classical guess, fit, first diagnosis, each further one, test whether a
+finding replaces another, separating experiments, free runs. Most of the time is compiling, once a law."""
+
+LOOP_SHARES = (_GUESS, _FIT, _DIAGNOSIS, _NEXT, _EXPERIMENT, _RUNS)
+"""The stages of a loop that finds one effect, as `Stage.to_come` has them."""
 
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 
@@ -146,6 +154,7 @@ def close_loop(
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
     anyway: bool = False,
+    checkpoint: str | Path | None = None,
 ) -> Loop:
     """Fit the declared model, add the effect that it lacks, and repeat until nothing significant is missing.
 
@@ -160,6 +169,9 @@ def close_loop(
         progress: receives a `Stage` and a `KeyFigure` for each stage, and a line for each of its steps.
         rules: the numbers that decide verdicts.
         anyway: whether records that contradict their declaration are fitted all the same.
+        checkpoint: file in which the answer of each computation is kept as it comes. A run that was killed
+            goes on from there and ends with the same digits; what other data, another declaration or another
+            version of isojax left there is not used.
 
     Returns:
         The loop: fits before and after, the findings, and the verdict over all.
@@ -176,16 +188,35 @@ def close_loop(
     start, campaign = time.perf_counter(), as_campaign(campaign)
     if not anyway:
         refuse_contradictions(campaign)
-    progress(Stage("classical guess"))
+    identity = {
+        "version of isojax": package_digest(),
+        "campaign": digest(campaign),
+        "question": digest(max_iterations, excluded, solver, rules),
+    }
+    with kept_answers(None if checkpoint is None else Path(checkpoint), identity, progress):
+        return _loop(campaign, max_iterations, excluded, solver, progress, rules, start)
+
+
+def _loop(
+    campaign: Campaign,
+    max_iterations: int,
+    excluded: tuple[str, ...],
+    solver: Any,
+    progress: Callable[[str], None],
+    rules: Rules,
+    start: float,
+) -> Loop:
+    """Close the loop over a campaign that agrees with its declaration."""
+    progress(Stage("classical guess", _GUESS, LOOP_SHARES[1:]))
     guess = classical_guess(campaign)
-    progress(Stage("fit of the declared model"))
+    progress(Stage("fit of the declared model", _FIT, LOOP_SHARES[2:]))
     before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     extensions, verdict = search_effects(
         before, search_of(campaign, rules, solver, progress), max_iterations, excluded
     )
     if extensions:
-        progress(Stage("search for separating experiments"))
+        progress(Stage("search for separating experiments", _EXPERIMENT, (_RUNS,)))
         extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
     after = extensions[-1].after if extensions else before
     if not is_successful(after.result):
@@ -194,7 +225,7 @@ def close_loop(
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
     # Asked for here, so that the time of the loop counts it.
-    progress(Stage("free runs of every record"))
+    progress(Stage("free runs of every record", _RUNS))
     progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
     return Loop(
         campaign,
@@ -224,7 +255,9 @@ def search_effects(
     if len(extensions) < 2:
         return extensions, verdict
     final = extensions[-1].after.estimate
-    search.progress(Stage("test whether the later findings replace an earlier one"))
+    search.progress(
+        Stage("test whether the later findings replace an earlier one", _REPLACE, (_EXPERIMENT, _RUNS))
+    )
     earlier = tuple(
         step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
     )
@@ -252,13 +285,20 @@ def _grow(
     while True:
         # Halved after each addition: the levels of all searches sum up to twice the first.
         significance = search.rules.significance / 2 ** len(extensions)
-        search.progress(Stage(f"diagnosis {len(extensions) + 1}: which effect is missing"))
+        search.progress(_diagnosis(len(extensions), max_iterations))
         verdict = diagnose_with(search, current, significance, excluded)
         search.progress(KeyFigure(verdict.reason))
         if verdict.after is None or len(extensions) == max_iterations:
             return extensions, verdict
         extensions = (*extensions, extend(current, verdict))
         current = extensions[-1].after
+
+
+def _diagnosis(added: int, most: int) -> Stage:
+    """Open a diagnosis: the first is expected to find an effect, those after it are not."""
+    later = (_EXPERIMENT, _RUNS) if added else (_NEXT, _EXPERIMENT, _RUNS) if most else (_RUNS,)
+    later = (_REPLACE, *later) if added > 1 else later
+    return Stage(f"diagnosis {added + 1}: which effect is missing", _NEXT if added else _DIAGNOSIS, later)
 
 
 def held_out_doubt(before: Fit, final: Fit, rules: Rules) -> Doubt:

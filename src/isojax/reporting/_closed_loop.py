@@ -126,6 +126,7 @@ def close_loop(
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
     anyway: bool = False,
+    checkpoint: str | Path | None = None,
 ) -> ClosedLoop:
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 
@@ -134,9 +135,12 @@ def close_loop(
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.
-        progress: receives a line a step.
+        progress: receives a `Stage` and a `KeyFigure` for each stage, and a line for each of its steps.
         rules: the numbers that decide verdicts.
         anyway: whether records that contradict their declaration are fitted all the same.
+        checkpoint: file in which the answer of each computation is kept as it comes. A run that was killed
+            goes on from there and ends with the same digits; what other data, another declaration or another
+            version of isojax left there is not used.
 
     Returns:
         The closed loop; `.report(folder)` writes it, `print` shows it.
@@ -163,5 +167,6 @@ def close_loop(
         progress=progress,
         rules=rules,
         anyway=anyway,
+        checkpoint=checkpoint,
     )
     return ClosedLoop(loop)

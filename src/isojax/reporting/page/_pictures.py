@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._progress import step
 from ..._results import is_successful
 from ...health import CampaignHealth
 from ...identification import ClassicalGuess, Fit, Loop, residual
@@ -95,6 +96,7 @@ def _draw(
     name: str, caption: str, plot: Callable[..., Figure], *args: Any, wide: bool = False, **options: Any
 ) -> tuple[Picture, ...]:
     """Draw one picture, as a row of its own to join to others."""
+    step(f"drawing: {name}")
     size = (_WHOLE if wide else _HALF, _HEIGHT)
     ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
     return (Picture(name, caption, encode(plot(*args, ax=ax, **options)), wide),)
