@@ -121,6 +121,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="where report.html, result.json and model.json go (no model after a failed fit)",
     )
+    _markdown(loop)
     _shown(loop)
     loop.set_defaults(run=_close_loop)
 
@@ -136,15 +137,24 @@ def _parser() -> argparse.ArgumentParser:
         "map",
         help="find the periodic orbits over drive amplitude and frequency, and whether they are stable",
         description="Find the periodic orbits of a model over a grid of drive amplitude and frequency, and "
-        "their Floquet multipliers. Writes map.npz (all arrays, SI units), map.png (largest multiplier), "
-        "response.png and, where orbits coexist, folds.png; prints a summary.",
+        "their Floquet multipliers. Writes map.npz (all arrays, SI units), curves.png (response over "
+        "frequency, dashed where unstable), map.png (largest multiplier), response.png and, with --folds "
+        "where orbits coexist, folds.png; prints a summary.",
         epilog=_EXIT_CODES,
     )
     plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
     _axis(plane, "amplitudes", "drive amplitudes [N, or m/s^2 for base excitation]")
     _axis(plane, "frequencies", "drive frequencies [Hz]")
     plane.add_argument(
-        "--coexisting", action="store_true", help="all orbits of a cell, not only that of the smallest motion"
+        "--coexisting",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="all orbits of a cell, or only that of the smallest motion; default: all",
+    )
+    plane.add_argument(
+        "--folds",
+        action="store_true",
+        help="follow the curve of folds around cells with several orbits; takes a few times as long",
     )
     plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
     plane.add_argument(
@@ -160,6 +170,7 @@ def _parser() -> argparse.ArgumentParser:
 
     demo = commands.add_parser("demo", help="close-loop on the campaign in the package")
     demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
+    _markdown(demo)
     _shown(demo)
     demo.set_defaults(run=_close_loop, campaign=campaign_folder(), anyway=False)
     return parser
@@ -169,6 +180,12 @@ def _campaign(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder")
     parser.add_argument(
         "--anyway", action="store_true", help="fit even where the records contradict their declaration"
+    )
+
+
+def _markdown(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--markdown", action="store_true", help="write report.md as well, with its pictures beside it"
     )
 
 
@@ -235,7 +252,7 @@ def _close_loop(asked: argparse.Namespace) -> int:
         measured = _read(asked.campaign, progress)
         loop = close_loop(measured, progress=progress, anyway=asked.anyway)
         progress(Stage("report"))
-        loop.report(folder)
+        loop.report(folder, markdown=asked.markdown)
     console = _results()
     console.print(loop_summary(loop.loop))
     console.print(Text(f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}"))
@@ -289,7 +306,7 @@ def _map(asked: argparse.Namespace) -> int:
         progress(KeyFigure(f"{smap.count.size} cells, {several} with several orbits"))
         seconds["map"] = watch()
         folds = None
-        if several:
+        if several and asked.folds:
             progress(Stage("folds around the cells with several orbits"))
             folds = folds_around(smap)
             seconds["folds"] = watch()

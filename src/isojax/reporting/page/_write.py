@@ -9,7 +9,7 @@ from ..._results import is_successful
 from ...health import CampaignHealth, campaign_health
 from ...identification import Fit, Loop
 from ...models import model_to_dict, write_whole
-from ._page import render_page
+from ._page import page_content, render_pages
 from ._result import result_dict
 
 
@@ -32,7 +32,9 @@ def check_folder(folder: str | Path) -> Path:
     return folder
 
 
-def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None = None) -> None:
+def write_report(
+    loop: Loop, folder: str | Path, health: CampaignHealth | None = None, *, markdown: bool = False
+) -> None:
     """Write report.html, result.json and model.json; everything is ready before the first is written.
 
     Where the last fit failed there is no model: no model.json is written, and one of before is removed.
@@ -41,6 +43,8 @@ def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None =
         loop: the closed loop.
         folder: where they go; made if it is not there. Other files in it stay as they are.
         health: of its campaign; computed here if omitted.
+        markdown: whether to write report.md as well, with its pictures report_*.png beside it. If not, those
+            of an earlier run are removed.
 
     Raises:
         ValueError: if something else than a folder is in the way, or a model that was found is not finite.
@@ -48,8 +52,9 @@ def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None =
     folder = check_folder(folder)
     health = campaign_health(loop) if health is None else health
     texts = {
+        **dict.fromkeys(["report.md", *(path.name for path in folder.glob("report_*.png"))]),
         "model.json": model_text(loop.after),
-        "report.html": render_page(loop, health),
+        **render_pages(page_content(loop, health), markdown=markdown),
         "result.json": json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n",
     }
     write_texts(folder, texts)
