@@ -1,5 +1,6 @@
 """report.html in a real browser: headless Chromium, driven through a pipe by its DevTools protocol."""
 
+import fcntl
 import json
 import os
 import shutil
@@ -16,9 +17,11 @@ LIGHT, DARK = "light", "dark"
 
 LOOK = """(() => {
   const seen = (one) => { const box = one.getBoundingClientRect(); return box.width > 0 && box.height > 0; };
+  const words = document.body.innerText.split(/\\s+/).length;
   document.querySelectorAll("details").forEach((one) => { one.open = true; });
   const pictures = [...document.images];
   return {
+    words: words,
     width: innerWidth,
     page_width: document.documentElement.scrollWidth,
     headline: document.querySelector(".verdict .headline").innerText,
@@ -37,15 +40,15 @@ class Browser:
     """One tab of Chromium; every request that its pages make is kept in `requests`."""
 
     def __init__(self, command, profile):
-        out_end, self.told = os.pipe()
-        self.heard, in_end = os.pipe()
-        # The pipe's ends must be 3 and 4 in the browser.
-        place = f'exec "$@" 3<&{out_end} 4>&{in_end}'
-        words = ["sh", "-c", place, "sh", command, *SWITCHES, f"--user-data-dir={profile}"]
+        (orders, self.told), (self.heard, answers) = os.pipe(), os.pipe()
+        # In the browser the ends of the pipes must be 3 and 4, so here they must be others.
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (orders, answers)]
+        place = f'exec "$@" 3<&{ends[0]} 4>&{ends[1]}'
+        words = ["bash", "-c", place, "bash", command, *SWITCHES, f"--user-data-dir={profile}"]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        self.process = subprocess.Popen(words, pass_fds=(out_end, in_end), **quiet)
-        os.close(out_end)
-        os.close(in_end)
+        self.process = subprocess.Popen(words, pass_fds=ends, **quiet)
+        for end in (orders, answers, *ends):
+            os.close(end)
         self.rest, self.count, self.session, self.requests = b"", 0, None, []
         target = self.ask("Target.createTarget", url="about:blank")["targetId"]
         attached = self.ask("Target.attachToTarget", targetId=target, flatten=True)
@@ -134,6 +137,7 @@ def test_browser_shows_headline_tables_and_every_picture_and_asks_nothing_of_the
     assert seen["width"] == width
     assert seen["page_width"] <= width, "the page is wider than the screen"
     assert "friction" in seen["headline"]
+    assert seen["words"] <= 900
     assert seen["headline_bottom"] < 900, "the headline is not on the first screen"
     assert any("NRMSE" in table and "held out" in table for table in seen["tables"])
     assert len(seen["pictures"]) >= 16

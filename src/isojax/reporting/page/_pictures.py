@@ -53,7 +53,7 @@ class Picture(NamedTuple):
     Attributes:
         name: what it shows, a few words.
         caption: how to read it.
-        png: the file; its ground is transparent, so that it suits a dark page.
+        png: the file.
         wide: whether it takes the whole width.
     """
 
@@ -114,7 +114,7 @@ def _draw(
     size = (_WHOLE if wide else _THIRD, height)
     ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
     file = BytesIO()
-    plot(*args, ax=ax, **options).savefig(file, format="png", dpi=_DPI, transparent=True)
+    plot(*args, ax=ax, **options).savefig(file, format="png", dpi=_DPI)
     return (Picture(name, caption, file.getvalue(), wide),)
 
 
