@@ -3,6 +3,7 @@
 import fcntl
 import json
 import os
+import select
 import shutil
 import subprocess
 from pathlib import Path
@@ -11,8 +12,11 @@ import pytest
 
 SWITCHES = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --remote-debugging-pipe"
+    "--disable-component-update --disable-sync --disable-dev-shm-usage --remote-debugging-pipe"
 ).split()
+PATIENCE = 120.0
+"""Seconds to wait for an answer, on a loaded machine."""
+
 LIGHT, DARK = "light", "dark"
 
 LOOK = """(() => {
@@ -69,6 +73,7 @@ class Browser:
     def read_until(self, wanted):
         while True:
             while b"\0" not in self.rest:
+                assert select.select([self.heard], [], [], PATIENCE)[0], "Chromium does not answer."
                 part = os.read(self.heard, 1 << 16)
                 assert part, "Chromium has ended."
                 self.rest += part
@@ -92,7 +97,7 @@ class Browser:
 
     def close(self):
         os.close(self.told)  # Chromium ends with its pipe
-        self.process.wait(timeout=30)
+        self.process.wait(timeout=PATIENCE)
         os.close(self.heard)
 
 
