@@ -25,7 +25,8 @@ def z_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def z_map():
-    return ij.stability_map(ij.paper.z_direction(), np.linspace(100, 400, 4), np.linspace(1.5, 3.5, 5))
+    amplitudes, frequencies = np.linspace(100, 400, 4), np.linspace(1.5, 3.5, 5)
+    return ij.stability_map(ij.paper.z_direction(), amplitudes, frequencies, coexisting=True)
 
 
 @pytest.mark.slow
@@ -37,8 +38,14 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
     assert main(["map", z_file, *WINDOW, "--out", str(out), "--quiet"]) == 0
     shown = capsys.readouterr()
     assert shown.err == ""
-    assert sorted(path.name for path in out.iterdir()) == ["map.npz", "map.png", "notes.txt", "response.png"]
-    for name in ("map.png", "response.png"):
+    assert sorted(path.name for path in out.iterdir()) == [
+        "curves.png",
+        "map.npz",
+        "map.png",
+        "notes.txt",
+        "response.png",
+    ]
+    for name in ("curves.png", "map.png", "response.png"):
         assert (out / name).read_bytes().startswith(PNG)
     with np.load(out / "map.npz", allow_pickle=False) as stored:
         for name in (
@@ -59,7 +66,9 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
     assert "4 amplitudes 100 to 400 N, 5 frequencies 1.5 to 3.5 Hz" in text
     assert "20 in 20 cells" in text
     radius = np.asarray(z_map.spectral_radius)
-    row, column = np.unravel_index(radius.argmax(), radius.shape)
+    assert radius.shape == (1, 4, 5)
+    _, row, column = np.unravel_index(radius.argmax(), radius.shape)
+    assert "nowhere; each cell holds at most one orbit" in text
     assert f"{radius.max():.4f} at {100 * (row + 1)} N, {1.5 + 0.5 * column:g} Hz" in text
     assert "compiling" in text
 
@@ -110,10 +119,12 @@ def test_map_in_which_nothing_converged_ends_with_code_one_and_says_why(
     z_file, z_map, tmp_path, capsys, monkeypatch
 ):
     blank = jnp.full_like(z_map.spectral_radius, jnp.nan)
-    lost = jnp.zeros(blank.shape, dtype=bool).at[0].set(True)
-    result = jax.vmap(
-        jax.vmap(lambda away: ij.RESULTS.where(away, ij.RESULTS.not_finite, ij.RESULTS.not_converged))
-    )(lost)
+    lost = jnp.zeros(blank.shape, dtype=bool).at[:, 0].set(True)
+
+    def ending(away):
+        return ij.RESULTS.where(away, ij.RESULTS.not_finite, ij.RESULTS.not_converged)
+
+    result = jax.vmap(jax.vmap(jax.vmap(ending)))(lost)
     failed = eqx.tree_at(
         lambda m: (m.spectral_radius, m.response, m.count, m.result),
         z_map,
@@ -124,7 +135,7 @@ def test_map_in_which_nothing_converged_ends_with_code_one_and_says_why(
     text = capsys.readouterr().out
     assert "20 cells (15 not converged, 5 left every bound)" in text
     with np.load(tmp_path / "map.npz") as stored:
-        np.testing.assert_array_equal(stored["result"][:, 0], [2, 1, 1, 1])
+        np.testing.assert_array_equal(stored["result"][0, :, 0], [2, 1, 1, 1])
 
 
 @pytest.mark.slow
@@ -146,7 +157,8 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
     for option in (
         "--amplitudes",
         "--frequencies",
-        "--coexisting",
+        "--no-coexisting",
+        "--folds",
         "--out",
         "--checkpoint",
         "--verbose",
@@ -155,6 +167,7 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
         assert option in shown
     for word in (
         "map.npz",
+        "curves.png",
         "map.png",
         "response.png",
         "folds.png",
@@ -179,7 +192,7 @@ def test_coexisting_map_follows_its_folds_to_both_cusps_and_resumes(tmp_path, ca
         "5",
         "11",
     ]
-    words += ["--coexisting", "--checkpoint", str(tmp_path / "kept")]
+    words += ["--folds", "--checkpoint", str(tmp_path / "kept")]
     assert main([*words, "--out", str(tmp_path / "one")]) == 0
     shown = capsys.readouterr()
     assert "orbits" in shown.err

@@ -144,6 +144,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     _resume(loop)
     _json(loop, "the content of result.json")
+    _markdown(loop)
     _shown(loop)
     loop.set_defaults(run=_close_loop)
 
@@ -160,15 +161,24 @@ def _parser() -> argparse.ArgumentParser:
         "map",
         help="find the periodic orbits over drive amplitude and frequency, and whether they are stable",
         description="Find the periodic orbits of a model over a grid of drive amplitude and frequency, and "
-        "their Floquet multipliers. Writes map.npz (all arrays, SI units), map.png (largest multiplier), "
-        "response.png and, where orbits coexist, folds.png; prints a summary.",
+        "their Floquet multipliers. Writes map.npz (all arrays, SI units), curves.png (response over "
+        "frequency, dashed where unstable), map.png (largest multiplier), response.png and, with --folds "
+        "where orbits coexist, folds.png; prints a summary.",
         epilog=_EXIT_CODES,
     )
     plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
     _axis(plane, "amplitudes", "drive amplitudes [N, or m/s^2 for base excitation]")
     _axis(plane, "frequencies", "drive frequencies [Hz]")
     plane.add_argument(
-        "--coexisting", action="store_true", help="all orbits of a cell, not only that of the smallest motion"
+        "--coexisting",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="all orbits of a cell, or only that of the smallest motion; default: all",
+    )
+    plane.add_argument(
+        "--folds",
+        action="store_true",
+        help="follow the curve of folds around cells with several orbits; takes a few times as long",
     )
     plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
     plane.add_argument(
@@ -187,6 +197,7 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
     _resume(demo)
     _json(demo, "the content of result.json")
+    _markdown(demo)
     _shown(demo)
     demo.set_defaults(run=_close_loop, campaign=campaign_folder(), anyway=False)
     return parser
@@ -211,6 +222,12 @@ def _resume(parser: argparse.ArgumentParser) -> None:
 def _json(parser: argparse.ArgumentParser, words: str) -> None:
     parser.add_argument(
         "--json", action="store_true", help=f"print {words} as JSON on stdout; all words go to stderr"
+    )
+
+
+def _markdown(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--markdown", action="store_true", help="write report.md as well, with its pictures beside it"
     )
 
 
@@ -305,7 +322,7 @@ def _close_loop(asked: argparse.Namespace) -> int:
             raise
         progress(Stage("report", _REPORT))
         with watched(progress):
-            loop.report(folder)
+            loop.report(folder, markdown=asked.markdown)
         discard(folder)
         asked.kept = lambda: f"the results are in {folder}"
     console = _results(asked)
@@ -386,7 +403,7 @@ def _map(asked: argparse.Namespace) -> int:
         progress(KeyFigure(f"{smap.count.size} cells, {several} with several orbits"))
         seconds["map"] = watch()
         folds = None
-        if several:
+        if several and asked.folds:
             progress(Stage("folds around the cells with several orbits", to_come=(0.0,)))
             folds = folds_around(smap)
             seconds["folds"] = watch()

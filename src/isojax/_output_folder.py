@@ -13,6 +13,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import filelock
@@ -116,7 +117,7 @@ def publish(folder: Path, contents: Mapping[str, str | bytes | None], stale: tup
     Args:
         folder: where they go; made if it is not there.
         contents: content by file name; None removes what has the name, whoever wrote it.
-        stale: names of further files that go, if isojax wrote them.
+        stale: patterns of names of further files that go, if isojax wrote them.
 
     Raises:
         KeptElsewhereError: if they could not be written there; it names the folder that has them.
@@ -136,7 +137,9 @@ def publish(folder: Path, contents: Mapping[str, str | bytes | None], stale: tup
         raise _kept_elsewhere(folder, contents, error) from None
     try:
         written = _written(room)
-        old = gone | (written & {*contents, *stale})
+        old = gone | {
+            name for name in written if name in contents or any(fnmatchcase(name, one) for one in stale)
+        }
         for name in old:
             (folder / name).unlink(missing_ok=True)
         _write(room / _WRITTEN, json.dumps(sorted((written - old) | set(contents))) + "\n")

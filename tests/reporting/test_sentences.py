@@ -26,7 +26,7 @@ from isojax.reporting.words._sentences import caveats, finding_words, headline, 
 def test_headline_says_what_the_verdict_says(found, verdict, start):
     sentence = headline(dataclasses.replace(found, verdict=verdict))
     assert sentence.startswith(start)
-    assert ("something else is too" in sentence) == (verdict == "partly_explained")
+    assert ("something else is missing too" in sentence) == (verdict == "partly_explained")
     assert sentence.endswith(".")
 
 
@@ -91,7 +91,7 @@ def test_more_than_two_findings_of_a_good_fit_are_said_to_explain_it(found):
     (step,) = found.extensions
     sentence = headline(dataclasses.replace(found, extensions=(step,) * 3, verdict="partly_explained"))
     assert "explain the records together" in sentence
-    assert "something else is too" not in sentence
+    assert "something else is missing too" not in sentence
 
 
 def test_finding_without_rivals_asks_for_no_experiment(found):

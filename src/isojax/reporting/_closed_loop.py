@@ -69,17 +69,18 @@ class ClosedLoop:
         """State of the data: dwells beside folds, drift budget; computed at its first use."""
         return campaign_health(self.loop)
 
-    def report(self, folder: str | Path) -> None:
+    def report(self, folder: str | Path, *, markdown: bool = False) -> None:
         """Write report.html, result.json and, unless the last fit failed, model.json.
 
         Args:
             folder: where they go; made if it is not there.
+            markdown: whether to write report.md with its pictures as well.
 
         Raises:
             ValueError: if something else than a folder is in the way, or a model that was found is not
                 finite.
         """
-        write_report(self.loop, folder, self.health)
+        write_report(self.loop, folder, self.health, markdown=markdown)
 
     def __str__(self) -> str:
         """Give the summary that the terminal shows."""

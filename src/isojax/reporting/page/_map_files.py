@@ -11,7 +11,7 @@ from ..._output_folder import check_folder, publish
 from ..._results import RESULTS, is_successful
 from ...models import model_to_dict
 from ...stability import FoldCurve, StabilityMap, continue_branch, fold_curve
-from ..plots import plot_fold_curve, plot_response_map, plot_stability_map
+from ..plots import plot_fold_curve, plot_response_curves, plot_response_map, plot_stability_map
 
 _CODES = ("successful", "not_converged", "not_finite")
 """Codes of a cell's result, 0 first."""
@@ -107,7 +107,7 @@ def folds_around(smap: StabilityMap) -> FoldCurve | None:
 
 
 def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None = None) -> tuple[str, ...]:
-    """Write map.npz, map.png, response.png and, where there are folds, folds.png.
+    """Write map.npz, curves.png, map.png, response.png and, where there are folds, folds.png.
 
     Everything is ready before the first is written. A folds.png of an earlier map goes where this has none.
 
@@ -128,6 +128,7 @@ def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None
     np.savez_compressed(buffer, **map_arrays(smap))  # type: ignore[arg-type]
     contents: dict[str, bytes | None] = {
         "map.npz": buffer.getvalue(),
+        "curves.png": png_bytes(plot_response_curves(smap)),
         "map.png": png_bytes(plot_stability_map(smap, folds=folds)),
         "response.png": png_bytes(plot_response_map(smap, folds=folds)),
     }

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..._output_folder import check_folder, publish
@@ -9,17 +10,19 @@ from ..._results import is_successful
 from ...health import CampaignHealth, campaign_health
 from ...identification import Fit, Loop
 from ...models import model_to_dict
-from ._page import render_page
+from ._page import page_content, render_pages
 from ._result import result_dict
 
-MAP_FILES = ("map.npz", "map.png", "response.png", "folds.png")
+MAP_FILES = ("map.npz", "map.png", "response.png", "folds.png", "curves.png")
 """What a map writes."""
 
-MODEL_FILES = ("model.json", "fit.txt", "report.html", "result.json")
-"""What a fit or a loop writes."""
+MODEL_FILES = ("model.json", "fit.txt", "report.html", "result.json", "report.md", "report_*.png")
+"""What a fit or a loop writes, as patterns."""
 
 
-def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None = None) -> None:
+def write_report(
+    loop: Loop, folder: str | Path, health: CampaignHealth | None = None, *, markdown: bool = False
+) -> None:
     """Write report.html, result.json and model.json; everything is ready before the first is written.
 
     Where the last fit failed there is no model: no model.json is written, and one of before is removed. So
@@ -29,6 +32,7 @@ def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None =
         loop: the closed loop.
         folder: where they go; made if it is not there. Files that isojax did not write stay as they are.
         health: of its campaign; computed here if omitted.
+        markdown: whether to write report.md as well, with its pictures report_*.png beside it.
 
     Raises:
         ValueError: if something else than a folder is in the way, or a model that was found is not finite.
@@ -38,7 +42,7 @@ def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None =
     health = campaign_health(loop) if health is None else health
     texts = {
         "model.json": model_text(loop.after),
-        "report.html": render_page(loop, health),
+        **render_pages(page_content(loop, health), markdown=markdown),
         "result.json": json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n",
     }
     write_model_files(folder, texts)
@@ -66,7 +70,7 @@ def model_text(fit: Fit) -> str | None:
     return json.dumps(model_to_dict(fit.model), indent=1, allow_nan=False) + "\n"
 
 
-def write_model_files(folder: Path, contents: dict[str, str | None]) -> None:
+def write_model_files(folder: Path, contents: Mapping[str, str | bytes | None]) -> None:
     """Write what belongs to a model; what an earlier run wrote there, a map included, belongs to another.
 
     Args:
