@@ -9,44 +9,20 @@ import time
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import jax
-import numpy as np
-from rich.console import Console
-from rich.text import Text
-
-from . import plot
-from ._compiling import compile_quickly
-from ._progress import KeyFigure, Stage
-from ._results import is_successful
-from ._stage_lines import stage_lines, step_lines
+from ._progress import KeyFigure, Stage, silent
 from .demo import campaign_folder
-from .identification import Fit, classical_guess, fit, read_campaign, silent
-from .models import load_model
-from .records import (
-    Campaign,
-    draft_campaign,
-    find_data_files,
-    find_suspicions,
-    inspect_file,
-    refuse_contradictions,
-)
-from .reporting import (
-    catalogue_table,
-    check_first_words,
-    check_folder,
-    close_loop,
-    compile_seconds,
-    folds_around,
-    inspection_summary,
-    loop_summary,
-    map_summary,
-    model_text,
-    png_bytes,
-    write_map,
-    write_texts,
-)
-from .stability import stability_map
+
+if TYPE_CHECKING:
+    import numpy as np
+    from rich.console import Console
+
+    from .identification import Fit
+    from .records import Campaign
+
+# Each command imports what it needs when it needs it: a bad argument or file is refused before JAX or
+# matplotlib has started.
 
 _TERMINAL = 120
 
@@ -71,11 +47,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit code: 0, 1 where the fit or every cell of the map did not converge (what was found is written all
         the same), or 2 where an argument or a file is bad.
     """
-    jax.config.update("jax_enable_x64", True)
-    compile_quickly()
-    cache = os.environ.get("ISOJAX_CACHE")
-    if cache:
-        jax.config.update("jax_compilation_cache_dir", cache)
     asked = _parser().parse_args(arguments)
     try:
         return asked.run(asked)
@@ -190,29 +161,55 @@ def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
     )
 
 
+def _start_jax() -> None:
+    """Set how JAX computes and compiles, before it is first asked to."""
+    import jax
+
+    from ._compiling import compile_quickly
+
+    jax.config.update("jax_enable_x64", True)
+    compile_quickly()
+    cache = os.environ.get("ISOJAX_CACHE")
+    if cache:
+        jax.config.update("jax_compilation_cache_dir", cache)
+
+
 def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Callable[[str], None]]:
     """Give what shows progress on stderr: a line a stage, every step of it, or nothing."""
+    from rich.console import Console
+
+    from ._stage_lines import stage_lines, step_lines
+
     console = Console(stderr=True, highlight=False)
     if asked.quiet:
         return contextlib.nullcontext(silent)
     return step_lines(console) if asked.verbose else stage_lines(console)
 
 
-def _results() -> Console:
+def _results() -> "Console":
     """Give what shows results; where no terminal reports its width, wide enough for every table."""
+    from rich.console import Console
+
     return Console(highlight=False, width=None if sys.stdout.isatty() else _TERMINAL)
 
 
 def _inspect(asked: argparse.Namespace) -> int:
+    from .records import draft_campaign, find_data_files, inspect_file
+
     if asked.rate is not None and not 0.0 < asked.rate < math.inf:
         raise ValueError(f"--rate must be a finite number above 0 [Hz], but is {asked.rate:g}.")
-    targets = [Path(one) for one in (asked.picture, asked.draft) if one is not None]
-    for target in targets:
-        check_folder(target.parent)
     if asked.draft is not None and Path(asked.draft).exists():
         raise ValueError(f"--draft {asked.draft} exists already; it is not overwritten.")
     found, schedules = find_data_files(asked.files)
     files = [inspect_file(file, asked.rate) for file in found]
+
+    from . import plot
+    from ._read_campaign import read_campaign
+    from .reporting import check_folder, inspection_summary, png_bytes, write_texts
+
+    targets = [Path(one) for one in (asked.picture, asked.draft) if one is not None]
+    for target in targets:
+        check_folder(target.parent)
     _results().print(inspection_summary(files))
     if asked.draft is not None:
         draft = Path(asked.draft)
@@ -230,9 +227,16 @@ def _inspect(asked: argparse.Namespace) -> int:
 
 
 def _close_loop(asked: argparse.Namespace) -> int:
-    begin, folder = time.perf_counter(), check_folder(asked.out)
+    begin = time.perf_counter()
     with _progress(asked) as progress:
         measured = _read(asked.campaign, progress)
+
+        from rich.text import Text
+
+        from .reporting import check_folder, close_loop, loop_summary
+
+        folder = check_folder(asked.out)
+        _start_jax()
         loop = close_loop(measured, progress=progress, anyway=asked.anyway)
         progress(Stage("report"))
         loop.report(folder)
@@ -242,7 +246,9 @@ def _close_loop(asked: argparse.Namespace) -> int:
     return _exit_code(loop.after)
 
 
-def _read(campaign: str | Path, progress: Callable[[str], None]) -> Campaign:
+def _read(campaign: str | Path, progress: Callable[[str], None]) -> "Campaign":
+    from ._read_campaign import read_campaign
+
     progress(Stage("reading of the campaign"))
     measured = read_campaign(campaign)
     progress(KeyFigure(f"{len(measured.records)} records read"))
@@ -250,12 +256,19 @@ def _read(campaign: str | Path, progress: Callable[[str], None]) -> Campaign:
 
 
 def _fit(asked: argparse.Namespace) -> int:
+    from .records import find_suspicions, refuse_contradictions
+
     begin = time.perf_counter()
-    folder = None if asked.out is None else check_folder(asked.out)
     with _progress(asked) as progress:
         measured = _read(asked.campaign, progress)
         if not asked.anyway:
             refuse_contradictions(measured)
+
+        from .identification import classical_guess, fit
+        from .reporting import check_first_words, check_folder, model_text, write_texts
+
+        folder = None if asked.out is None else check_folder(asked.out)
+        _start_jax()
         progress(Stage("classical guess"))
         guess = classical_guess(measured)
         progress(KeyFigure(" ".join(guess.notes)))
@@ -271,9 +284,20 @@ def _fit(asked: argparse.Namespace) -> int:
 
 
 def _map(asked: argparse.Namespace) -> int:
-    folder, model = check_folder(asked.out), load_model(asked.model)
     amplitudes = _values("--amplitudes", asked.amplitudes)
     frequencies = _values("--frequencies", asked.frequencies)
+    _start_jax()
+
+    from .models import load_model
+
+    model = load_model(asked.model)
+
+    import numpy as np
+
+    from .reporting import check_folder, folds_around, map_summary, write_map
+    from .stability import stability_map
+
+    folder = check_folder(asked.out)
     seconds, watch = {}, _stopwatch()
     with _progress(asked) as progress:
         progress(Stage("periodic orbits over drive amplitude and frequency"))
@@ -301,8 +325,10 @@ def _map(asked: argparse.Namespace) -> int:
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
 
 
-def _values(option: str, words: Sequence[str]) -> np.ndarray:
+def _values(option: str, words: Sequence[str]) -> "np.ndarray":
     """Give the values along one side of a map."""
+    import numpy as np
+
     start, stop, count = math.nan, math.nan, 0
     if 2 <= len(words) <= 3:
         with contextlib.suppress(ValueError):
@@ -317,6 +343,8 @@ def _values(option: str, words: Sequence[str]) -> np.ndarray:
 
 def _stopwatch() -> Callable[[], tuple[float, float]]:
     """Give what measures the seconds since its last call: compiling, and everything else."""
+    from .reporting import compile_seconds
+
     last = [compile_seconds(), time.perf_counter()]
 
     def watch() -> tuple[float, float]:
@@ -328,10 +356,14 @@ def _stopwatch() -> Callable[[], tuple[float, float]]:
     return watch
 
 
-def _exit_code(fitted: Fit) -> int:
+def _exit_code(fitted: "Fit") -> int:
+    from ._results import is_successful
+
     return 0 if is_successful(fitted.result) else _NOT_CONVERGED
 
 
 def _effects() -> int:
+    from .reporting import catalogue_table
+
     _results().print(catalogue_table())
     return 0

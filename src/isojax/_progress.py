@@ -11,3 +11,11 @@ class Stage(str):
 
 class KeyFigure(str):
     """A line that gives the result of the stage before it is over, such as "chi2/dof 1.02"."""
+
+
+def silent(line: str) -> None:
+    """Take a line of progress and say nothing.
+
+    Args:
+        line: the line.
+    """

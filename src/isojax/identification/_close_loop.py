@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import scipy.stats
 
-from .._progress import KeyFigure, Stage
+from .._progress import KeyFigure, Stage, silent
 from .._results import RESULTS, is_successful
 from .._show import Row, number, shown
 from ..elements import CATALOGUE
@@ -29,7 +29,7 @@ from .diagnosis import (
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of, silent
+from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Remainder, explain_remainder
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from ._leaves import Leaf, leaf_columns
@@ -27,6 +26,8 @@ def read_hdf5_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
     Raises:
         ValueError: If it is not HDF5, a dataset is missing, or one is a group, text or a matrix.
     """
+    import h5py
+
     try:
         handle = h5py.File(file, "r")
     except OSError as error:
@@ -36,6 +37,8 @@ def read_hdf5_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
 
 
 def _leaves(file: Path, path: str, node: Any) -> Iterator[Leaf]:
+    import h5py
+
     if isinstance(node, h5py.Group):
         point = "." if "MATLAB_class" in node.attrs else "/"
         for name in map(str, node):

@@ -5,9 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
-import scipy.io
+import scipy
 
 from ._hdf5 import read_hdf5_columns
 from ._leaves import Leaf, leaf_columns
@@ -29,6 +28,8 @@ def read_mat_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colum
         ValueError: If it is no .mat file, a variable is missing, or one is text, a struct, a cell or a
             matrix.
     """
+    import h5py
+
     if h5py.is_hdf5(file):
         return read_hdf5_columns(file, names)
     try:
