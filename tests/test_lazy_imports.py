@@ -67,3 +67,8 @@ def test_every_name_that_type_checkers_see_is_there():
 
 def test_the_package_says_that_it_is_typed():
     assert Path(isojax.__file__).with_name("py.typed").is_file()
+
+
+def test_the_citation_is_of_this_version():
+    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {isojax.__version__}\n" in cited
