@@ -40,7 +40,8 @@ def missing_extra(file: Path, package: str, what: str) -> ValueError:
     pip finds the extra in the installed isojax, whether that came from a clone, a wheel or an index.
     """
     return ValueError(
-        f'{file}: reading {what} needs the package {package}; install it by: python -m pip install "isojax[io]"'
+        f"{file}: reading {what} needs the package {package}; to install it: "
+        'python -m pip install "isojax[io]"'
     )
 
 
