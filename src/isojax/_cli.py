@@ -10,49 +10,22 @@ import time
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import jax
-import numpy as np
-from rich.console import Console
-from rich.text import Text
-
-from . import plot
-from ._compiling import compile_quickly
 from ._interrupt import INTERRUPTED, prompt_interrupt
 from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
-from ._progress import KeyFigure, Notice, Stage, before, watched
-from ._results import is_successful
-from ._stage_lines import stage_lines
+from ._progress import LOOP_SHARES, KeyFigure, Notice, Stage, before, silent, watched
 from .demo import campaign_folder
-from .identification import LOOP_SHARES, Fit, classical_guess, fit, fit_report, read_campaign, silent
-from .models import load_model, write_whole
-from .records import (
-    Campaign,
-    draft_campaign,
-    find_data_files,
-    find_suspicions,
-    inspect_file,
-    refuse_contradictions,
-)
-from .reporting import (
-    catalogue_table,
-    check_first_dicts,
-    check_first_words,
-    close_loop,
-    compile_seconds,
-    folds_around,
-    inspection_dict,
-    inspection_summary,
-    loop_summary,
-    map_dict,
-    map_summary,
-    model_text,
-    png_bytes,
-    result_dict,
-    write_map,
-    write_model_files,
-)
-from .stability import stability_map
+
+if TYPE_CHECKING:
+    import numpy as np
+    from rich.console import Console
+
+    from .identification import Fit
+    from .records import Campaign
+
+# Each command imports what it needs when it needs it: a bad argument or file is refused before JAX or
+# matplotlib has started.
 
 _TERMINAL = 120
 
@@ -85,11 +58,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         the same), 2 where an argument or a file is bad, 3 where the results had to be written elsewhere, 130
         after Ctrl-C.
     """
-    jax.config.update("jax_enable_x64", True)
-    compile_quickly()
-    cache = os.environ.get("ISOJAX_CACHE")
-    if cache:
-        jax.config.update("jax_compilation_cache_dir", cache)
     asked = _parser().parse_args(arguments)
     asked.kept = lambda: "nothing is written"
     try:
@@ -191,7 +159,7 @@ def _parser() -> argparse.ArgumentParser:
     plane.set_defaults(run=_map)
 
     effects = commands.add_parser("effects", help="list the effects that can be named")
-    effects.set_defaults(run=lambda asked: _effects())
+    effects.set_defaults(run=_effects, json=False)
 
     demo = commands.add_parser("demo", help="close-loop on the campaign in the package")
     demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
@@ -249,18 +217,37 @@ def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
     )
 
 
+def _start_jax() -> None:
+    """Set how JAX computes and compiles, before it is first asked to."""
+    import jax
+
+    from ._compiling import compile_quickly
+
+    jax.config.update("jax_enable_x64", True)
+    compile_quickly()
+    cache = os.environ.get("ISOJAX_CACHE")
+    if cache:
+        jax.config.update("jax_compilation_cache_dir", cache)
+
+
 def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Callable[[str], None]]:
     """Give what shows progress on stderr: a line a stage, every step of it, or nothing."""
+    from rich.console import Console
+
+    from ._stage_lines import stage_lines
+
     if asked.quiet:
         return contextlib.nullcontext(silent)
     return stage_lines(Console(stderr=True, highlight=False), steps=asked.verbose)
 
 
-def _results(asked: argparse.Namespace) -> Console:
+def _results(asked: argparse.Namespace) -> "Console":
     """Give what shows results; where no terminal reports its width, wide enough for every table.
 
     Where the result itself is printed words go to stderr, or nowhere where they are not wanted.
     """
+    from rich.console import Console
+
     out = sys.stderr if asked.json else sys.stdout
     quiet = asked.json and getattr(asked, "quiet", False)
     return Console(file=out, highlight=False, width=None if out.isatty() else _TERMINAL, quiet=quiet)
@@ -272,15 +259,22 @@ def _print_json(asked: argparse.Namespace, content: Callable[[], object]) -> Non
 
 
 def _inspect(asked: argparse.Namespace) -> int:
+    from .records import draft_campaign, find_data_files, inspect_file
+
     if asked.rate is not None and not 0.0 < asked.rate < math.inf:
         raise ValueError(f"--rate must be a finite number above 0 [Hz], but is {asked.rate:g}.")
-    targets = [Path(one) for one in (asked.picture, asked.draft) if one is not None]
-    for target in targets:
-        check_folder(target.parent)
     if asked.draft is not None and Path(asked.draft).exists():
         raise ValueError(f"--draft {asked.draft} exists already; it is not overwritten.")
     found, schedules = find_data_files(asked.files)
     files = [inspect_file(file, asked.rate) for file in found]
+
+    from . import plot
+    from ._read_campaign import read_campaign
+    from .models import write_whole
+    from .reporting import inspection_dict, inspection_summary, png_bytes
+
+    for target in (Path(one) for one in (asked.picture, asked.draft) if one is not None):
+        check_folder(target.parent)
     console = _results(asked)
     console.print(inspection_summary(files))
     _print_json(asked, lambda: [inspection_dict(one) for one in files])
@@ -303,17 +297,25 @@ def _inspect(asked: argparse.Namespace) -> int:
     return 0
 
 
-def _say(console: Console, words: str) -> None:
+def _say(console: "Console", words: str) -> None:
+    from rich.text import Text
+
     console.print(Text(words), soft_wrap=True)
 
 
 def _close_loop(asked: argparse.Namespace) -> int:
+    from .records import refuse_contradictions
+
     begin = time.perf_counter()
     with output_folder(asked.out) as folder, _progress(asked) as progress:
         progress(Stage("reading of the campaign", _READING, (*LOOP_SHARES, _REPORT)))
         measured = _read(asked.campaign, progress)
         if not asked.anyway:
             refuse_contradictions(measured)
+
+        from .reporting import close_loop, loop_summary, result_dict
+
+        _start_jax()
         kept = _kept(asked, folder, progress)
         try:
             loop = close_loop(measured, progress=before(progress, _REPORT), anyway=True, checkpoint=kept)
@@ -348,13 +350,17 @@ def _kept(asked: argparse.Namespace, folder: Path, progress: Callable[[str], Non
     return kept
 
 
-def _read(campaign: str | Path, progress: Callable[[str], None]) -> Campaign:
+def _read(campaign: str | Path, progress: Callable[[str], None]) -> "Campaign":
+    from ._read_campaign import read_campaign
+
     measured = read_campaign(campaign)
     progress(KeyFigure(f"{len(measured.records)} records read"))
     return measured
 
 
 def _fit(asked: argparse.Namespace) -> int:
+    from .records import find_suspicions, refuse_contradictions
+
     begin, guessing, fitting = time.perf_counter(), *LOOP_SHARES[:2]
     where = contextlib.nullcontext(None) if asked.out is None else output_folder(asked.out)
     with where as folder, _progress(asked) as progress:
@@ -362,6 +368,11 @@ def _fit(asked: argparse.Namespace) -> int:
         measured = _read(asked.campaign, progress)
         if not asked.anyway:
             refuse_contradictions(measured)
+
+        from .identification import classical_guess, fit, fit_report
+        from .reporting import check_first_dicts, check_first_words, model_text, write_model_files
+
+        _start_jax()
         progress(Stage("classical guess", guessing, (fitting,)))
         guess = classical_guess(measured)
         progress(KeyFigure(" ".join(guess.notes)))
@@ -381,9 +392,19 @@ def _fit(asked: argparse.Namespace) -> int:
 
 
 def _map(asked: argparse.Namespace) -> int:
-    model = load_model(asked.model)
     amplitudes = _values("--amplitudes", asked.amplitudes)
     frequencies = _values("--frequencies", asked.frequencies)
+    _start_jax()
+
+    from .models import load_model
+
+    model = load_model(asked.model)
+
+    import numpy as np
+
+    from .reporting import folds_around, map_dict, map_summary, write_map
+    from .stability import stability_map
+
     seconds, watch = {}, _stopwatch()
     with output_folder(asked.out) as folder, _progress(asked) as progress:
         if asked.checkpoint is not None:
@@ -417,8 +438,10 @@ def _map(asked: argparse.Namespace) -> int:
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
 
 
-def _values(option: str, words: Sequence[str]) -> np.ndarray:
+def _values(option: str, words: Sequence[str]) -> "np.ndarray":
     """Give the values along one side of a map."""
+    import numpy as np
+
     start, stop, count = math.nan, math.nan, 0
     if 2 <= len(words) <= 3:
         with contextlib.suppress(ValueError):
@@ -433,6 +456,8 @@ def _values(option: str, words: Sequence[str]) -> np.ndarray:
 
 def _stopwatch() -> Callable[[], tuple[float, float]]:
     """Give what measures the seconds since its last call: compiling, and everything else."""
+    from .reporting import compile_seconds
+
     last = [compile_seconds(), time.perf_counter()]
 
     def watch() -> tuple[float, float]:
@@ -444,10 +469,14 @@ def _stopwatch() -> Callable[[], tuple[float, float]]:
     return watch
 
 
-def _exit_code(fitted: Fit) -> int:
+def _exit_code(fitted: "Fit") -> int:
+    from ._results import is_successful
+
     return 0 if is_successful(fitted.result) else _NOT_CONVERGED
 
 
-def _effects() -> int:
-    Console(highlight=False, width=None if sys.stdout.isatty() else _TERMINAL).print(catalogue_table())
+def _effects(asked: argparse.Namespace) -> int:
+    from .reporting import catalogue_table
+
+    _results(asked).print(catalogue_table())
     return 0

@@ -31,6 +31,12 @@ class KeyFigure(str):
     """A line that gives the result of the stage before it is over, such as "chi2/dof 1.02"."""
 
 
+LOOP_SHARES = (5.0, 8.0, 60.0, 12.0, 3.0, 8.0)
+"""Usual shares of the time of a loop that finds one effect, as `Stage.to_come` has them: classical guess,
+fit, first diagnosis, each further one, separating experiments, free runs. Most of the time is compiling, once
+a law."""
+
+
 class Notice(str):
     """A line that stays to be read, such as "what was kept belongs to another campaign"."""
 
@@ -84,3 +90,11 @@ def step(line: str) -> None:
     progress = _WATCHING.get()
     if progress is not None:
         progress(line)
+
+
+def silent(line: str) -> None:
+    """Take a line of progress and say nothing.
+
+    Args:
+        line: the line.
+    """

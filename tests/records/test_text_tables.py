@@ -234,3 +234,25 @@ def test_whatever_the_bytes_are_the_reader_gives_numbers_or_a_value_error(
         for name, column in read_text_columns(file, None).items():
             again = read_text_columns(file, [name])[name]
             np.testing.assert_array_equal(again.samples, column.samples)
+
+
+@pytest.mark.parametrize(
+    ("separator", "clock"),
+    [
+        (",", "%H:%M:%S.%f"),
+        (";", "%Y-%m-%d %H:%M:%S.%f"),
+        ("\t", "%Y-%m-%dT%H:%M:%S.%fZ"),
+        ("   ", "%H:%M:%S.%f"),
+    ],
+)
+def test_times_of_day_are_seconds_since_the_first_over_midnight(
+    separator: str, clock: str, tmp_path: Path
+) -> None:
+    times = pd.Timestamp("2026-03-05 23:59:58.5") + pd.to_timedelta(np.arange(40) * 125, unit="ms")
+    rows = [f"{one.strftime(clock)}{separator}{i % 7}{separator}{i % 5}.5" for i, one in enumerate(times)]
+    file = tmp_path / "run.csv"
+    file.write_text("\n".join([separator.join(("time", "force", "a")), *rows]) + "\n")
+    columns = read_text_columns(file, ["time", "a"])
+    np.testing.assert_allclose(columns["time"].samples, np.arange(40) / 8.0, atol=1e-6)
+    assert columns["time"].unit == "s"
+    np.testing.assert_array_equal(columns["a"].samples, np.arange(40) % 5 + 0.5)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import scipy.stats
 
 from .._kept import digest, kept_answers, package_digest
-from .._progress import KeyFigure, Stage
+from .._progress import LOOP_SHARES, KeyFigure, Stage, silent
 from .._results import RESULTS, is_successful
 from .._show import Row, number, shown
 from ..elements import CATALOGUE
@@ -30,16 +30,14 @@ from .diagnosis import (
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of, silent
+from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Remainder, explain_remainder
 
-_GUESS, _FIT, _DIAGNOSIS, _NEXT, _REPLACE, _EXPERIMENT, _RUNS = 5.0, 8.0, 60.0, 12.0, 12.0, 3.0, 8.0
-"""Usual shares of the time of a loop: classical guess, fit, first diagnosis, each further one, test whether a
-finding replaces another, separating experiments, free runs. Most of the time is compiling, once a law."""
+_GUESS, _FIT, _DIAGNOSIS, _NEXT, _EXPERIMENT, _RUNS = LOOP_SHARES
 
-LOOP_SHARES = (_GUESS, _FIT, _DIAGNOSIS, _NEXT, _EXPERIMENT, _RUNS)
-"""The stages of a loop that finds one effect, as `Stage.to_come` has them."""
+_REPLACE = 12.0
+"""Usual share of the time of the test whether a finding replaces another."""
 
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 

@@ -8,9 +8,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from .._progress import silent
 from .._show import Row, shown
 from ..health import CampaignHealth, campaign_health
-from ..identification import DEFAULT_SOLVER, ClassicalGuess, Extension, Finding, Fit, Loop, Rules, silent
+from ..identification import DEFAULT_SOLVER, ClassicalGuess, Extension, Finding, Fit, Loop, Rules
 from ..identification import close_loop as find_loop
 from ..models import Isolator
 from ..records import Campaign

@@ -47,5 +47,4 @@ from ._search import ROUGH as ROUGH
 from ._search import Rival as Rival
 from ._search import Search as Search
 from ._search import search_of as search_of
-from ._search import silent as silent
 from ._simulator import Simulator as Simulator
