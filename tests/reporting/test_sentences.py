@@ -7,6 +7,7 @@ from isojax.elements import StribeckFriction
 from isojax.identification import DriftBudget, Errors, Fit
 from isojax.identification._close_loop import overall_verdict
 from isojax.records import NoisePeak, Spikes, data_health
+from isojax.records.noise._health import UnsettledDwell
 from isojax.reporting import render_text, verdict_summary
 from isojax.reporting.words._health_words import budget_words
 from isojax.reporting.words._sentences import caveats, finding_words, headline, health_words
@@ -109,9 +110,14 @@ def test_caveats_name_what_is_declared_and_what_is_hidden(found):
 
 
 def test_health_counts_dwells_and_gives_the_noise(found):
-    text = " ".join(health_words(data_health(found.campaign), found.after))
-    dwells = sum(len(record.dwells) for record in found.campaign.records)
-    assert f"of {dwells} dwells never settled" in text
+    health = data_health(found.campaign)
+    text = " ".join(health_words(health, found.after))
+    dwells = [dwell for record in found.campaign.records for dwell in record.dwells]
+    assert f"All {len(dwells)} dwells settled." in text
+    slow = UnsettledDwell("up", dwells[0], 1e-6, 0.031)
+    text = " ".join(health_words(dataclasses.replace(health, unsettled=(slow,)), found.after))
+    assert f"1 of {len(dwells)} dwells never settled; the worst: up at " in text
+    assert "(3.10 %)" in text
     assert f"{found.after.noise.sigma:#.3g} m/s² rms" in text
 
 

@@ -222,8 +222,9 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
             f"{one.record} at {one.dwell.frequency:.3g} Hz ({typeset_share(one.change)})" for one in worst
         )
         lines.append(
-            f"{len(health.unsettled)} of {health.dwells} dwells never settled"
-            + (f"; the worst: {examples}." if worst else ".")
+            f"{len(health.unsettled)} of {health.dwells} dwells never settled; the worst: {examples}."
+            if worst
+            else f"All {health.dwells} dwells settled."
         )
     if health.brief_blows:
         names = ", ".join(f"{blow.record} ({blow.samples})" for blow in health.brief_blows)
