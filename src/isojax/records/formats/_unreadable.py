@@ -1,5 +1,6 @@
 """The error for a file whose bytes are not those of its format."""
 
+import re
 from pathlib import Path
 
 _MARKS = {
@@ -37,5 +38,7 @@ def unreadable(file: Path, what: str, error: BaseException) -> ValueError:
     cause = "it is cut short or damaged"
     if seen is not None and file.suffix.lower() not in seen:
         cause = f"it has the wrong ending, since it begins as {seen}"
-    said = " ".join(str(error).split())[:_LONGEST] or type(error).__name__
+    said = (
+        " ".join(re.sub("<[^>]* at 0x[^>]*>", "...", str(error)).split())[:_LONGEST] or type(error).__name__
+    )
     return ValueError(f"{file} cannot be read as {what}. Likely cause: {cause} (the reader says: {said})")
