@@ -277,7 +277,7 @@ def calm_loop(monkeypatch):
     others = tuple(name for name in isojax.CATALOGUE if name not in few)
     find = isojax.close_loop
     monkeypatch.setattr(
-        "isojax._cli.close_loop", lambda *args, **options: find(*args, excluded=others, **options)
+        "isojax.reporting.close_loop", lambda *args, **options: find(*args, excluded=others, **options)
     )
 
 

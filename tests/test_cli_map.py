@@ -38,7 +38,7 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
     assert main(["map", z_file, *WINDOW, "--out", str(out), "--quiet"]) == 0
     shown = capsys.readouterr()
     assert shown.err == ""
-    assert sorted(path.name for path in out.iterdir()) == [
+    assert sorted(path.name for path in out.glob("[!.]*")) == [
         "curves.png",
         "map.npz",
         "map.png",
@@ -130,7 +130,7 @@ def test_map_in_which_nothing_converged_ends_with_code_one_and_says_why(
         z_map,
         (blank, blank, jnp.zeros_like(z_map.count), result),
     )
-    monkeypatch.setattr("isojax._cli.stability_map", lambda *_, **__: failed)
+    monkeypatch.setattr("isojax.stability.stability_map", lambda *_, **__: failed)
     assert main(["map", z_file, *WINDOW, "--out", str(tmp_path), "--quiet"]) == 1
     text = capsys.readouterr().out
     assert "20 cells (15 not converged, 5 left every bound)" in text
@@ -143,7 +143,7 @@ def test_nothing_is_written_where_a_picture_fails(z_file, z_map, tmp_path, monke
     def fail(*_, **__):
         raise ValueError("no ink")
 
-    monkeypatch.setattr("isojax._cli.stability_map", lambda *_, **__: z_map)
+    monkeypatch.setattr("isojax.stability.stability_map", lambda *_, **__: z_map)
     monkeypatch.setattr("isojax.reporting.page._map_files.plot_response_map", fail)
     assert main(["map", z_file, *WINDOW, "--out", str(tmp_path / "out"), "--quiet"]) == 2
     assert not (tmp_path / "out").exists()

@@ -8,14 +8,13 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._arguments import MAP_STEPS, command_line
 from ._interrupt import INTERRUPTED, prompt_interrupt
 from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
 from ._progress import LOOP_SHARES, KeyFigure, Notice, Stage, before, silent, watched
-from .demo import campaign_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,16 +35,6 @@ _WRITTEN_ELSEWHERE = 3
 _READING, _REPORT = 2.0, 30.0
 """Usual shares of the time of a loop, beside `LOOP_SHARES`."""
 
-_MAP_STEPS = 200
-"""Values along each side of a map, if omitted."""
-
-_EXIT_CODES = (
-    "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
-    "argument or a file is bad, or the records contradict campaign.toml; nothing is written then; 3 the "
-    "results could not be written where they were asked for, and the message says which folder has them; 130 "
-    "interrupted."
-)
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
@@ -58,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         the same), 2 where an argument or a file is bad, 3 where the results had to be written elsewhere, 130
         after Ctrl-C.
     """
-    asked = _parser().parse_args(arguments)
+    commands = {"inspect": _inspect, "close-loop": _close_loop, "fit": _fit, "map": _map, "effects": _effects}
+    asked = command_line(commands).parse_args(arguments)
     asked.kept = lambda: "nothing is written"
     try:
         with prompt_interrupt(lambda: f"interrupted; {asked.kept()}"):
@@ -69,152 +59,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"isojax: interrupted; {asked.kept()}", file=sys.stderr)
         return INTERRUPTED
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="isojax",
-        description="Identify a nonlinear vibration isolator from time histories; name what its model lacks; "
-        "map the stability of its periodic response.",
-        epilog=f"{_EXIT_CODES} ISOJAX_CACHE names a folder in which compiled code is kept between runs.",
-    )
-    parser.add_argument("--version", action="version", version=f"isojax {version('isojax')}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-
-    seen = commands.add_parser(
-        "inspect",
-        help="list what is in data files, draft a campaign.toml",
-        description="List channels, units, ranges, rates, flaws and the kind of excitation of data files "
-        "that no campaign.toml describes yet. Units and quantities come from headings and names.",
-        epilog=_EXIT_CODES,
-    )
-    seen.add_argument("files", nargs="+", metavar="FILE", help="data files, or folders of them")
-    seen.add_argument(
-        "--rate", type=float, metavar="HZ", help="samples per second, where no file states them"
-    )
-    seen.add_argument(
-        "--picture", metavar="PATH", help="draw drive, response and spectra of each file (.png)"
-    )
-    seen.add_argument(
-        "--draft", metavar="PATH", help="write a campaign.toml there, each guess of it marked `# guessed`"
-    )
-    _json(seen, "what is in the files")
-    seen.set_defaults(run=_inspect)
-
-    loop = commands.add_parser("close-loop", help="fit, name what is missing, add it, report")
-    _campaign(loop)
-    loop.add_argument(
-        "--out",
-        required=True,
-        metavar="DIR",
-        help="where report.html, result.json and model.json go (no model after a failed fit); what an "
-        "earlier run of isojax wrote there goes, other files stay",
-    )
-    _resume(loop)
-    _json(loop, "the content of result.json")
-    _markdown(loop)
-    _shown(loop)
-    loop.set_defaults(run=_close_loop)
-
-    single = commands.add_parser("fit", help="fit the declared model and print its report")
-    _campaign(single)
-    single.add_argument(
-        "--out", metavar="DIR", help="where model.json (not after a failed fit) and fit.txt go"
-    )
-    _json(single, "the fit as `fit.save` writes it")
-    _shown(single)
-    single.set_defaults(run=_fit)
-
-    plane = commands.add_parser(
-        "map",
-        help="find the periodic orbits over drive amplitude and frequency, and whether they are stable",
-        description="Find the periodic orbits of a model over a grid of drive amplitude and frequency, and "
-        "their Floquet multipliers. Writes map.npz (all arrays, SI units), curves.png (response over "
-        "frequency, dashed where unstable), map.png (largest multiplier), response.png and, with --folds "
-        "where orbits coexist, folds.png; prints a summary.",
-        epilog=_EXIT_CODES,
-    )
-    plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
-    _axis(plane, "amplitudes", "drive amplitudes [N, or m/s^2 for base excitation]")
-    _axis(plane, "frequencies", "drive frequencies [Hz]")
-    plane.add_argument(
-        "--coexisting",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="all orbits of a cell, or only that of the smallest motion; default: all",
-    )
-    plane.add_argument(
-        "--folds",
-        action="store_true",
-        help="follow the curve of folds around cells with several orbits; takes a few times as long",
-    )
-    plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
-    plane.add_argument(
-        "--checkpoint",
-        metavar="DIR",
-        help="keep finished chunks here; a run that was killed goes on from them",
-    )
-    _json(plane, "grid, count of orbits and largest multiplier of each cell, folds")
-    _shown(plane)
-    plane.set_defaults(run=_map)
-
-    effects = commands.add_parser("effects", help="list the effects that can be named")
-    effects.set_defaults(run=_effects, json=False)
-
-    demo = commands.add_parser("demo", help="close-loop on the campaign in the package")
-    demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
-    _resume(demo)
-    _json(demo, "the content of result.json")
-    _markdown(demo)
-    _shown(demo)
-    demo.set_defaults(run=_close_loop, campaign=campaign_folder(), anyway=False)
-    return parser
-
-
-def _campaign(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder")
-    parser.add_argument(
-        "--anyway", action="store_true", help="fit even where the records contradict their declaration"
-    )
-
-
-def _resume(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--resume",
-        action="store_true",
-        help="go on from what an interrupted or killed run into the same folder has finished; the result is "
-        "the same, digit for digit",
-    )
-
-
-def _json(parser: argparse.ArgumentParser, words: str) -> None:
-    parser.add_argument(
-        "--json", action="store_true", help=f"print {words} as JSON on stdout; all words go to stderr"
-    )
-
-
-def _markdown(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--markdown", action="store_true", help="write report.md as well, with its pictures beside it"
-    )
-
-
-def _shown(parser: argparse.ArgumentParser) -> None:
-    shown = parser.add_mutually_exclusive_group()
-    shown.add_argument(
-        "--verbose", action="store_true", help="a line for every step, not only for every stage"
-    )
-    shown.add_argument("--quiet", action="store_true", help="no lines of progress")
-
-
-def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
-    parser.add_argument(
-        f"--{name}",
-        required=True,
-        nargs="+",
-        metavar=("START STOP", "COUNT"),
-        help=f"{words}; COUNT equal steps apart, {_MAP_STEPS} if omitted",
-    )
 
 
 def _start_jax() -> None:
@@ -445,7 +289,7 @@ def _values(option: str, words: Sequence[str]) -> "np.ndarray":
     start, stop, count = math.nan, math.nan, 0
     if 2 <= len(words) <= 3:
         with contextlib.suppress(ValueError):
-            start, stop, count = float(words[0]), float(words[1]), int((*words, _MAP_STEPS)[2])
+            start, stop, count = float(words[0]), float(words[1]), int((*words, MAP_STEPS)[2])
     if count < 2 or not 0.0 < start < stop < math.inf:
         raise ValueError(
             f"{option} must be START STOP [COUNT], two ascending positive numbers and a count of at least 2, "

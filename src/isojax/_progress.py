@@ -36,6 +36,9 @@ LOOP_SHARES = (5.0, 8.0, 60.0, 12.0, 3.0, 8.0)
 fit, first diagnosis, each further one, separating experiments, free runs. Most of the time is compiling, once
 a law."""
 
+REPLACE_SHARE = 12.0
+"""Usual share of the test whether a finding replaces another, which not every loop needs."""
+
 
 class Notice(str):
     """A line that stays to be read, such as "what was kept belongs to another campaign"."""

@@ -147,7 +147,7 @@ def test_markdown_stands_beside_its_pictures(page, found, written):
 
 
 def test_markdown_of_an_earlier_run_goes_where_none_is_asked_for(plain_folder):
-    left = sorted(path.name for path in plain_folder.iterdir())
+    left = sorted(path.name for path in plain_folder.glob("[!.]*"))
     assert left == ["mine.png", "model.json", "notes.txt", "report.html", "result.json"]
 
 

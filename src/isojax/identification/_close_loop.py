@@ -11,7 +11,7 @@ from typing import Any, Literal
 import scipy.stats
 
 from .._kept import digest, kept_answers, package_digest
-from .._progress import LOOP_SHARES, KeyFigure, Stage, silent
+from .._progress import LOOP_SHARES, REPLACE_SHARE, KeyFigure, Stage, silent
 from .._results import RESULTS, is_successful
 from .._show import Row, number, shown
 from ..elements import CATALOGUE
@@ -35,9 +35,6 @@ from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Remainder, explain_remainder
 
 _GUESS, _FIT, _DIAGNOSIS, _NEXT, _EXPERIMENT, _RUNS = LOOP_SHARES
-
-_REPLACE = 12.0
-"""Usual share of the time of the test whether a finding replaces another."""
 
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 
@@ -254,7 +251,7 @@ def search_effects(
         return extensions, verdict
     final = extensions[-1].after.estimate
     search.progress(
-        Stage("test whether the later findings replace an earlier one", _REPLACE, (_EXPERIMENT, _RUNS))
+        Stage("test whether the later findings replace an earlier one", REPLACE_SHARE, (_EXPERIMENT, _RUNS))
     )
     earlier = tuple(
         step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
@@ -295,7 +292,7 @@ def _grow(
 def _diagnosis(added: int, most: int) -> Stage:
     """Open a diagnosis: the first is expected to find an effect, those after it are not."""
     later = (_EXPERIMENT, _RUNS) if added else (_NEXT, _EXPERIMENT, _RUNS) if most else (_RUNS,)
-    later = (_REPLACE, *later) if added > 1 else later
+    later = (REPLACE_SHARE, *later) if added > 1 else later
     return Stage(f"diagnosis {added + 1}: which effect is missing", _NEXT if added else _DIAGNOSIS, later)
 
 

@@ -26,7 +26,7 @@ _LOOKED_AT = 500
 _MOST_LOOKED_AT = 2**18
 """Letters in these lines; of a table with long rows fewer lines are looked at."""
 
-_MOST_COLUMNS = 1024
+_MOST_FIELDS = 1024
 _LONGEST_LINE = 2**16
 """Bytes of a line: 64 a column."""
 
@@ -165,7 +165,7 @@ def read_table(file: Path) -> TextTable:
             f"{lines[written[0]]!r:.80}"
         )
     first = written[layout.first]
-    if layout.width > _MOST_COLUMNS:
+    if layout.width > _MOST_FIELDS:
         raise _lying(file, f"line {first + 1} has {layout.width} columns")
     if len(layout.headings) != layout.width:
         raise ValueError(
@@ -198,7 +198,7 @@ def _check_lines(file: Path, raw: bytes) -> None:
 
 def _lying(file: Path, found: str) -> ValueError:
     return ValueError(
-        f"{file}: {found}; expected a row a sample, of at most {_MOST_COLUMNS} columns and {_LONGEST_LINE} "
+        f"{file}: {found}; expected a row a sample, of at most {_MOST_FIELDS} columns and {_LONGEST_LINE} "
         "bytes. Likely cause: the samples of a channel stand in one row; transpose the table, or export "
         "channels as columns"
     )
