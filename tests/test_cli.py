@@ -334,6 +334,7 @@ def test_an_interrupted_loop_keeps_what_it_did_and_resumes_with_the_same_result(
     names = sorted(entry.name for entry in out.iterdir())
     assert names == [".isojax", "mine.txt", "model.json", "report.html", "result.json"]
 
+    capsys.readouterr()
     assert main(["fit", str(campaign), "--out", str(out), "--quiet", "--json"]) in (0, 1)
     shown = capsys.readouterr()
     assert shown.err == ""
