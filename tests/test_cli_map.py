@@ -11,6 +11,7 @@ import pytest
 
 import isojax as ij
 from isojax._cli import main
+from isojax.reporting import map_dict
 
 PNG = b"\x89PNG\r\n\x1a\n"
 WINDOW = ["--amplitudes", "100", "400", "4", "--frequencies", "1.5", "3.5", "5"]
@@ -71,6 +72,16 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
     assert "nowhere; each cell holds at most one orbit" in text
     assert f"{radius.max():.4f} at {100 * (row + 1)} N, {1.5 + 0.5 * column:g} Hz" in text
     assert "compiling" in text
+
+
+def test_a_map_as_json_holds_what_each_cell_says(z_map):
+    said = json.loads(json.dumps(map_dict(z_map), allow_nan=False))
+    assert said["amplitudes"] == [100.0, 200.0, 300.0, 400.0]
+    np.testing.assert_array_equal(said["spectral_radius"], np.asarray(z_map.spectral_radius))
+    np.testing.assert_array_equal(said["count"], np.asarray(z_map.count))
+    assert said["folds"] is None
+    lost = eqx.tree_at(lambda m: m.spectral_radius, z_map, z_map.spectral_radius.at[0, 0].set(jnp.nan))
+    assert map_dict(lost)["spectral_radius"][0][0] is None
 
 
 @pytest.mark.parametrize(
@@ -161,6 +172,7 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
         "--folds",
         "--out",
         "--checkpoint",
+        "--json",
         "--verbose",
         "--quiet",
     ):

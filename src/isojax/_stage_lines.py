@@ -86,7 +86,7 @@ class _Left(ProgressColumn):
     def __init__(self, pace: Pace):
         """Take what knows it."""
         self._pace = pace
-        super().__init__()
+        super().__init__(Column(no_wrap=True))
 
     def render(self, task: Task) -> Text:
         return Text(self._pace.words, style="dim")
