@@ -51,9 +51,12 @@ def test_a_bad_campaign_is_refused_before_anything_that_fits_or_draws_is_importe
     assert not packages & COMPUTING
 
 
-def test_a_bad_file_is_refused_by_inspect_before_jax_is_imported(tmp_path):
-    (tmp_path / "bad.csv").write_text("force,acceleration\n1,2\n3,4,5\n", encoding="utf-8")
-    code, packages = packages_after("inspect", tmp_path / "bad.csv")
+@pytest.mark.parametrize(
+    ("words", "name"), [(["inspect"], "bad.csv"), (["close-loop", "--out", "none"], "campaign.toml")]
+)
+def test_a_bad_table_or_declaration_is_refused_before_jax_is_imported(words, name, tmp_path):
+    (tmp_path / name).write_text("force,acceleration\n1,2\n3,4,5\n", encoding="utf-8")
+    code, packages = packages_after(*words, tmp_path / name)
     assert code == 2
     assert not packages & (COMPUTING | {"jax", "equinox"})
 

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .elements import CATALOGUE, AbstractElement
 from .records import Campaign, read_declaration, read_measurements
 
 
@@ -55,6 +54,9 @@ def read_campaign(
         ('kN', 200.0)
     """
     declared = read_declaration(source, data)
+
+    from .elements import CATALOGUE  # starts JAX, which a declaration that is wrong need not wait for
+
     model = declared.sections["model"]
     names = catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"])
     for name in names:
@@ -66,11 +68,13 @@ def read_campaign(
     return read_measurements(declared)
 
 
-def _element_class(file: Path, field: str, found: str, suffix: str) -> type[AbstractElement]:
-    """Give the catalogue class of a declared name, short (`cubic`) or in full (`cubic_stiffness`)."""
+def _catalogue_name(file: Path, field: str, found: str, suffix: str) -> str:
+    """Give the catalogue's name for a declared one, short (`cubic`) or in full (`cubic_stiffness`)."""
+    from .elements import CATALOGUE
+
     for name in (found + suffix, found):
         if name in CATALOGUE:
-            return CATALOGUE[name]
+            return name
     short = [name.removesuffix(suffix) for name in CATALOGUE if suffix and name.endswith(suffix)]
     near = difflib.get_close_matches(found, [*short, *CATALOGUE], n=1, cutoff=0.0)[0]
     raise ValueError(
@@ -96,7 +100,7 @@ def catalogue_names(
         ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
     """
     return tuple(
-        _element_class(file, field, found, suffix).name
+        _catalogue_name(file, field, found, suffix)
         for field, names, suffix in (
             ("model.stiffness", stiffness, "_stiffness"),
             ("model.damping", damping, "_damping"),

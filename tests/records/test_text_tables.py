@@ -256,3 +256,13 @@ def test_times_of_day_are_seconds_since_the_first_over_midnight(
     np.testing.assert_allclose(columns["time"].samples, np.arange(40) / 8.0, atol=1e-6)
     assert columns["time"].unit == "s"
     np.testing.assert_array_equal(columns["a"].samples, np.arange(40) % 5 + 0.5)
+
+
+def test_one_column_of_decimal_commas_is_one_column(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text("force [N]\n1,5\n-2,25\n3,0e1\n0,5\n")
+    columns = read_text_columns(file, None)
+    assert {name: one.unit for name, one in columns.items()} == {"force [N]": "N"}
+    np.testing.assert_array_equal(columns["force [N]"].samples, [1.5, -2.25, 30.0, 0.5])
+    file.write_text("force,a\n1,5\n2,25\n3,0\n")
+    assert list(read_text_columns(file, None)) == ["force", "a"]

@@ -8,7 +8,7 @@ MOST_BYTES = 2**31
 MOST_ARRAYS = 2**14
 """Groups, structures and arrays in one file."""
 
-MOST_NESTED = 64
+DEEPEST = 64
 """Levels of groups or structures within each other."""
 
 
@@ -31,9 +31,9 @@ def check_size(file: Path, size: int) -> None:
 
 
 def check_levels(file: Path, levels: int) -> None:
-    """Refuses groups or structures that are nested deeper than `MOST_NESTED`."""
-    if levels > MOST_NESTED:
+    """Refuses groups or structures that are nested deeper than `DEEPEST`."""
+    if levels > DEEPEST:
         raise ValueError(
-            f"{file} nests groups or structures more than {MOST_NESTED} levels deep; expected arrays in a "
+            f"{file} nests groups or structures more than {DEEPEST} levels deep; expected arrays in a "
             "few. Likely cause: a link or a field that leads back to what holds it"
         )

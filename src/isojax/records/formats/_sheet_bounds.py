@@ -11,7 +11,7 @@ MOST_CELLS = 2**25
 MOST_TEXT = 2**30
 """Bytes of a sheet's XML: some 32 a cell."""
 
-_CHUNK = 2**20
+_PIECE = 2**20
 _PLACE = re.compile(rb"\sr=[\"']([A-Z]{1,3})([0-9]{1,7})[\"']")
 
 
@@ -42,7 +42,7 @@ def _check_part(file: Path, archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> 
         )
     rows, columns, tail = 1, 1, b""
     with archive.open(part) as handle:
-        while chunk := handle.read(_CHUNK):
+        while chunk := handle.read(_PIECE):
             text = tail + chunk
             places = _PLACE.findall(text)
             rows = max([rows, *(int(number) for _, number in places)])

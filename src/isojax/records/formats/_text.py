@@ -26,7 +26,7 @@ _LOOKED_AT = 500
 _MOST_LOOKED_AT = 2**18
 """Letters in these lines; of a table with long rows fewer lines are looked at."""
 
-_MOST_FIELDS = 1024
+_CELLS_A_ROW = 1024
 _LONGEST_LINE = 2**16
 """Bytes of a line: 64 a column."""
 
@@ -36,6 +36,7 @@ _SEPARATORS = (",", ";", "\t", _SPACES)
 
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", _SPACES: "spaces"}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*")
 _MARKS = "#%!"
 """Signs before a heading, as NumPy and other programs write them."""
 
@@ -165,7 +166,7 @@ def read_table(file: Path) -> TextTable:
             f"{lines[written[0]]!r:.80}"
         )
     first = written[layout.first]
-    if layout.width > _MOST_FIELDS:
+    if layout.width > _CELLS_A_ROW:
         raise _lying(file, f"line {first + 1} has {layout.width} columns")
     if len(layout.headings) != layout.width:
         raise ValueError(
@@ -198,7 +199,7 @@ def _check_lines(file: Path, raw: bytes) -> None:
 
 def _lying(file: Path, found: str) -> ValueError:
     return ValueError(
-        f"{file}: {found}; expected a row a sample, of at most {_MOST_FIELDS} columns and {_LONGEST_LINE} "
+        f"{file}: {found}; expected a row a sample, of at most {_CELLS_A_ROW} columns and {_LONGEST_LINE} "
         "bytes. Likely cause: the samples of a channel stand in one row; transpose the table, or export "
         "channels as columns"
     )
@@ -220,6 +221,8 @@ def decoded(raw: bytes) -> str:
 
 def _dialect(lines: Sequence[str]) -> tuple[str, str]:
     """Gives the separator and the decimal sign with which most cells are numbers, and fewest texts."""
+    if len(lines) > 2 and "," not in lines[0] and all(map(_DECIMAL_COMMA.fullmatch, lines[1:])):
+        return ";", ","  # a heading of one column, above what would else be two columns of whole numbers
     best, chosen = -math.inf, (",", ".")
     for separator in _SEPARATORS:
         rows = [_cells(line, separator) for line in lines]

@@ -14,7 +14,7 @@ _MARKS = {
 }
 """First bytes of a format, and its name."""
 
-_LONGEST_CAUSE = 120
+_SAID = 120
 """Letters of the reading package's own message that are shown."""
 
 
@@ -38,8 +38,5 @@ def unreadable(file: Path, what: str, error: BaseException) -> ValueError:
     cause = "it is cut short or damaged"
     if seen is not None and file.suffix.lower() not in seen:
         cause = f"it has the wrong ending, since it begins as {seen}"
-    said = (
-        " ".join(re.sub("<[^>]* at 0x[^>]*>", "...", str(error)).split())[:_LONGEST_CAUSE]
-        or type(error).__name__
-    )
+    said = " ".join(re.sub("<[^>]* at 0x[^>]*>", "...", str(error)).split())[:_SAID] or type(error).__name__
     return ValueError(f"{file} cannot be read as {what}. Likely cause: {cause} (the reader says: {said})")
