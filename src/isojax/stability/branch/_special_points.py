@@ -63,10 +63,11 @@ def _slopes(
 ) -> tuple[Array, Array]:
     """Give the residual at a point and its derivative by state and share."""
 
-    def open_end(u: Array) -> Array:
-        return family.open_end(method, scale, u)
+    def open_end(u: Array) -> tuple[Array, Array]:
+        return (family.open_end(method, scale, u),) * 2
 
-    return open_end(here), jax.jacfwd(open_end)(here)
+    slope, value = jax.jacfwd(open_end, has_aux=True)(here)
+    return value, slope
 
 
 @eqx.filter_jit
@@ -121,30 +122,33 @@ def _locate(
         states = scale.shape[0]
         chord = (high - low) / jnp.linalg.norm(high - low)
 
-        def correct(guess: Array) -> Array:
-            def newton(_: Array | int, u: Array) -> Array:
+        def correct(guess: Array) -> tuple[Array, Array]:
+            def newton(_: Array | int, carry: tuple[Array, Array]) -> tuple[Array, Array]:
+                u = carry[0]
                 left, slope = _slopes(here, method, scale, u)
                 across = jnp.dot(chord, u - guess)
-                return u - jnp.linalg.solve(
+                step = jnp.linalg.solve(
                     jnp.concatenate([slope, chord[None]]), jnp.concatenate([left, across[None]])
                 )
+                return u - step, slope
 
-            return jax.lax.fori_loop(0, _CORRECTIONS, newton, guess)
+            # One step more than the point needs, so that the last slope is the point's own.
+            return jax.lax.fori_loop(0, _CORRECTIONS + 1, newton, (guess, jnp.zeros((states, states + 1))))
 
-        def halve(_: Array | int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-            low, high = ends
-            middle = correct(0.5 * (low + high))
-            _, slope = _slopes(here, method, scale, middle)
+        def halve(
+            _: Array | int, carry: tuple[Array, Array, Array, Array]
+        ) -> tuple[Array, Array, Array, Array]:
+            low, high, *_ = carry
+            middle, slope = correct(0.5 * (low + high))
             ahead = jnp.linalg.solve(
                 jnp.concatenate([slope, chord[None]]), jnp.zeros(states + 1).at[-1].set(1.0)
             )
             test = critical_values(slope[:, :states] + jnp.eye(states), ahead)[kind]
             same = test * sign > 0.0
-            return jnp.where(same, middle, low), jnp.where(same, high, middle)
+            return jnp.where(same, middle, low), jnp.where(same, high, middle), middle, slope
 
-        low, high = jax.lax.fori_loop(0, bisections, halve, (low, high))
-        found = correct(0.5 * (low + high))
-        _, slope = _slopes(here, method, scale, found)
+        begin = (low, high, low, jnp.zeros((states, states + 1)))
+        _, _, found, slope = jax.lax.fori_loop(0, bisections + 1, halve, begin)
         repeats = _repeats(here, method, scale, found[:states], found[states:])
         return found, slope[:, :states] + jnp.eye(states), repeats
 
