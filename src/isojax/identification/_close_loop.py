@@ -31,7 +31,7 @@ from .diagnosis import (
 from .experiment import with_separating_experiment
 from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of, silent
 from .guess import ClassicalGuess, as_campaign, classical_guess
-from .remainder import Remainder, explain_remainder
+from .remainder import Alternatives, Remainder, explain_remainder, find_alternatives
 
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 
@@ -53,6 +53,7 @@ class Loop:
             final model, with its unit; empty where its fit is not good.
         seconds: wall time.
         rules: the numbers that decided.
+        alternatives: for each finding, and for all together, the force laws that explain the records as well.
     """
 
     campaign: Campaign
@@ -65,6 +66,7 @@ class Loop:
     bounds: dict[str, tuple[float, str]]
     seconds: float
     rules: Rules = Rules()
+    alternatives: tuple[Alternatives, ...] = ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -181,9 +183,8 @@ def close_loop(
     progress(Stage("fit of the declared model"))
     before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
-    extensions, verdict = search_effects(
-        before, search_of(campaign, rules, solver, progress), max_iterations, excluded
-    )
+    search = search_of(campaign, rules, solver, progress)
+    extensions, verdict = search_effects(before, search, max_iterations, excluded)
     if extensions:
         progress(Stage("search for separating experiments"))
         extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
@@ -193,6 +194,11 @@ def close_loop(
     elif verdict.after is not None:
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
+    names = tuple(finding.effect for finding in findings_in(after.model, extensions))
+    alternatives: tuple[Alternatives, ...] = ()
+    if names and is_successful(after.result):
+        progress(Stage("range of laws that explain the records as well"))
+        alternatives = find_alternatives(after.estimate, names, search)
     # Asked for here, so that the time of the loop counts it.
     progress(Stage("free runs of every record"))
     progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
@@ -202,11 +208,12 @@ def close_loop(
         before,
         extensions,
         after,
-        overall_verdict(before, after, len(findings_in(after.model, extensions)), verdict, rules),
+        overall_verdict(before, after, len(names), verdict, rules, alternatives),
         verdict,
         verdict.bounds,
         time.perf_counter() - start,
         rules,
+        alternatives,
     )
 
 
@@ -286,12 +293,20 @@ def held_out_doubt(before: Fit, final: Fit, rules: Rules) -> Doubt:
     return "worse" if rise > 3.0 * 2.0 * math.sqrt(max(rise, 0.0) / last.dof) else "not down to noise"
 
 
-def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules: Rules) -> VerdictWord:
+def overall_verdict(
+    before: Fit,
+    final: Fit,
+    findings: int,
+    last: Verdict,
+    rules: Rules,
+    alternatives: tuple[Alternatives, ...] = (),
+) -> VerdictWord:
     """Give the verdict over all iterations."""
     first, found = before.estimate, final.estimate
     if not findings or not is_successful(final.result):
         return last.verdict
     if findings <= rules.most_at_once and is_good(final, rules):
-        return "partly_explained" if held_out_doubt(before, final, rules) else "found"
+        outdone = any(one.better is not None for one in alternatives)
+        return "partly_explained" if outdone or held_out_doubt(before, final, rules) else "found"
     explained = 1.0 - found.excess / max(first.excess, 1.0)
     return "partly_explained" if explained >= rules.most_of_it else "unexplained"
