@@ -143,7 +143,8 @@ def test_fit_shows_a_line_a_stage_and_verbose_its_steps_as_well(tmp_path, capsys
         assert main(["fit", str(campaign), *option]) in (0, 1)
         shown = capsys.readouterr().err.splitlines()
         names = [line.split(" s  ")[1].split(":")[0] for line in shown]
-        assert {"reading of the campaign", "classical guess", "fit of the declared model"} <= set(names)
+        stages = ("reading of the campaign", "classical guess", "fit of the declared model")
+        assert {f"[{place}/3] {stage}" for place, stage in enumerate(stages, 1)} <= set(names)
         assert ("step 1" not in names) == stages_only
         assert (len(shown) == 3) == stages_only
 
@@ -267,3 +268,103 @@ def test_records_that_contradict_their_declaration_end_with_code_two(command, tm
     assert "wrong sign" in said
     assert "--anyway" in said
     assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def calm_loop(monkeypatch):
+    """Make the loop of the command ask nothing but its first diagnosis, of a few effects."""
+    few = ("coulomb_friction", "dahl_friction", "cubic_damping")
+    others = tuple(name for name in isojax.CATALOGUE if name not in few)
+    find = isojax.close_loop
+    monkeypatch.setattr(
+        "isojax.reporting.close_loop", lambda *args, **options: find(*args, excluded=others, **options)
+    )
+
+
+def stop_at(monkeypatch, place, error):
+    """Let the command fail at its n-th evaluation, as Ctrl-C or kill would end it."""
+    from isojax.identification.fitting import _simulator
+
+    work, calls = _simulator.information, []
+
+    def counted(*args):
+        calls.append(1)
+        if len(calls) == place:
+            raise error
+        return work(*args)
+
+    monkeypatch.setattr(_simulator, "information", counted)
+    return calls
+
+
+@pytest.mark.slow
+def test_an_interrupted_loop_keeps_what_it_did_and_resumes_with_the_same_result(
+    calm_loop, tmp_path, capsys, monkeypatch
+):
+    campaign, out = small_campaign(tmp_path / "campaign", dwells=2), tmp_path / "out"
+    words = ["close-loop", str(campaign), "--out", str(out)]
+    with monkeypatch.context() as patch:
+        stop_at(patch, 8, KeyboardInterrupt())
+        assert main(words) == 130
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    *stages, last = shown.err.splitlines()
+    assert last.startswith("isojax: interrupted; what is finished is kept in ")
+    assert "--resume" in last
+    assert all("[" in line for line in stages)
+    assert [entry.name for entry in out.iterdir()] == [".isojax"]
+    (out / "mine.txt").write_text("mine")
+
+    with monkeypatch.context() as patch:
+        page = {"report.html": "<html></html>"}
+        patch.setattr("isojax.reporting.page._write.page_content", lambda *_: {})
+        patch.setattr("isojax.reporting.page._write.render_pages", lambda *_, **__: page)
+        resumed = stop_at(patch, 0, KeyboardInterrupt())
+        assert main([*words, "--resume", "--json"]) in (0, 1)
+        again = len(resumed)
+        shown = capsys.readouterr()
+        result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+        assert json.loads(shown.out) == result
+        assert "finished computations were kept: going on from there" in shown.err
+        assert "coulomb_friction" in shown.err
+        assert not (out / ".isojax" / "answers").exists()
+
+        assert main([*words, "--quiet"]) in (0, 1)
+        whole = json.loads((out / "result.json").read_text(encoding="utf-8"))
+        assert len(resumed) == again + again + 7
+    assert {**whole, "seconds": 0.0} == {**result, "seconds": 0.0}
+    names = sorted(entry.name for entry in out.iterdir())
+    assert names == [".isojax", "mine.txt", "model.json", "report.html", "result.json"]
+
+    capsys.readouterr()
+    assert main(["fit", str(campaign), "--out", str(out), "--quiet", "--json"]) in (0, 1)
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    (tmp_path / "fit.json").write_text(shown.out, encoding="utf-8")
+    loaded = isojax.load_fit(tmp_path / "fit.json")
+    assert float(loaded.model["mass"]) == 800.0
+    names = sorted(entry.name for entry in out.iterdir())
+    assert names == [".isojax", "fit.txt", "mine.txt", "model.json"]
+
+
+def test_inspect_prints_json_alone(capsys):
+    assert main(["inspect", str(campaign_folder()), "--rate", "500", "--json"]) == 0
+    shown = capsys.readouterr()
+    files = json.loads(shown.out)
+    assert len(files) == 6
+    assert {one["kind"] for one in files} == {"stepped_sine"}
+    assert all(one["channels"][0]["rms"] > 0.0 for one in files)
+    assert "samples" not in files[0]["channels"][0]
+    assert "9 dwells" in shown.err
+
+
+@pytest.mark.parametrize("command", ["close-loop", "fit"])
+def test_results_on_a_full_disk_end_with_code_three_and_the_place(command, tmp_path, capsys, monkeypatch):
+    from isojax._output_folder import KeptElsewhereError
+
+    def full(*_, **__):
+        raise KeptElsewhereError(f"{tmp_path} cannot be written to (No space left on device). See there.")
+
+    monkeypatch.setattr("isojax._cli._read", full)
+    assert main([command, str(campaign_folder()), "--out", str(tmp_path / "out"), "--quiet"]) == 3
+    assert "No space left" in capsys.readouterr().err

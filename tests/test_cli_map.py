@@ -11,6 +11,7 @@ import pytest
 
 import isojax as ij
 from isojax._cli import main
+from isojax.reporting import map_dict
 
 PNG = b"\x89PNG\r\n\x1a\n"
 WINDOW = ["--amplitudes", "100", "400", "4", "--frequencies", "1.5", "3.5", "5"]
@@ -25,7 +26,8 @@ def z_file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def z_map():
-    return ij.stability_map(ij.paper.z_direction(), np.linspace(100, 400, 4), np.linspace(1.5, 3.5, 5))
+    amplitudes, frequencies = np.linspace(100, 400, 4), np.linspace(1.5, 3.5, 5)
+    return ij.stability_map(ij.paper.z_direction(), amplitudes, frequencies, coexisting=True)
 
 
 @pytest.mark.slow
@@ -37,8 +39,14 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
     assert main(["map", z_file, *WINDOW, "--out", str(out), "--quiet"]) == 0
     shown = capsys.readouterr()
     assert shown.err == ""
-    assert sorted(path.name for path in out.iterdir()) == ["map.npz", "map.png", "notes.txt", "response.png"]
-    for name in ("map.png", "response.png"):
+    assert sorted(path.name for path in out.glob("[!.]*")) == [
+        "curves.png",
+        "map.npz",
+        "map.png",
+        "notes.txt",
+        "response.png",
+    ]
+    for name in ("curves.png", "map.png", "response.png"):
         assert (out / name).read_bytes().startswith(PNG)
     with np.load(out / "map.npz", allow_pickle=False) as stored:
         for name in (
@@ -59,9 +67,21 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
     assert "4 amplitudes 100 to 400 N, 5 frequencies 1.5 to 3.5 Hz" in text
     assert "20 in 20 cells" in text
     radius = np.asarray(z_map.spectral_radius)
-    row, column = np.unravel_index(radius.argmax(), radius.shape)
+    assert radius.shape == (1, 4, 5)
+    _, row, column = np.unravel_index(radius.argmax(), radius.shape)
+    assert "nowhere; each cell holds at most one orbit" in text
     assert f"{radius.max():.4f} at {100 * (row + 1)} N, {1.5 + 0.5 * column:g} Hz" in text
     assert "compiling" in text
+
+
+def test_a_map_as_json_holds_what_each_cell_says(z_map):
+    said = json.loads(json.dumps(map_dict(z_map), allow_nan=False))
+    assert said["amplitudes"] == [100.0, 200.0, 300.0, 400.0]
+    np.testing.assert_array_equal(said["spectral_radius"], np.asarray(z_map.spectral_radius)[0])
+    np.testing.assert_array_equal(said["count"], np.asarray(z_map.count))
+    assert said["folds"] is None
+    lost = eqx.tree_at(lambda m: m.spectral_radius, z_map, z_map.spectral_radius.at[:, 0, 0].set(jnp.nan))
+    assert map_dict(lost)["spectral_radius"][0][0] is None
 
 
 @pytest.mark.parametrize(
@@ -110,21 +130,23 @@ def test_map_in_which_nothing_converged_ends_with_code_one_and_says_why(
     z_file, z_map, tmp_path, capsys, monkeypatch
 ):
     blank = jnp.full_like(z_map.spectral_radius, jnp.nan)
-    lost = jnp.zeros(blank.shape, dtype=bool).at[0].set(True)
-    result = jax.vmap(
-        jax.vmap(lambda away: ij.RESULTS.where(away, ij.RESULTS.not_finite, ij.RESULTS.not_converged))
-    )(lost)
+    lost = jnp.zeros(blank.shape, dtype=bool).at[:, 0].set(True)
+
+    def ending(away):
+        return ij.RESULTS.where(away, ij.RESULTS.not_finite, ij.RESULTS.not_converged)
+
+    result = jax.vmap(jax.vmap(jax.vmap(ending)))(lost)
     failed = eqx.tree_at(
         lambda m: (m.spectral_radius, m.response, m.count, m.result),
         z_map,
         (blank, blank, jnp.zeros_like(z_map.count), result),
     )
-    monkeypatch.setattr("isojax._cli.stability_map", lambda *_, **__: failed)
+    monkeypatch.setattr("isojax.stability.stability_map", lambda *_, **__: failed)
     assert main(["map", z_file, *WINDOW, "--out", str(tmp_path), "--quiet"]) == 1
     text = capsys.readouterr().out
     assert "20 cells (15 not converged, 5 left every bound)" in text
     with np.load(tmp_path / "map.npz") as stored:
-        np.testing.assert_array_equal(stored["result"][:, 0], [2, 1, 1, 1])
+        np.testing.assert_array_equal(stored["result"][0, :, 0], [2, 1, 1, 1])
 
 
 @pytest.mark.slow
@@ -132,7 +154,7 @@ def test_nothing_is_written_where_a_picture_fails(z_file, z_map, tmp_path, monke
     def fail(*_, **__):
         raise ValueError("no ink")
 
-    monkeypatch.setattr("isojax._cli.stability_map", lambda *_, **__: z_map)
+    monkeypatch.setattr("isojax.stability.stability_map", lambda *_, **__: z_map)
     monkeypatch.setattr("isojax.reporting.page._map_files.plot_response_map", fail)
     assert main(["map", z_file, *WINDOW, "--out", str(tmp_path / "out"), "--quiet"]) == 2
     assert not (tmp_path / "out").exists()
@@ -146,15 +168,18 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
     for option in (
         "--amplitudes",
         "--frequencies",
-        "--coexisting",
+        "--no-coexisting",
+        "--folds",
         "--out",
         "--checkpoint",
+        "--json",
         "--verbose",
         "--quiet",
     ):
         assert option in shown
     for word in (
         "map.npz",
+        "curves.png",
         "map.png",
         "response.png",
         "folds.png",
@@ -179,7 +204,7 @@ def test_coexisting_map_follows_its_folds_to_both_cusps_and_resumes(tmp_path, ca
         "5",
         "11",
     ]
-    words += ["--coexisting", "--checkpoint", str(tmp_path / "kept")]
+    words += ["--folds", "--checkpoint", str(tmp_path / "kept")]
     assert main([*words, "--out", str(tmp_path / "one")]) == 0
     shown = capsys.readouterr()
     assert "orbits" in shown.err

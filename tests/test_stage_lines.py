@@ -6,39 +6,41 @@ import re
 import pytest
 from rich.console import Console
 
-from isojax._progress import KeyFigure, Stage
-from isojax._stage_lines import stage_lines, step_lines
+from isojax._progress import KeyFigure, Resumed, Stage, before
+from isojax._stage_lines import Pace, stage_lines
 
 LINES = (
-    Stage("classical guess"),
-    Stage("fit"),
+    Stage("classical guess", 1.0, (3.0, 1.0)),
+    Stage("fit", 3.0, (1.0,)),
     "step 1: chi2/dof 118",
     "step 2: chi2/dof [1.02]",
     KeyFigure("chi2/dof 1.02"),
-    Stage("report"),
+    Stage("report", 1.0),
 )
 
 
-def shown(display, terminal=False, lines=LINES):
+def shown(terminal=False, steps=False, lines=LINES):
     """What a display writes, with every number of seconds as 0.0."""
     file = io.StringIO()
-    with display(Console(file=file, width=100, force_terminal=terminal, highlight=False)) as progress:
+    console = Console(file=file, width=100, force_terminal=terminal, highlight=False)
+    with stage_lines(console, steps=steps) as progress:
         for line in lines:
             progress(line)
     return re.sub(r" +\d+\.\d s", "0.0 s", file.getvalue())
 
 
 def test_each_stage_leaves_one_line_with_its_key_figure():
-    expected = ["0.0 s  classical guess", "0.0 s  fit: chi2/dof 1.02", "0.0 s  report"]
-    assert shown(stage_lines).splitlines() == expected
+    expected = ["0.0 s  [1/3] classical guess", "0.0 s  [2/3] fit: chi2/dof 1.02", "0.0 s  [3/3] report"]
+    assert shown().splitlines() == expected
 
 
 def test_verbose_shows_every_line():
-    assert [line.split("s  ")[1] for line in shown(step_lines).splitlines()] == list(map(str, LINES))
+    left = [re.sub(r"^\[./3\] ", "", line.split("s  ")[1]) for line in shown(steps=True).splitlines()]
+    assert left == list(map(str, LINES))
 
 
 def test_a_terminal_shows_the_current_step_and_keeps_only_the_stages():
-    written = shown(stage_lines, terminal=True)
+    written = shown(terminal=True)
     assert "step 2: chi2/dof [1.02]" in written
     kept = [line for line in written.replace("\r", "\n").splitlines() if "chi2/dof 1.02" in line]
     assert len(kept) == 1
@@ -54,3 +56,54 @@ def test_a_stage_that_raises_leaves_no_line_and_hides_no_error():
     with pytest.raises(ValueError, match="bad file"), stage_lines(Console(file=file)) as progress:
         fail(progress)
     assert file.getvalue() == ""
+
+
+class Clock:
+    """Seconds that pass when a test lets them."""
+
+    def __init__(self):
+        self.now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_time_left_is_the_pace_so_far_times_the_share_to_come():
+    clock = Clock()
+    pace = Pace(clock)
+    pace.open(Stage("guess", 2.0, (6.0, 4.0)))
+    clock.now = 10.0
+    assert (pace.place, pace.left, pace.words) == ("[1/3]", None, "")
+    pace.open(Stage("fit", 6.0, (4.0,)))
+    clock.now = 20.0  # 5 s a share: 30 s for this stage, of which 10 are over, and 20 for the next
+    assert (pace.place, pace.left, pace.words) == ("[2/3]", 40.0, "about 40 s left")
+    clock.now = 100.0  # later than was expected, the rest is not less than the stages to come
+    assert pace.left == 20.0
+
+
+def test_what_was_kept_says_nothing_of_the_time_left():
+    clock = Clock()
+    pace = Pace(clock)
+    pace.open(Stage("fit", 6.0, (60.0,)))
+    clock.now = 0.1
+    pace.open(Stage("diagnosis", 60.0))
+    clock.now = 0.2
+    pace.forget()
+    assert pace.left is None
+    clock.now = 60.2
+    pace.open(Stage("report", 30.0))
+    assert pace.left == pytest.approx(30.0)
+
+
+def test_a_resumed_run_says_so_once():
+    lines = (Stage("fit", 1.0), "step 1", Resumed("3 finished computations were kept"), "step 2")
+    assert shown(lines=lines).splitlines() == [
+        "0.0 s  3 finished computations were kept",
+        "0.0 s  [1/1] fit",
+    ]
+
+
+def test_later_stages_of_others_are_counted():
+    heard = []
+    before(heard.append, 30.0)(Stage("free runs", 8.0, (2.0,)))
+    assert (heard[0].share, heard[0].to_come) == (8.0, (2.0, 30.0))

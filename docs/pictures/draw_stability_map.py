@@ -1,4 +1,4 @@
-"""Draw the picture of README.md; `python docs/pictures/draw_stability_map.py` writes it beside itself."""
+"""Draw the picture of README.md and that of the page on maps, and write both beside this script."""
 
 from pathlib import Path
 
@@ -19,3 +19,4 @@ plane, cut = figure.subplots(1, 2)
 ij.plot.stability_map(smap, folds=folds, ax=plane)
 ij.plot.frequency_response(response, ax=cut)
 figure.savefig(Path(__file__).with_name("stability_map.png"), dpi=110)
+ij.plot.response_curves(smap).savefig(Path(__file__).with_name("curves.png"), dpi=90)

@@ -8,67 +8,37 @@ what drives it, `plot` the pictures, `reporting` the tables; the others hold the
 Examples in docstrings assume `import isojax as ij`, `import numpy as np` and JAX's 64-bit mode.
 """
 
-from importlib.metadata import version as _version
-from types import ModuleType as _ModuleType
-from typing import Any as _Any
+import importlib
+import importlib.metadata
+from typing import Any
 
-from . import elements as elements
-from . import excitations as excitations
-from . import identification as identification
-from . import models as models
-from . import paper as paper
-from . import plot as plot
-from . import records as records
-from . import reporting as reporting
-from . import stability as stability
-from ._compiling import compile_quickly as compile_quickly
-from ._results import RESULTS as RESULTS
-from ._results import is_successful as is_successful
-from .excitations import Harmonic as Harmonic
-from .identification import classical_guess as classical_guess
-from .identification import diagnose as diagnose
-from .identification import explain_remainder as explain_remainder
-from .identification import extend as extend
-from .identification import find_separating_experiment as find_separating_experiment
-from .identification import fit as fit
-from .identification import load_fit as load_fit
-from .identification import read_campaign as read_campaign
-from .identification import residual as residual
-from .models import Integrator as Integrator
-from .models import Isolator as Isolator
-from .models import load_model as load_model
-from .models import save_model as save_model
-from .models import simulate as simulate
-from .reporting import close_loop as close_loop
-from .reporting import plots as _plots
-from .stability import backbone_curve as backbone_curve
-from .stability import bifurcation_diagram as bifurcation_diagram
-from .stability import continue_branch as continue_branch
-from .stability import find_periodic_orbit as find_periodic_orbit
-from .stability import fold_curve as fold_curve
-from .stability import frequency_response as frequency_response
-from .stability import harmonic_balance as harmonic_balance
-from .stability import sensitivity as sensitivity
-from .stability import stability_map as stability_map
-from .stability import transmissibility as transmissibility
+import lazy_loader
 
-__version__ = _version("isojax")
+__version__ = importlib.metadata.version("isojax")
 
-_NAMESPACES = (elements, excitations, identification, models, paper, plot, records, reporting, stability)
+# The names listed in __init__.pyi, where type checkers find them too, are imported when they are first used.
+_listed, __dir__, _NAMES = lazy_loader.attach_stub(__name__, __file__)
+
+_ROOMS = (
+    "elements",
+    "excitations",
+    "records",
+    "models",
+    "identification",
+    "stability",
+    "reporting",
+    "reporting.plots",
+)
 
 
-def __dir__() -> list[str]:
-    """Public names: functions and classes of the journey, and the namespaces."""
-    return sorted(
-        name
-        for name, value in globals().items()
-        if not name.startswith("_") and (not isinstance(value, _ModuleType) or value in _NAMESPACES)
-    )
-
-
-def __getattr__(name: str) -> _Any:
-    """Find a name that is not listed here where it lives: `isojax.CubicStiffness`, `isojax.plot_record`."""
-    for room in (elements, excitations, records, models, identification, stability, reporting, _plots):
-        if not name.startswith("_") and name in vars(room):
-            return vars(room)[name]
+def __getattr__(name: str) -> Any:
+    """Find a name that is not listed where it lives: `isojax.CubicStiffness`, `isojax.plot_record`."""
+    if name in _NAMES:
+        return _listed(name)
+    for room in _ROOMS if not name.startswith("_") else ():
+        found = vars(importlib.import_module(f"{__name__}.{room}"))
+        if name in found:
+            return found[name]
+    if name in globals():
+        return globals()[name]  # a folder that a room imports, such as `health`
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,63 +2,38 @@
 
 import argparse
 import contextlib
+import json
 import math
 import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import jax
-import numpy as np
-from rich.console import Console
-from rich.text import Text
+from ._arguments import MAP_STEPS, command_line
+from ._interrupt import INTERRUPTED, prompt_interrupt
+from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
+from ._progress import LOOP_SHARES, KeyFigure, Notice, Stage, before, silent, watched
 
-from . import plot
-from ._compiling import compile_quickly
-from ._progress import KeyFigure, Stage
-from ._results import is_successful
-from ._stage_lines import stage_lines, step_lines
-from .demo import campaign_folder
-from .identification import Fit, classical_guess, fit, read_campaign, silent
-from .models import load_model
-from .records import (
-    Campaign,
-    draft_campaign,
-    find_data_files,
-    find_suspicions,
-    inspect_file,
-    refuse_contradictions,
-)
-from .reporting import (
-    catalogue_table,
-    check_first_words,
-    check_folder,
-    close_loop,
-    compile_seconds,
-    folds_around,
-    inspection_summary,
-    loop_summary,
-    map_summary,
-    model_text,
-    png_bytes,
-    write_map,
-    write_texts,
-)
-from .stability import stability_map
+if TYPE_CHECKING:
+    import numpy as np
+    from rich.console import Console
+
+    from .identification import Fit
+    from .records import Campaign
+
+# Each command imports what it needs when it needs it: a bad argument or file is refused before JAX or
+# matplotlib has started.
 
 _TERMINAL = 120
 
 _NOT_CONVERGED = 1
 
-_MAP_STEPS = 200
-"""Values along each side of a map, if omitted."""
+_WRITTEN_ELSEWHERE = 3
 
-_EXIT_CODES = (
-    "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
-    "argument or a file is bad, or the records contradict campaign.toml; nothing is written then."
-)
+_READING, _REPORT = 2.0, 30.0
+"""Usual shares of the time of a loop, beside `LOOP_SHARES`."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -69,214 +44,218 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit code: 0, 1 where the fit or every cell of the map did not converge (what was found is written all
-        the same), or 2 where an argument or a file is bad.
+        the same), 2 where an argument or a file is bad, 3 where the results had to be written elsewhere, 130
+        after Ctrl-C.
     """
+    commands = {"inspect": _inspect, "close-loop": _close_loop, "fit": _fit, "map": _map, "effects": _effects}
+    asked = command_line(commands).parse_args(arguments)
+    asked.kept = lambda: "nothing is written"
+    try:
+        with prompt_interrupt(lambda: f"interrupted; {asked.kept()}"):
+            return asked.run(asked)
+    except (ValueError, OSError) as error:
+        print(f"isojax: {' '.join(str(error).split())}", file=sys.stderr)
+        return _WRITTEN_ELSEWHERE if isinstance(error, KeptElsewhereError) else 2
+    except KeyboardInterrupt:
+        print(f"isojax: interrupted; {asked.kept()}", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _start_jax() -> None:
+    """Set how JAX computes and compiles, before it is first asked to."""
+    import jax
+
+    from ._compiling import compile_quickly
+
     jax.config.update("jax_enable_x64", True)
     compile_quickly()
     cache = os.environ.get("ISOJAX_CACHE")
     if cache:
         jax.config.update("jax_compilation_cache_dir", cache)
-    asked = _parser().parse_args(arguments)
-    try:
-        return asked.run(asked)
-    except (ValueError, OSError) as error:
-        print(f"isojax: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="isojax",
-        description="Identify a nonlinear vibration isolator from time histories; name what its model lacks; "
-        "map the stability of its periodic response.",
-        epilog=f"{_EXIT_CODES} ISOJAX_CACHE names a folder in which compiled code is kept between runs.",
-    )
-    parser.add_argument("--version", action="version", version=f"isojax {version('isojax')}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-
-    seen = commands.add_parser(
-        "inspect",
-        help="list what is in data files, draft a campaign.toml",
-        description="List channels, units, ranges, rates, flaws and the kind of excitation of data files "
-        "that no campaign.toml describes yet. Units and quantities come from headings and names.",
-        epilog=_EXIT_CODES,
-    )
-    seen.add_argument("files", nargs="+", metavar="FILE", help="data files, or folders of them")
-    seen.add_argument(
-        "--rate", type=float, metavar="HZ", help="samples per second, where no file states them"
-    )
-    seen.add_argument(
-        "--picture", metavar="PATH", help="draw drive, response and spectra of each file (.png)"
-    )
-    seen.add_argument(
-        "--draft", metavar="PATH", help="write a campaign.toml there, each guess of it marked `# guessed`"
-    )
-    seen.set_defaults(run=_inspect)
-
-    loop = commands.add_parser("close-loop", help="fit, name what is missing, add it, report")
-    _campaign(loop)
-    loop.add_argument(
-        "--out",
-        required=True,
-        metavar="DIR",
-        help="where report.html, result.json and model.json go (no model after a failed fit)",
-    )
-    _shown(loop)
-    loop.set_defaults(run=_close_loop)
-
-    single = commands.add_parser("fit", help="fit the declared model and print its report")
-    _campaign(single)
-    single.add_argument(
-        "--out", metavar="DIR", help="where model.json (not after a failed fit) and fit.txt go"
-    )
-    _shown(single)
-    single.set_defaults(run=_fit)
-
-    plane = commands.add_parser(
-        "map",
-        help="find the periodic orbits over drive amplitude and frequency, and whether they are stable",
-        description="Find the periodic orbits of a model over a grid of drive amplitude and frequency, and "
-        "their Floquet multipliers. Writes map.npz (all arrays, SI units), map.png (largest multiplier), "
-        "response.png and, where orbits coexist, folds.png; prints a summary.",
-        epilog=_EXIT_CODES,
-    )
-    plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
-    _axis(plane, "amplitudes", "drive amplitudes [N, or m/s^2 for base excitation]")
-    _axis(plane, "frequencies", "drive frequencies [Hz]")
-    plane.add_argument(
-        "--coexisting", action="store_true", help="all orbits of a cell, not only that of the smallest motion"
-    )
-    plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
-    plane.add_argument(
-        "--checkpoint",
-        metavar="DIR",
-        help="keep finished chunks here; a run that was killed goes on from them",
-    )
-    _shown(plane)
-    plane.set_defaults(run=_map)
-
-    effects = commands.add_parser("effects", help="list the effects that can be named")
-    effects.set_defaults(run=lambda asked: _effects())
-
-    demo = commands.add_parser("demo", help="close-loop on the campaign in the package")
-    demo.add_argument("--out", default="isojax-demo", metavar="DIR", help="default: ./isojax-demo")
-    _shown(demo)
-    demo.set_defaults(run=_close_loop, campaign=campaign_folder(), anyway=False)
-    return parser
-
-
-def _campaign(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("campaign", metavar="CAMPAIGN", help="campaign.toml or its folder")
-    parser.add_argument(
-        "--anyway", action="store_true", help="fit even where the records contradict their declaration"
-    )
-
-
-def _shown(parser: argparse.ArgumentParser) -> None:
-    shown = parser.add_mutually_exclusive_group()
-    shown.add_argument(
-        "--verbose", action="store_true", help="a line for every step, not only for every stage"
-    )
-    shown.add_argument("--quiet", action="store_true", help="no lines of progress")
-
-
-def _axis(parser: argparse.ArgumentParser, name: str, words: str) -> None:
-    parser.add_argument(
-        f"--{name}",
-        required=True,
-        nargs="+",
-        metavar=("START STOP", "COUNT"),
-        help=f"{words}; COUNT equal steps apart, {_MAP_STEPS} if omitted",
-    )
 
 
 def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Callable[[str], None]]:
     """Give what shows progress on stderr: a line a stage, every step of it, or nothing."""
-    console = Console(stderr=True, highlight=False)
+    from rich.console import Console
+
+    from ._stage_lines import stage_lines
+
     if asked.quiet:
         return contextlib.nullcontext(silent)
-    return step_lines(console) if asked.verbose else stage_lines(console)
+    return stage_lines(Console(stderr=True, highlight=False), steps=asked.verbose)
 
 
-def _results() -> Console:
-    """Give what shows results; where no terminal reports its width, wide enough for every table."""
-    return Console(highlight=False, width=None if sys.stdout.isatty() else _TERMINAL)
+def _results(asked: argparse.Namespace) -> "Console":
+    """Give what shows results; where no terminal reports its width, wide enough for every table.
+
+    Where the result itself is printed words go to stderr, or nowhere where they are not wanted.
+    """
+    from rich.console import Console
+
+    out = sys.stderr if asked.json else sys.stdout
+    quiet = asked.json and getattr(asked, "quiet", False)
+    return Console(file=out, highlight=False, width=None if out.isatty() else _TERMINAL, quiet=quiet)
+
+
+def _print_json(asked: argparse.Namespace, content: Callable[[], object]) -> None:
+    if asked.json:
+        print(json.dumps(content(), indent=1, allow_nan=False))
 
 
 def _inspect(asked: argparse.Namespace) -> int:
+    from .records import draft_campaign, find_data_files, inspect_file
+
     if asked.rate is not None and not 0.0 < asked.rate < math.inf:
         raise ValueError(f"--rate must be a finite number above 0 [Hz], but is {asked.rate:g}.")
-    targets = [Path(one) for one in (asked.picture, asked.draft) if one is not None]
-    for target in targets:
-        check_folder(target.parent)
     if asked.draft is not None and Path(asked.draft).exists():
         raise ValueError(f"--draft {asked.draft} exists already; it is not overwritten.")
     found, schedules = find_data_files(asked.files)
     files = [inspect_file(file, asked.rate) for file in found]
-    _results().print(inspection_summary(files))
+
+    from . import plot
+    from ._read_campaign import read_campaign
+    from .models import write_whole
+    from .reporting import inspection_dict, inspection_summary, png_bytes
+
+    for target in (Path(one) for one in (asked.picture, asked.draft) if one is not None):
+        check_folder(target.parent)
+    console = _results(asked)
+    console.print(inspection_summary(files))
+    _print_json(asked, lambda: [inspection_dict(one) for one in files])
     if asked.draft is not None:
         draft = Path(asked.draft)
-        write_texts(draft.parent, {draft.name: draft_campaign(files, draft.parent, schedules)})
+        drafted = draft_campaign(files, draft.parent, schedules)
+        draft.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(draft, drafted)
         try:
-            measured = read_campaign(draft)
-            print(f"{draft}: {len(measured.records)} records are read by it. Check what it says was guessed.")
+            count = len(read_campaign(draft).records)
+            _say(console, f"{draft}: {count} records are read by it. Check what it says was guessed.")
         except ValueError as error:
-            print(f"{draft} is written, but must be mended: {error}")
+            _say(console, f"{draft} is written, but must be mended: {error}")
     if asked.picture is not None:
         picture = Path(asked.picture)
-        write_texts(picture.parent, {picture.name: png_bytes(plot.inspection(files))})
-        print(f"see {asked.picture}")
+        drawn = png_bytes(plot.inspection(files))
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(picture, drawn)
+        _say(console, f"see {asked.picture}")
     return 0
 
 
+def _say(console: "Console", words: str) -> None:
+    from rich.text import Text
+
+    console.print(Text(words), soft_wrap=True)
+
+
 def _close_loop(asked: argparse.Namespace) -> int:
-    begin, folder = time.perf_counter(), check_folder(asked.out)
-    with _progress(asked) as progress:
+    from .records import refuse_contradictions
+
+    begin = time.perf_counter()
+    with output_folder(asked.out) as folder, _progress(asked) as progress:
+        progress(Stage("reading of the campaign", _READING, (*LOOP_SHARES, _REPORT)))
         measured = _read(asked.campaign, progress)
-        loop = close_loop(measured, progress=progress, anyway=asked.anyway)
-        progress(Stage("report"))
-        loop.report(folder)
-    console = _results()
+        if not asked.anyway:
+            refuse_contradictions(measured)
+
+        from .reporting import close_loop, loop_summary, result_dict
+
+        _start_jax()
+        kept = _kept(asked, folder, progress)
+        try:
+            loop = close_loop(measured, progress=before(progress, _REPORT), anyway=True, checkpoint=kept)
+        except ValueError:
+            discard(folder)  # the same would be refused again
+            raise
+        progress(Stage("report", _REPORT))
+        with watched(progress):
+            loop.report(folder, markdown=asked.markdown)
+        discard(folder)
+        asked.kept = lambda: f"the results are in {folder}"
+    console = _results(asked)
     console.print(loop_summary(loop.loop))
-    console.print(Text(f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}"))
+    _say(console, f"{time.perf_counter() - begin:.1f} s with compiling; see {folder / 'report.html'}")
+    _print_json(asked, lambda: result_dict(loop.loop, loop.health))
     return _exit_code(loop.after)
 
 
-def _read(campaign: str | Path, progress: Callable[[str], None]) -> Campaign:
-    progress(Stage("reading of the campaign"))
+def _kept(asked: argparse.Namespace, folder: Path, progress: Callable[[str], None]) -> Path:
+    """Give the file in which the loop keeps its answers; those of an earlier run only where asked for."""
+    kept = kept_file(folder)
+    if asked.resume and not kept.exists():
+        progress(Notice(f"no unfinished run is kept in {folder}: beginning anew"))
+    if kept.exists() and not asked.resume:
+        progress(Notice(f"what an unfinished run kept in {folder} is not used without --resume"))
+        discard(folder)
+    asked.kept = lambda: (
+        f"what is finished is kept in {folder}; --resume goes on from there"
+        if kept.exists()
+        else "nothing is written"
+    )
+    return kept
+
+
+def _read(campaign: str | Path, progress: Callable[[str], None]) -> "Campaign":
+    from ._read_campaign import read_campaign
+
     measured = read_campaign(campaign)
     progress(KeyFigure(f"{len(measured.records)} records read"))
     return measured
 
 
 def _fit(asked: argparse.Namespace) -> int:
-    begin = time.perf_counter()
-    folder = None if asked.out is None else check_folder(asked.out)
-    with _progress(asked) as progress:
+    from .records import find_suspicions, refuse_contradictions
+
+    begin, guessing, fitting = time.perf_counter(), *LOOP_SHARES[:2]
+    where = contextlib.nullcontext(None) if asked.out is None else output_folder(asked.out)
+    with where as folder, _progress(asked) as progress:
+        progress(Stage("reading of the campaign", _READING, (guessing, fitting)))
         measured = _read(asked.campaign, progress)
         if not asked.anyway:
             refuse_contradictions(measured)
-        progress(Stage("classical guess"))
+
+        from .identification import classical_guess, fit, fit_report
+        from .reporting import check_first_dicts, check_first_words, model_text, write_model_files
+
+        _start_jax()
+        progress(Stage("classical guess", guessing, (fitting,)))
         guess = classical_guess(measured)
         progress(KeyFigure(" ".join(guess.notes)))
-        progress(Stage("fit of the declared model"))
+        progress(Stage("fit of the declared model", fitting))
         fitted = fit(guess.model, measured, progress=progress, anyway=asked.anyway)
         progress(KeyFigure(f"chi2/dof {fitted.stats.chi2 / fitted.stats.dof:.4g}"))
-    report = "\n".join((*check_first_words(find_suspicions(measured)), str(fitted)))
-    if folder is not None:
-        write_texts(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
-    print(report)
-    print(f"{time.perf_counter() - begin:.1f} s with compiling")
+        report = "\n".join((*check_first_words(find_suspicions(measured)), fit_report(fitted)))
+        if folder is not None:
+            write_model_files(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
+    console = _results(asked)
+    _say(console, report)
+    _say(console, f"{time.perf_counter() - begin:.1f} s with compiling")
+    _print_json(
+        asked, lambda: {"check_first": check_first_dicts(find_suspicions(measured))} | fitted.to_dict()
+    )
     return _exit_code(fitted)
 
 
 def _map(asked: argparse.Namespace) -> int:
-    folder, model = check_folder(asked.out), load_model(asked.model)
     amplitudes = _values("--amplitudes", asked.amplitudes)
     frequencies = _values("--frequencies", asked.frequencies)
+    _start_jax()
+
+    from .models import load_model
+
+    model = load_model(asked.model)
+
+    import numpy as np
+
+    from .reporting import folds_around, map_dict, map_summary, write_map
+    from .stability import stability_map
+
     seconds, watch = {}, _stopwatch()
-    with _progress(asked) as progress:
-        progress(Stage("periodic orbits over drive amplitude and frequency"))
+    with output_folder(asked.out) as folder, _progress(asked) as progress:
+        if asked.checkpoint is not None:
+            asked.kept = lambda: (
+                f"finished chunks are kept in {asked.checkpoint}; the same command goes on from them"
+            )
+        progress(Stage("periodic orbits over drive amplitude and frequency", to_come=(0.0,)))
         smap = stability_map(
             model,
             amplitudes,
@@ -289,24 +268,28 @@ def _map(asked: argparse.Namespace) -> int:
         progress(KeyFigure(f"{smap.count.size} cells, {several} with several orbits"))
         seconds["map"] = watch()
         folds = None
-        if several:
-            progress(Stage("folds around the cells with several orbits"))
+        if several and asked.folds:
+            progress(Stage("folds around the cells with several orbits", to_come=(0.0,)))
             folds = folds_around(smap)
             seconds["folds"] = watch()
         progress(Stage("pictures"))
         written = write_map(smap, folder, folds=folds)
         seconds["pictures"] = watch()
-    print(map_summary(smap, folds=folds, seconds=seconds))
-    print(f"see {', '.join(str(folder / name) for name in written)}")
+    console = _results(asked)
+    _say(console, map_summary(smap, folds=folds, seconds=seconds))
+    _say(console, f"see {', '.join(str(folder / name) for name in written)}")
+    _print_json(asked, lambda: map_dict(smap, folds))
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
 
 
-def _values(option: str, words: Sequence[str]) -> np.ndarray:
+def _values(option: str, words: Sequence[str]) -> "np.ndarray":
     """Give the values along one side of a map."""
+    import numpy as np
+
     start, stop, count = math.nan, math.nan, 0
     if 2 <= len(words) <= 3:
         with contextlib.suppress(ValueError):
-            start, stop, count = float(words[0]), float(words[1]), int((*words, _MAP_STEPS)[2])
+            start, stop, count = float(words[0]), float(words[1]), int((*words, MAP_STEPS)[2])
     if count < 2 or not 0.0 < start < stop < math.inf:
         raise ValueError(
             f"{option} must be START STOP [COUNT], two ascending positive numbers and a count of at least 2, "
@@ -317,6 +300,8 @@ def _values(option: str, words: Sequence[str]) -> np.ndarray:
 
 def _stopwatch() -> Callable[[], tuple[float, float]]:
     """Give what measures the seconds since its last call: compiling, and everything else."""
+    from .reporting import compile_seconds
+
     last = [compile_seconds(), time.perf_counter()]
 
     def watch() -> tuple[float, float]:
@@ -328,10 +313,14 @@ def _stopwatch() -> Callable[[], tuple[float, float]]:
     return watch
 
 
-def _exit_code(fitted: Fit) -> int:
+def _exit_code(fitted: "Fit") -> int:
+    from ._results import is_successful
+
     return 0 if is_successful(fitted.result) else _NOT_CONVERGED
 
 
-def _effects() -> int:
-    _results().print(catalogue_table())
+def _effects(asked: argparse.Namespace) -> int:
+    from .reporting import catalogue_table
+
+    _results(asked).print(catalogue_table())
     return 0

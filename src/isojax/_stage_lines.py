@@ -9,7 +9,7 @@ from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextCol
 from rich.table import Column
 from rich.text import Text
 
-from ._progress import KeyFigure, Stage
+from ._progress import KeyFigure, Notice, Resumed, Stage
 
 
 def _seconds(elapsed: float) -> str:
@@ -23,32 +23,109 @@ class _Elapsed(ProgressColumn):
         return Text(_seconds(task.elapsed or 0.0))
 
 
+class Pace:
+    """Where a task stands: which stage of how many, and how long the rest will take.
+
+    The time left is that of the stages that are over, times the usual share of what is to come over theirs.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter):
+        """Begin before the first stage.
+
+        Args:
+            clock: gives seconds.
+        """
+        self._clock = clock
+        self._stage = Stage("")
+        self._opened = clock()
+        self._begun = 0
+        self._over = self._spent = 0.0
+
+    def open(self, stage: Stage) -> None:
+        """Close the stage that is open, and open another.
+
+        Args:
+            stage: the other.
+        """
+        if self._stage.share > 0.0:
+            self._over += self._stage.share
+            self._spent += self._clock() - self._opened
+        self._stage, self._opened, self._begun = stage, self._clock(), self._begun + 1
+
+    def forget(self) -> None:
+        """Begin to measure here: what came before took no time."""
+        self._over, self._spent, self._opened = 0.0, 0.0, self._clock()
+
+    @property
+    def place(self) -> str:
+        """The stage that is open and how many there are, as far as is known, such as "[3/8]"."""
+        return f"[{self._begun}/{self._begun + len(self._stage.to_come)}]"
+
+    @property
+    def left(self) -> float | None:
+        """Seconds that are left [s]; None before a stage is over whose share is known."""
+        if self._over == 0.0 or self._stage.share + sum(self._stage.to_come) == 0.0:
+            return None
+        pace = self._spent / self._over
+        here = max(0.0, pace * self._stage.share - (self._clock() - self._opened))
+        return here + pace * sum(self._stage.to_come)
+
+    @property
+    def words(self) -> str:
+        """The time left in words, such as "about 2 min left"; "" where nobody knows."""
+        left = self.left
+        if left is None:
+            return ""
+        rounded = f"{left / 60.0:.0f} min" if left >= 90.0 else f"{max(5.0, 5.0 * round(left / 5.0)):.0f} s"
+        return f"about {rounded} left"
+
+
+class _Left(ProgressColumn):
+    """Time left of the whole task."""
+
+    def __init__(self, pace: Pace):
+        """Take what knows it."""
+        self._pace = pace
+        super().__init__(Column(no_wrap=True))
+
+    def render(self, task: Task) -> Text:
+        return Text(self._pace.words, style="dim")
+
+
 @contextmanager
-def stage_lines(console: Console) -> Iterator[Callable[[str], None]]:
+def stage_lines(console: Console, steps: bool = False) -> Iterator[Callable[[str], None]]:
     """Give what shows one line for each stage, with its seconds and its key figure once it is over.
 
-    On a terminal the current stage has a live line, which ends with its latest step. Elsewhere a stage shows
-    nothing before it is over. A stage that raises leaves no line.
+    On a terminal the current stage has a live line, with the time that is left and its latest step. Elsewhere
+    a stage shows nothing before it is over. A stage that raises leaves no line.
 
     Args:
         console: where to show them.
+        steps: whether every line of progress is left as it comes, with the seconds since the start, and not
+            only one for each stage.
 
     Yields:
         A callable that takes a line of progress.
     """
+    pace = Pace()
     shortened = Column(no_wrap=True, overflow="ellipsis")
     columns = (
         _Elapsed(Column(no_wrap=True)),
         SpinnerColumn(),
         TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True)),
+        _Left(pace),
         TextColumn("{task.fields[step]}", style="dim", markup=False, table_column=shortened),
     )
-    stage, figure, opened = "", "", time.perf_counter()
+    begin = opened = time.perf_counter()
+    stage, figure = "", ""
+
+    def leave(words: str, since: float) -> None:
+        line = f"{_seconds(time.perf_counter() - since)}  {words}"
+        console.print(Text(line, style="dim"), soft_wrap=True)
 
     def close() -> None:
-        if stage:
-            line = f"{_seconds(time.perf_counter() - opened)}  {stage}"
-            console.print(Text(f"{line}: {figure}" if figure else line, style="dim"), soft_wrap=True)
+        if stage and not steps:
+            leave(f"{stage}: {figure}" if figure else stage, opened)
 
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
         task = live.add_task("", step="")
@@ -57,30 +134,18 @@ def stage_lines(console: Console) -> Iterator[Callable[[str], None]]:
             nonlocal stage, figure, opened
             if isinstance(line, Stage):
                 close()
-                stage, figure, opened = line, "", time.perf_counter()
-                live.reset(task, description=line, step="")
+                pace.open(line)
+                line = stage = f"{pace.place} {line}"
+                figure, opened = "", time.perf_counter()
+                live.reset(task, description=stage, step="")
             elif isinstance(line, KeyFigure):
                 figure = line
             else:
+                if isinstance(line, Resumed):
+                    pace.forget()
                 live.update(task, step=line, refresh=True)
+            if steps or isinstance(line, Notice):
+                leave(line, begin)
 
         yield show
         close()
-
-
-@contextmanager
-def step_lines(console: Console) -> Iterator[Callable[[str], None]]:
-    """Give what shows every line of progress, steps as well, with the seconds since the start.
-
-    Args:
-        console: where to show them.
-
-    Yields:
-        A callable that takes a line of progress.
-    """
-    begin = time.perf_counter()
-
-    def show(line: str) -> None:
-        console.print(Text(f"{_seconds(time.perf_counter() - begin)}  {line}", style="dim"), soft_wrap=True)
-
-    yield show

@@ -71,7 +71,7 @@ def test_without_leave_to_add_a_missing_effect_is_named_and_not_called_found(tmp
     loop = close_loop(written(tmp_path, "impulse", '["linear"]'), max_iterations=0)
     assert loop.verdict == "unexplained"
     assert loop.findings == ()
-    assert "cubic spring explains it best, but no effect might be added" in str(loop)
+    assert "Cubic spring explains it best but was not added" in str(loop)
     with pytest.raises(ValueError, match="`max_iterations` must be 0 or more, but is -1"):
         close_loop(loop.loop.campaign, max_iterations=-1)
 

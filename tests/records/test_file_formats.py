@@ -138,7 +138,7 @@ def test_a_missing_extra_is_named(
     folder = tiny(("run.csv", f"run{ending}"))
     FORMATS[ending](folder / f"run{ending}", channels)
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(ValueError, match=r"pip install 'isojax\[io\]'.*pip install '\.\[io\]'"):
+    with pytest.raises(ValueError, match=r'needs the package .*: python -m pip install "isojax\[io\]"$'):
         read_campaign(folder)
 
 

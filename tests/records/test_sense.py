@@ -1,5 +1,6 @@
 """Nonsense is named before a fit: campaigns of the simulated rig, each with one mistake."""
 
+import dataclasses
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from isojax import fit, read_campaign, rig
+from isojax.demo import campaign_folder
 from isojax.identification import classical_guess
 from isojax.records import Campaign, Suspicion, find_suspicions
 
@@ -137,6 +139,19 @@ def test_a_wrong_sign_is_named(right, spoiled, plan, output, channel):
     campaign = read_campaign(spoiled(right(plan, output), data=times(column, -1.0)))
     assert names(campaign) == ["sign"]
     assert first(campaign).causes[0].line == "[input] gain = -1"
+
+
+def test_one_odd_record_among_right_ones_is_named_whatever_its_role():
+    campaign = read_campaign(campaign_folder())
+    assert find_suspicions(campaign) == ()
+    assert {record.role for record in campaign.records} == {"fit", "holdout"}
+    for place in (0, next(i for i, one in enumerate(campaign.records) if one.role == "holdout")):
+        record = campaign.records[place]
+        flipped = dataclasses.replace(record, input=-record.input)
+        records = (*campaign.records[:place], flipped, *campaign.records[place + 1 :])
+        (found,) = find_suspicions(dataclasses.replace(campaign, records=records))
+        assert (found.where, found.contradicts) == (record.name, True)
+        assert [cause.name for cause in found.causes] == ["sign of one record"]
 
 
 @pytest.mark.parametrize(("plan", "output"), SOME)

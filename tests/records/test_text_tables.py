@@ -234,3 +234,35 @@ def test_whatever_the_bytes_are_the_reader_gives_numbers_or_a_value_error(
         for name, column in read_text_columns(file, None).items():
             again = read_text_columns(file, [name])[name]
             np.testing.assert_array_equal(again.samples, column.samples)
+
+
+@pytest.mark.parametrize(
+    ("separator", "clock"),
+    [
+        (",", "%H:%M:%S.%f"),
+        (";", "%Y-%m-%d %H:%M:%S.%f"),
+        ("\t", "%Y-%m-%dT%H:%M:%S.%fZ"),
+        ("   ", "%H:%M:%S.%f"),
+    ],
+)
+def test_times_of_day_are_seconds_since_the_first_over_midnight(
+    separator: str, clock: str, tmp_path: Path
+) -> None:
+    times = pd.Timestamp("2026-03-05 23:59:58.5") + pd.to_timedelta(np.arange(40) * 125, unit="ms")
+    rows = [f"{one.strftime(clock)}{separator}{i % 7}{separator}{i % 5}.5" for i, one in enumerate(times)]
+    file = tmp_path / "run.csv"
+    file.write_text("\n".join([separator.join(("time", "force", "a")), *rows]) + "\n")
+    columns = read_text_columns(file, ["time", "a"])
+    np.testing.assert_allclose(columns["time"].samples, np.arange(40) / 8.0, atol=1e-6)
+    assert columns["time"].unit == "s"
+    np.testing.assert_array_equal(columns["a"].samples, np.arange(40) % 5 + 0.5)
+
+
+def test_one_column_of_decimal_commas_is_one_column(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text("force [N]\n1,5\n-2,25\n3,0e1\n0,5\n")
+    columns = read_text_columns(file, None)
+    assert {name: one.unit for name, one in columns.items()} == {"force [N]": "N"}
+    np.testing.assert_array_equal(columns["force [N]"].samples, [1.5, -2.25, 30.0, 0.5])
+    file.write_text("force,a\n1,5\n2,25\n3,0\n")
+    assert list(read_text_columns(file, None)) == ["force", "a"]

@@ -60,11 +60,11 @@ def found(campaign):
 
 @pytest.fixture(scope="session")
 def written(found, tmp_path_factory):
-    """The folder of the report of that loop, which held a file before."""
+    """The folder of the report of that loop, with Markdown, which held a file before."""
     folder = tmp_path_factory.mktemp("report") / "out"
     folder.mkdir()
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
-    write_report(found, folder)
+    write_report(found, folder, markdown=True)
     return folder
 
 

@@ -49,6 +49,8 @@ def test_every_plot_draws_on_the_axes_it_is_given_and_labels_them(found, name):
     assert ax.get_ylabel() or name == "ranking"
     assert ax.lines or ax.collections or ax.patches
     figure.canvas.draw()
+    legend = ax.get_legend()
+    assert legend is None or not ax.bbox.padded(-1.0).overlaps(legend.get_window_extent())
 
 
 @pytest.mark.parametrize("name", ["time_history", "restoring_force", "errors"])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from isojax import RESULTS
-from isojax.identification import uncertainty
+from isojax.identification import fit_report, uncertainty
+from isojax.identification.fitting._fit_result import _within
 from isojax.records import data_health
 from isojax.reporting.words._sentences import health_words
 
@@ -42,6 +43,23 @@ def test_report_lists_strong_correlations_only(found):
     assert first in lines[0]
     assert second in lines[0]
     assert abs(float(lines[0].rpartition("=")[2])) == pytest.approx(0.95, abs=0.01)
+
+
+def test_printed_report_cuts_its_longest_lists_to_the_lines_there_are():
+    sizes = {"Model": 3, "Coefficients": 20, "Correlations": 30, "None": 0}
+    sections = [(title, [title[0]] * count) for title, count in sizes.items()]
+    assert _within(sections, 56) == sections
+    printed = dict(_within(sections, 30))
+    assert printed["Model"] == ["M"] * 3
+    assert printed["None"] == []
+    assert len(printed["Coefficients"]) == 1 + printed["Coefficients"].count("C")
+    assert printed["Coefficients"][-1] == f"... and {20 - printed['Coefficients'].count('C')} more"
+    assert printed["Correlations"][-1] == f"... and {30 - printed['Correlations'].count('C')} more"
+    assert sum(map(len, printed.values())) + 3 == 30
+
+
+def test_printed_report_is_the_whole_one_where_it_is_short(found):
+    assert str(found.after) == fit_report(found.after)
 
 
 def test_report_names_partners_that_the_data_cannot_part(found):

@@ -47,10 +47,12 @@ def test_dry_friction_is_pursued_as_a_force_that_opposes_the_velocity(unexplaine
 @pytest.mark.slow
 def test_the_page_has_the_section_with_its_pictures(unexplained):
     page = render_page(unexplained)
-    section = page.partition("<h2>Unexplained residual</h2>")[2].partition("<h2>")[0]
-    assert section.count("data:image/png;base64,") == 4
-    assert "no finding" in section
-    assert re.search(r"selected from \d+ free laws, would explain [\d.]+ % of it", section)
+    sentence = page.partition('<h2 id="residual">Unexplained residual</h2>')[2].partition("<h2")[0]
+    assert "no finding" in sentence
+    assert re.search(r"selected from \d+ free laws, would explain [\d.]+ % of it", sentence)
+    detail = page.partition('id="residual-detail"')[2].partition("</details>")[0]
+    assert detail.count("data:image/png;base64,") == 4
+    assert "<details open>" in page
 
 
 def test_the_terminal_says_it_in_a_few_lines(unexplained):

@@ -107,10 +107,11 @@ def test_failed_fit_is_written_with_nulls_and_said_in_the_report(plain, tmp_path
 
 
 def test_files_come_together_and_others_stay(found, written):
-    assert sorted(path.name for path in written.iterdir()) == [
+    assert sorted(path.name for path in written.glob("[!.]*") if path.suffix != ".png") == [
         "model.json",
         "notes.txt",
         "report.html",
+        "report.md",
         "result.json",
     ]
     assert (written / "notes.txt").read_text(encoding="utf-8") == "mine"

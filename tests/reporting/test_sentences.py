@@ -7,6 +7,7 @@ from isojax.elements import StribeckFriction
 from isojax.identification import DriftBudget, Errors, Fit
 from isojax.identification._close_loop import overall_verdict
 from isojax.records import NoisePeak, Spikes, data_health
+from isojax.records.noise._health import UnsettledDwell
 from isojax.reporting import render_text, verdict_summary
 from isojax.reporting.words._health_words import budget_words
 from isojax.reporting.words._sentences import caveats, finding_words, headline, health_words
@@ -26,7 +27,7 @@ from isojax.reporting.words._sentences import caveats, finding_words, headline, 
 def test_headline_says_what_the_verdict_says(found, verdict, start):
     sentence = headline(dataclasses.replace(found, verdict=verdict))
     assert sentence.startswith(start)
-    assert ("something else is too" in sentence) == (verdict == "partly_explained")
+    assert ("something else is missing too" in sentence) == (verdict == "partly_explained")
     assert sentence.endswith(".")
 
 
@@ -91,7 +92,7 @@ def test_more_than_two_findings_of_a_good_fit_are_said_to_explain_it(found):
     (step,) = found.extensions
     sentence = headline(dataclasses.replace(found, extensions=(step,) * 3, verdict="partly_explained"))
     assert "explain the records together" in sentence
-    assert "something else is too" not in sentence
+    assert "something else is missing too" not in sentence
 
 
 def test_finding_without_rivals_asks_for_no_experiment(found):
@@ -109,9 +110,14 @@ def test_caveats_name_what_is_declared_and_what_is_hidden(found):
 
 
 def test_health_counts_dwells_and_gives_the_noise(found):
-    text = " ".join(health_words(data_health(found.campaign), found.after))
-    dwells = sum(len(record.dwells) for record in found.campaign.records)
-    assert f"of {dwells} dwells never settled" in text
+    health = data_health(found.campaign)
+    text = " ".join(health_words(health, found.after))
+    dwells = [dwell for record in found.campaign.records for dwell in record.dwells]
+    assert f"All {len(dwells)} dwells settled." in text
+    slow = UnsettledDwell("up", dwells[0], 1e-6, 0.031)
+    text = " ".join(health_words(dataclasses.replace(health, unsettled=(slow,)), found.after))
+    assert f"1 of {len(dwells)} dwells never settled; the worst: up at " in text
+    assert "(3.10 %)" in text
     assert f"{found.after.noise.sigma:#.3g} m/s² rms" in text
 
 

@@ -139,6 +139,35 @@ def test_branch_is_dashed_between_the_known_folds_and_marks_them(branch):
     assert ax.get_xlabel() == "force amplitude [N]"
 
 
+@pytest.mark.slow
+def test_curves_of_a_map_are_dashed_where_the_middle_orbit_of_a_fold_is(lens):
+    figure = ij.plot.response_curves(lens, curves=3)
+    ax = figure.axes[0]
+    drawn = [float(words.removesuffix(" N")) for words in entries(figure)[:-2]]
+    assert len(drawn) == 3
+    assert drawn[-1] == pytest.approx(AMPLITUDES[-1], abs=0.06)
+    assert entries(figure)[-2:] == ["stable", "unstable"]
+    several = [(force, f) for force in drawn for f, (low, high) in FOLDS.items() if low < force < high]
+    assert several
+    points = {
+        held: {
+            (round(float(x), 6), round(float(y), 6))
+            for line in ax.lines
+            if line.is_dashed() != held
+            for x, y in zip(line.get_xdata(), line.get_ydata(), strict=True)
+        }
+        for held in (True, False)
+    }
+    for force, frequency in several:
+        place = (slice(None), int(np.argmin(np.abs(AMPLITUDES - force))), list(FOLDS).index(frequency))
+        low, middle, high = ((frequency, round(1e3 * float(size), 6)) for size in lens.response[place])
+        assert {low, high} <= points[True]
+        assert middle in points[False]
+        assert middle not in points[True]
+    with pytest.raises(ValueError, match="`curves` must be a positive count"):
+        ij.plot.response_curves(lens, curves=0)
+
+
 def test_every_kind_of_bifurcation_has_a_mark_of_its_own():
     from isojax.reporting.plots._stability_style import MARKS
 
@@ -247,7 +276,8 @@ def test_bars_of_a_power_law_are_its_exponents():
 def test_summary_counts_what_the_known_folds_hold(lens):
     between = np.stack([(low < AMPLITUDES) & (high > AMPLITUDES) for low, high in FOLDS.values()], axis=1)
     text = map_summary(lens, seconds={"map": (3.0, 1.0)})
-    assert f"{between.sum()} cells hold several orbits" in text
+    assert f"{between.sum()} cells hold several orbits, up to 3" in text
+    assert "--folds draws their curve" in text
     assert f"{between.size + 2 * between.sum()} in {between.size} cells" in text
     assert "symmetric orbits only" in text
     assert "4.0 s: 3.0 s compiling, 1.0 s running" in text

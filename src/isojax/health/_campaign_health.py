@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from .._progress import step
 from .._results import is_successful
 from .._show import shown
 from ..identification import DriftBudget, Loop, drift_budget
@@ -38,8 +39,10 @@ def campaign_health(loop: Loop) -> CampaignHealth:
         Their health.
     """
     after = loop.after
+    step("dwells beside the periodic orbits of the model")
     dwells = dwell_stability(after.model, loop.campaign) if is_successful(after.result) else ()
     records = loop.campaign.records
+    step("noise, hum and drift of the records")
     return CampaignHealth(
         data_health(loop.campaign),
         tuple(line for record in records for line in hum_lines(record)),

@@ -7,6 +7,8 @@ Read the rooms in the order of an analysis: `guess` (start values), `fitting` (c
 and their exact derivatives. `_rules.py` holds the numbers by which fit and diagnosis decide.
 """
 
+from .._progress import silent as silent
+from .._read_campaign import read_campaign as read_campaign
 from ._close_loop import Loop as Loop
 from ._close_loop import close_loop as close_loop
 from ._close_loop import extend as extend
@@ -35,10 +37,10 @@ from .fitting import Uncertainty as Uncertainty
 from .fitting import as_fit as as_fit
 from .fitting import drift_budget as drift_budget
 from .fitting import fit as fit
+from .fitting import fit_report as fit_report
 from .fitting import load_fit as load_fit
 from .fitting import plain_unit as plain_unit
 from .fitting import residual as residual
-from .fitting import silent as silent
 from .fitting import uncertainty as uncertainty
 from .guess import CircleFit as CircleFit
 from .guess import ClassicalGuess as ClassicalGuess
@@ -53,7 +55,6 @@ from .guess import invert_equivalent as invert_equivalent
 from .guess import linear_response as linear_response
 from .guess import normalised_law as normalised_law
 from .guess import paper_table as paper_table
-from .guess import read_campaign as read_campaign
 from .guess import scales as scales
 from .remainder import DwellRemainder as DwellRemainder
 from .remainder import ForceMap as ForceMap

@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import scipy.stats
 
-from .._progress import KeyFigure, Stage
+from .._kept import digest, kept_answers, package_digest
+from .._progress import LOOP_SHARES, REPLACE_SHARE, KeyFigure, Stage, silent
 from .._results import RESULTS, is_successful
 from .._show import Row, number, shown
 from ..elements import CATALOGUE
@@ -29,9 +30,11 @@ from .diagnosis import (
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of, silent
+from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Alternatives, Remainder, explain_remainder, find_alternatives
+
+_GUESS, _FIT, _DIAGNOSIS, _NEXT, _EXPERIMENT, _RUNS = LOOP_SHARES
 
 Doubt = Literal["", "diverges", "worse", "not down to noise"]
 
@@ -148,6 +151,7 @@ def close_loop(
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
     anyway: bool = False,
+    checkpoint: str | Path | None = None,
 ) -> Loop:
     """Fit the declared model, add the effect that it lacks, and repeat until nothing significant is missing.
 
@@ -162,6 +166,9 @@ def close_loop(
         progress: receives a `Stage` and a `KeyFigure` for each stage, and a line for each of its steps.
         rules: the numbers that decide verdicts.
         anyway: whether records that contradict their declaration are fitted all the same.
+        checkpoint: file in which the answer of each computation is kept as it comes. A run that was killed
+            goes on from there and ends with the same digits; what other data, another declaration or another
+            version of isojax left there is not used.
 
     Returns:
         The loop: fits before and after, the findings, and the verdict over all.
@@ -178,15 +185,34 @@ def close_loop(
     start, campaign = time.perf_counter(), as_campaign(campaign)
     if not anyway:
         refuse_contradictions(campaign)
-    progress(Stage("classical guess"))
+    identity = {
+        "version of isojax": package_digest(),
+        "campaign": digest(campaign),
+        "question": digest(max_iterations, excluded, solver, rules),
+    }
+    with kept_answers(None if checkpoint is None else Path(checkpoint), identity, progress):
+        return _loop(campaign, max_iterations, excluded, solver, progress, rules, start)
+
+
+def _loop(
+    campaign: Campaign,
+    max_iterations: int,
+    excluded: tuple[str, ...],
+    solver: Any,
+    progress: Callable[[str], None],
+    rules: Rules,
+    start: float,
+) -> Loop:
+    """Close the loop over a campaign that agrees with its declaration."""
+    progress(Stage("classical guess", _GUESS, LOOP_SHARES[1:]))
     guess = classical_guess(campaign)
-    progress(Stage("fit of the declared model"))
+    progress(Stage("fit of the declared model", _FIT, LOOP_SHARES[2:]))
     before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     search = search_of(campaign, rules, solver, progress)
     extensions, verdict = search_effects(before, search, max_iterations, excluded)
     if extensions:
-        progress(Stage("search for separating experiments"))
+        progress(Stage("search for separating experiments", _EXPERIMENT, (_RUNS,)))
         extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
     after = extensions[-1].after if extensions else before
     if not is_successful(after.result):
@@ -200,7 +226,7 @@ def close_loop(
         progress(Stage("range of laws that explain the records as well"))
         alternatives = find_alternatives(after.estimate, names, search)
     # Asked for here, so that the time of the loop counts it.
-    progress(Stage("free runs of every record"))
+    progress(Stage("free runs of every record", _RUNS))
     progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
     return Loop(
         campaign,
@@ -231,7 +257,9 @@ def search_effects(
     if len(extensions) < 2:
         return extensions, verdict
     final = extensions[-1].after.estimate
-    search.progress(Stage("test whether the later findings replace an earlier one"))
+    search.progress(
+        Stage("test whether the later findings replace an earlier one", REPLACE_SHARE, (_EXPERIMENT, _RUNS))
+    )
     earlier = tuple(
         step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
     )
@@ -259,13 +287,20 @@ def _grow(
     while True:
         # Halved after each addition: the levels of all searches sum up to twice the first.
         significance = search.rules.significance / 2 ** len(extensions)
-        search.progress(Stage(f"diagnosis {len(extensions) + 1}: which effect is missing"))
+        search.progress(_diagnosis(len(extensions), max_iterations))
         verdict = diagnose_with(search, current, significance, excluded)
         search.progress(KeyFigure(verdict.reason))
         if verdict.after is None or len(extensions) == max_iterations:
             return extensions, verdict
         extensions = (*extensions, extend(current, verdict))
         current = extensions[-1].after
+
+
+def _diagnosis(added: int, most: int) -> Stage:
+    """Open a diagnosis: the first is expected to find an effect, those after it are not."""
+    later = (_EXPERIMENT, _RUNS) if added else (_NEXT, _EXPERIMENT, _RUNS) if most else (_RUNS,)
+    later = (REPLACE_SHARE, *later) if added > 1 else later
+    return Stage(f"diagnosis {added + 1}: which effect is missing", _NEXT if added else _DIAGNOSIS, later)
 
 
 def held_out_doubt(before: Fit, final: Fit, rules: Rules) -> Doubt:

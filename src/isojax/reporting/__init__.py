@@ -9,12 +9,13 @@ from ._closed_loop import ClosedLoop as ClosedLoop
 from ._closed_loop import close_loop as close_loop
 from ._compile_seconds import compile_seconds as compile_seconds
 from .page import catalogue_table as catalogue_table
-from .page import check_folder as check_folder
 from .page import error_table as error_table
 from .page import folds_around as folds_around
+from .page import inspection_dict as inspection_dict
 from .page import inspection_summary as inspection_summary
 from .page import loop_summary as loop_summary
 from .page import map_arrays as map_arrays
+from .page import map_dict as map_dict
 from .page import map_summary as map_summary
 from .page import model_text as model_text
 from .page import parameter_table as parameter_table
@@ -25,6 +26,7 @@ from .page import render_text as render_text
 from .page import result_dict as result_dict
 from .page import verdict_summary as verdict_summary
 from .page import write_map as write_map
+from .page import write_model_files as write_model_files
 from .page import write_report as write_report
-from .page import write_texts as write_texts
+from .words import check_first_dicts as check_first_dicts
 from .words import check_first_words as check_first_words

@@ -8,9 +8,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from .._progress import silent
 from .._show import Row, shown
 from ..health import CampaignHealth, campaign_health
-from ..identification import DEFAULT_SOLVER, ClassicalGuess, Extension, Finding, Fit, Loop, Rules, silent
+from ..identification import DEFAULT_SOLVER, ClassicalGuess, Extension, Finding, Fit, Loop, Rules
 from ..identification import close_loop as find_loop
 from ..models import Isolator
 from ..records import Campaign
@@ -69,17 +70,18 @@ class ClosedLoop:
         """State of the data: dwells beside folds, drift budget; computed at its first use."""
         return campaign_health(self.loop)
 
-    def report(self, folder: str | Path) -> None:
+    def report(self, folder: str | Path, *, markdown: bool = False) -> None:
         """Write report.html, result.json and, unless the last fit failed, model.json.
 
         Args:
             folder: where they go; made if it is not there.
+            markdown: whether to write report.md with its pictures as well.
 
         Raises:
             ValueError: if something else than a folder is in the way, or a model that was found is not
                 finite.
         """
-        write_report(self.loop, folder, self.health)
+        write_report(self.loop, folder, self.health, markdown=markdown)
 
     def __str__(self) -> str:
         """Give the summary that the terminal shows."""
@@ -126,6 +128,7 @@ def close_loop(
     progress: Callable[[str], None] = silent,
     rules: Rules = Rules(),
     anyway: bool = False,
+    checkpoint: str | Path | None = None,
 ) -> ClosedLoop:
     """Fit the declared model, find the effect that it lacks, add it, and again until nothing is left.
 
@@ -134,9 +137,12 @@ def close_loop(
         max_iterations: effects that may be added at most; with 0 the declared model is fitted and diagnosed.
         excluded: catalogue names that are not to be considered.
         solver: an optimistix least-squares solver.
-        progress: receives a line a step.
+        progress: receives a `Stage` and a `KeyFigure` for each stage, and a line for each of its steps.
         rules: the numbers that decide verdicts.
         anyway: whether records that contradict their declaration are fitted all the same.
+        checkpoint: file in which the answer of each computation is kept as it comes. A run that was killed
+            goes on from there and ends with the same digits; what other data, another declaration or another
+            version of isojax left there is not used.
 
     Returns:
         The closed loop; `.report(folder)` writes it, `print` shows it.
@@ -163,5 +169,6 @@ def close_loop(
         progress=progress,
         rules=rules,
         anyway=anyway,
+        checkpoint=checkpoint,
     )
     return ClosedLoop(loop)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._progress import silent
 from ..._results import RESULTS
 from ...elements import CATALOGUE, AbstractElement
 from .._rules import Rules
@@ -18,7 +19,6 @@ from ..fitting import (
     complete,
     lack_of_fit,
     search_of,
-    silent,
 )
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._kept import recall
 from ...elements import AbstractElement
 
 CYCLES = 6
@@ -71,7 +72,11 @@ def work_per_cycle(
 
     Source: Erlicher & Point 2004, Comptes Rendus Mecanique 332:51, on what makes Bouc-Wen models passive.
     """
-    forces = np.asarray(_loops(element, jnp.asarray(amplitude), jnp.asarray(angular)))
+
+    def compute() -> tuple[np.ndarray]:
+        return (np.asarray(_loops(element, jnp.asarray(amplitude), jnp.asarray(angular))),)
+
+    (forces,) = recall("work per cycle", compute, element, amplitude, angular)
     before, force = forces[-2 * STEPS : -STEPS], forces[-STEPS:]
     phase = 2.0 * np.pi * np.arange(STEPS) / STEPS
     power = (forces * np.cos(np.tile(phase, CYCLES))[:, None]).reshape(CYCLES, STEPS, -1)

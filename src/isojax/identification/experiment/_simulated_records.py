@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._kept import recall
 from ...models import RK4, Instant, Isolator, Quantity, State, add_ringing, read_record, scan_records
 from ...records import Dwell, Record
 from ..fitting import Problem
@@ -123,16 +124,21 @@ def trial_run(
     }
     lanes = rows * DWELLS
     start = (jnp.full(lanes, rest), *(jnp.zeros(lanes),) * (1 + model.internal_states))
-    path, reading = _run(
-        model,
-        Instant(*(side_by_side(values) for values in zip(*tables, strict=True)), channels=channels),
-        start,
-        problem.quantity,
-        1.0 / experiment.rate,
-    )
 
-    def in_turn(values: Array) -> Float[np.ndarray, "record time"]:
-        return np.asarray(values)[length:].T.reshape(rows, total)
+    def compute() -> tuple[np.ndarray, ...]:
+        path, reading = _run(
+            model,
+            Instant(*(side_by_side(values) for values in zip(*tables, strict=True)), channels=channels),
+            start,
+            problem.quantity,
+            1.0 / experiment.rate,
+        )
+        return (*map(np.asarray, path), np.asarray(reading))
+
+    *path, reading = recall("trial run", compute, model, experiment, problem.quantity, rest)
+
+    def in_turn(values: Float[np.ndarray, "time lanes"]) -> Float[np.ndarray, "record time"]:
+        return values[length:].T.reshape(rows, total)
 
     displacement = in_turn(path[0])
     outputs = displacement if experiment.quantity != problem.quantity else in_turn(reading)
@@ -140,5 +146,5 @@ def trial_run(
         dataclasses.replace(record, output=output, raw_output=output)
         for record, output in zip(blank, outputs, strict=True)
     )
-    starts = np.stack([np.asarray(state)[length] for state in path])
+    starts = np.stack([state[length] for state in path])
     return TrialRun(records, starts, displacement)

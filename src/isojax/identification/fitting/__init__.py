@@ -26,6 +26,7 @@ from ._estimate import estimate as estimate
 from ._fit import complete as complete
 from ._fit import fit as fit
 from ._fit_result import Fit as Fit
+from ._fit_result import fit_report as fit_report
 from ._initial_states import best_nuisances as best_nuisances
 from ._lack_of_fit import LackOfFit as LackOfFit
 from ._lack_of_fit import lack_of_fit as lack_of_fit
@@ -46,5 +47,4 @@ from ._search import ROUGH as ROUGH
 from ._search import Rival as Rival
 from ._search import Search as Search
 from ._search import search_of as search_of
-from ._search import silent as silent
 from ._simulator import Simulator as Simulator

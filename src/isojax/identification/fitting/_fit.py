@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..._parameters import element_names, list_parameters, replace_parameters
+from ..._progress import silent
 from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator, check_integrator
@@ -20,7 +21,7 @@ from ._evaluation import Evaluation
 from ._fit_result import Fit
 from ._integration_steps import find_integrator
 from ._saved_fit import Statistics
-from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, search_of, silent
+from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, search_of
 from ._simulator import Simulator
 
 

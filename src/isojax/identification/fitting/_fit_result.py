@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from ..._parameters import Parameter, list_parameters
 from ..._results import RESULTS, is_successful, name_of_result
-from ..._show import Row, shown
+from ..._show import LINES, Row, shown
 from ...models import Isolator
 from ...records import Campaign, NoiseEstimate, brief_blows
 from ._coefficients import Coefficient, Coefficients
@@ -163,8 +163,11 @@ class Fit(NamedTuple):
         return [*said, "  print(fit) gives the report with statistics, correlations and warnings"]
 
     def __str__(self) -> str:
-        """Give the fit report."""
-        return fit_report(self)
+        """Give the fit report, its longest lists cut where it would take more than 30 lines."""
+        return _joined(_within(_sections(self), LINES))
+
+
+Sections = list[tuple[str, list[str]]]
 
 
 def fit_report(fit: Fit) -> str:
@@ -174,7 +177,11 @@ def fit_report(fit: Fit) -> str:
     determined by the data by name; strong correlations; errors in physical units and over the noise. Of a
     search that failed there are no numbers but NaN, and why it failed.
     """
-    sections = [
+    return _joined(_sections(fit))
+
+
+def _sections(fit: Fit) -> Sections:
+    return [
         ("Model", _model(fit)),
         ("Fit statistics", _statistics(fit)),
         ("Errors", _error_table(fit)),
@@ -182,10 +189,30 @@ def fit_report(fit: Fit) -> str:
         (f"Correlations of {_STRONG:g} and more", _correlations(fit)),
         ("Warnings", warnings_of(fit)),
     ]
-    blocks = [
+
+
+def _joined(sections: Sections) -> str:
+    blocks = (
         "\n".join([f"[[{title}]]", *(f"    {line}" for line in lines)]) for title, lines in sections if lines
-    ]
+    )
     return "\n".join(blocks)
+
+
+def _within(sections: Sections, most: int) -> Sections:
+    """Cut the longest section, again and again, until title and lines of all take no more than `most`."""
+    kept = [len(lines) for _, lines in sections]
+    shown = list(kept)
+
+    def taken() -> int:
+        cut = sum(one < all_of_it for one, all_of_it in zip(shown, kept, strict=True))
+        return sum(shown) + cut + sum(count > 0 for count in kept)
+
+    while taken() > most:
+        shown[max(range(len(shown)), key=lambda place: shown[place])] -= 1
+    return [
+        (title, lines if count == len(lines) else [*lines[:count], f"... and {len(lines) - count} more"])
+        for (title, lines), count in zip(sections, shown, strict=True)
+    ]
 
 
 def _model(fit: Fit) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import optimistix as optx
 
+from ..._progress import silent
 from ...elements import Scales
 from ...records import Campaign
 from .._rules import Rules
@@ -33,14 +34,6 @@ squared."""
 
 ROUGH = 0.1
 """The same for refits that are only ranked, as a share of the difference that makes a tie."""
-
-
-def silent(line: str) -> None:
-    """Take a line of progress and say nothing.
-
-    Args:
-        line: the line.
-    """
 
 
 class Rival(NamedTuple):

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from ..._kept import recall
 from ..._parameters import element_names, list_parameters
 from ...models import Isolator
 from ..jacobian import Prepared, Unknowns, information, internal_starts, prepare, score_information
@@ -90,7 +91,14 @@ class Simulator:
         names = element_names(model)
         known = [self._internal.get(name) for name in names[:carried]] + [None] * len(names[carried:])
         if any(states is None for states in known):
-            internal = np.stack(internal_starts(model, self.problem.records, prepared, carried))
+            internal = np.stack(
+                recall(
+                    "internal states",
+                    lambda: internal_starts(model, self.problem.records, prepared, carried),
+                    model,
+                    carried,
+                )
+            )
             ends = np.cumsum([element.internal_states for element in model.elements])
             fresh = np.split(internal, ends[:-1], axis=1)
             # Nuisances are deviations from the starts, which must therefore stay while they are carried on.
@@ -180,8 +188,11 @@ def _matrices(
     unknowns: Unknowns, carried: int, prepared: Prepared
 ) -> Float[np.ndarray, "lanes column column"]:
     """Give the information matrices, NaN where a simulation left every bound."""
-    if carried == len(unknowns.model.elements):
-        matrices = information(unknowns, prepared)
-    else:
-        matrices = score_information(unknowns, carried, prepared)
+
+    def compute() -> tuple[np.ndarray]:
+        if carried == len(unknowns.model.elements):
+            return (information(unknowns, prepared),)
+        return (score_information(unknowns, carried, prepared),)
+
+    (matrices,) = recall("information", compute, unknowns, carried)
     return np.where(np.abs(matrices) < HUGE, matrices, np.nan)

@@ -7,6 +7,7 @@ Read `_classical_guess.py` first, then `_start_coefficients.py` and the two bala
 `_paper_table.py`, with `_equivalent_law.py`, `_half_power.py` and `_circle_fit.py`.
 """
 
+from ._as_campaign import as_campaign as as_campaign
 from ._balance_start import find_balance_start as find_balance_start
 from ._circle_fit import CircleFit as CircleFit
 from ._circle_fit import fit_circle as fit_circle
@@ -24,6 +25,4 @@ from ._motion import is_absolute as is_absolute
 from ._motion import measured_motion as measured_motion
 from ._paper_table import PaperTable as PaperTable
 from ._paper_table import paper_table as paper_table
-from ._read_campaign import as_campaign as as_campaign
-from ._read_campaign import read_campaign as read_campaign
 from ._scales import scales as scales

@@ -9,13 +9,13 @@ from ..._show import Row, amount, shown
 from ..._types import check_float64
 from ...models import Isolator
 from ...records import Campaign
+from ._as_campaign import as_campaign
 from ._declared_model import base_model, declared_names
 from ._force_balance import BalanceFit
 from ._linear_response import LinearResponse
 from ._logarithmic_decrement import Decrement
 from ._measured_receptance import MeasuredResponse, measured_receptance
 from ._paper_table import PaperTable, paper_table
-from ._read_campaign import as_campaign
 from ._sensor_offset_start import with_sensor_zero
 from ._start_coefficients import start_from_dwells, start_from_time
 

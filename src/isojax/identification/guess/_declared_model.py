@@ -1,54 +1,12 @@
 """The model that a campaign declares, before any number is known."""
 
-import difflib
-from collections.abc import Sequence
 from operator import attrgetter
-from pathlib import Path
 
+from ..._read_campaign import catalogue_names
 from ...elements import CATALOGUE, AbstractElement
 from ...models import Isolator
 from ...records import Campaign
 from ._scales import scales
-
-
-def _element_class(file: Path, field: str, found: str, suffix: str) -> type[AbstractElement]:
-    """Give the catalogue class of a declared name, short (`cubic`) or in full (`cubic_stiffness`)."""
-    for name in (found + suffix, found):
-        if name in CATALOGUE:
-            return CATALOGUE[name]
-    short = [name.removesuffix(suffix) for name in CATALOGUE if suffix and name.endswith(suffix)]
-    near = difflib.get_close_matches(found, [*short, *CATALOGUE], n=1, cutoff=0.0)[0]
-    raise ValueError(
-        f"Field `{field}` of {file} must name effects of the catalogue, but has {found!r}; nearest: {near!r}."
-    )
-
-
-def catalogue_names(
-    file: Path, stiffness: Sequence[str], damping: Sequence[str], elements: Sequence[str]
-) -> tuple[str, ...]:
-    """List the catalogue names that the [model] of a campaign.toml means.
-
-    Args:
-        file: the campaign.toml.
-        stiffness: springs, short (`cubic`) or in full (`cubic_stiffness`).
-        damping: dampers, likewise.
-        elements: further effects.
-
-    Returns:
-        Their names, as written and in this order.
-
-    Raises:
-        ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
-    """
-    return tuple(
-        _element_class(file, field, found, suffix).name
-        for field, names, suffix in (
-            ("model.stiffness", stiffness, "_stiffness"),
-            ("model.damping", damping, "_damping"),
-            ("model.elements", elements, ""),
-        )
-        for found in names
-    )
 
 
 def _is_freed(campaign: Campaign, kind: type[AbstractElement]) -> bool:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._kept import recall
 from ...models import Isolator
 from ._batch import Prepared, workers
 from ._fixed_steps import fixed_information, fixed_path, fixed_readings
@@ -123,5 +124,9 @@ def readings(
             stepping.readings(model, scale, own, batch, prepared.quantity, prepared.sample_time)
         )
 
-    with ThreadPoolExecutor(workers()) as pool:
-        return np.concatenate(list(pool.map(one, range(parts))), axis=1)
+    def compute() -> tuple[np.ndarray]:
+        with ThreadPoolExecutor(workers()) as pool:
+            return (np.concatenate(list(pool.map(one, range(parts))), axis=1),)
+
+    (simulated,) = recall("readings", compute, model, stiffness_scale, states)
+    return simulated

@@ -9,12 +9,13 @@ from jaxtyping import Float
 from scipy import stats
 
 from ..._parameters import list_parameters, replace_parameters
+from ..._progress import silent
 from ..._results import is_successful
 from ..._show import Row, amount, shown
 from ...models import Isolator
 from .._rules import Rules
 from ..diagnosis import Projection, project, refit_from
-from ..fitting import Estimate, Search, silent
+from ..fitting import Estimate, Search
 from ._free_laws import AbstractFreeForce, free_laws
 
 SMALLEST_LAW = 0.03

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..._progress import silent
 from ..._results import is_successful
 from ..._show import Row, shown
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, search_of, silent
+from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, search_of
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 from ._matching_pursuit import Pursuit, pursue_laws

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._wording import listing
+from ._bounds import check_size
 from ._heading import split_heading
 from ._samples import Column, as_samples, find_channel, missing_column, unit_of_time
 
@@ -25,11 +26,13 @@ class Leaf:
         path: Its full name, such as "run.force" or "bench/force".
         read: Gives the array; may raise ValueError where it holds no numbers.
         unit: Unit that the file states, or None.
+        size: Bytes that it takes as float64, where the file says so before it is read.
     """
 
     path: str
     read: Callable[[], Any]
     unit: str | None = None
+    size: int = 0
 
 
 def leaf_columns(file: Path, names: Sequence[str] | None, leaves: Sequence[Leaf]) -> dict[str, Column]:
@@ -45,20 +48,23 @@ def leaf_columns(file: Path, names: Sequence[str] | None, leaves: Sequence[Leaf]
         Name to column.
 
     Raises:
-        ValueError: If there is no array of a name, or it holds no row or column of numbers.
+        ValueError: If there is no array of a name, it holds no row or column of numbers, or it is too large.
     """
     if names is None:
+        check_size(file, sum(leaf.size for leaf in leaves))
         return dict(_all_columns(file, leaves))
     columns = {}
     for name in names:
         leaf = _find(file, name, leaves)
         if leaf is not None:
+            check_size(file, leaf.size)
             values, rest = leaf.read(), ""
         else:
             path, rest = _split_index(name)
             leaf = _find(file, path, leaves) if rest else None
             if leaf is None:
                 raise _missing(file, name, leaves)
+            check_size(file, leaf.size)
             values = _picked(file, leaf.path, np.asarray(leaf.read()), rest)
         unit = leaf.unit or split_heading(leaf.path)[1] or unit_of_time(values)
         columns[name] = Column(as_samples(values, file, name), unit=unit)

@@ -10,6 +10,7 @@ import numpy as np
 from ._layout import pick_columns
 from ._samples import Column, as_samples, missing_extra
 from ._text import decoded, read_text_columns
+from ._unreadable import unreadable
 
 _WHOLE = 0.05
 """Share of a sample by which a segment may miss the end of the one before it."""
@@ -45,7 +46,7 @@ def read_lvm_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colum
         headings = [str(name).strip() for name in segments[0]["Channel names"]]
         values = [np.asarray(one["data"], dtype=np.float64) for one in segments]
     except Exception as error:  # lvm_read raises ValueError, KeyError, SyntaxError, ... on a broken file
-        raise ValueError(f"{file} cannot be read as a LabVIEW measurement file: {error}") from error
+        raise unreadable(file, "a LabVIEW measurement file", error) from error
     wide = [one.shape[1] if one.ndim == 2 else 0 for one in values]
     if headings and headings[-1] == "Comment":
         headings = headings[:-1]

@@ -5,13 +5,15 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
-import scipy.io
+import scipy
 
 from ._hdf5 import read_hdf5_columns
 from ._leaves import Leaf, leaf_columns
+from ._mat_bounds import check_mat_elements
+from ._matlab_object import matlab_object
 from ._samples import Column
+from ._unreadable import unreadable
 
 
 def read_mat_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
@@ -29,14 +31,17 @@ def read_mat_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colum
         ValueError: If it is no .mat file, a variable is missing, or one is text, a struct, a cell or a
             matrix.
     """
+    import h5py
+
     if h5py.is_hdf5(file):
         return read_hdf5_columns(file, names)
+    check_mat_elements(file)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # SciPy warns of variables that nobody asked for
             held = scipy.io.loadmat(file, appendmat=False)
     except Exception as error:  # SciPy raises TypeError, ValueError, zlib.error, ... on a broken file
-        raise ValueError(f"{file} cannot be read as a MATLAB .mat file: {error}") from error
+        raise unreadable(file, "a MATLAB .mat file", error) from error
     leaves = [
         leaf
         for name, value in held.items()
@@ -63,9 +68,6 @@ def _leaves(file: Path, path: str, value: Any) -> Iterator[Leaf]:
 
 def _refusal(file: Path, path: str) -> Callable[[], Any]:
     def refuse() -> Any:
-        raise ValueError(
-            f"{file}: column `{path}` holds objects, a MATLAB table, timetable or class, that only MATLAB "
-            "can read; save its variables as arrays, such as force = T.force"
-        )
+        raise matlab_object(file, path)
 
     return refuse

@@ -1,11 +1,14 @@
 """Parquet files, by pyarrow."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
+from ._bounds import check_size
 from ._heading import split_heading
 from ._layout import pick_columns
 from ._samples import Column, as_samples, missing_extra, unit_of_time
+from ._unreadable import unreadable
 
 
 def read_parquet_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
@@ -27,10 +30,9 @@ def read_parquet_columns(file: Path, names: Sequence[str] | None) -> dict[str, C
         import pyarrow.parquet
     except ImportError as error:
         raise missing_extra(file, "pyarrow", "Parquet files") from error
-    try:
-        table = pyarrow.parquet.ParquetFile(file).read()
-    except Exception as error:  # pyarrow raises a dozen kinds on a broken file
-        raise ValueError(f"{file} cannot be read as a Parquet file: {error}") from error
+    held = _or_unreadable(file, lambda: pyarrow.parquet.ParquetFile(file))
+    check_size(file, 8 * held.metadata.num_rows * held.metadata.num_columns)
+    table = _or_unreadable(file, held.read)
 
     def column(i: int) -> Column:
         name = table.column_names[i]
@@ -40,3 +42,10 @@ def read_parquet_columns(file: Path, names: Sequence[str] | None) -> dict[str, C
         return Column(as_samples(values, file, name), unit=unit)
 
     return pick_columns(file, names, table.column_names, column)
+
+
+def _or_unreadable(file: Path, work: Callable[[], Any]) -> Any:
+    try:
+        return work()
+    except Exception as error:  # pyarrow raises a dozen kinds on a broken file
+        raise unreadable(file, "a Parquet file", error) from error

@@ -35,10 +35,13 @@ def missing_column(file: Path, name: str, present: Iterable[str]) -> ValueError:
 
 
 def missing_extra(file: Path, package: str, what: str) -> ValueError:
-    """Gives the error for a format whose package is not installed, with the commands that install it."""
+    """Gives the error for a format whose package is not installed, with the command that installs it.
+
+    pip finds the extra in the installed isojax, whether that came from a clone, a wheel or an index.
+    """
     return ValueError(
-        f"{file}: reading {what} needs {package}; pip install 'isojax[io]', or in a clone of the repository "
-        "pip install '.[io]'"
+        f"{file}: reading {what} needs the package {package}; to install it: "
+        'python -m pip install "isojax[io]"'
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ._heading import split_heading
 from ._samples import Column, as_samples, find_channel, missing_extra, unit_of_time
+from ._unreadable import unreadable
 
 _UNIT_NAMES = ("unit_string", "NI_UnitDescription", "Unit", "unit")
 """Properties under which LabVIEW, DIAdem and others write the unit of a channel."""
@@ -31,11 +32,14 @@ def read_tdms_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
         from nptdms import TdmsFile
     except ImportError as error:
         raise missing_extra(file, "npTDMS", "TDMS") from error
+    with file.open("rb") as handle:
+        if handle.read(4) != b"TDSm":
+            raise unreadable(file, "TDMS", ValueError("the mark TDSm at its start is missing"))
     try:
         held = TdmsFile.read(str(file))
         channels = [channel for group in held.groups() for channel in group.channels()]
     except Exception as error:  # npTDMS raises ValueError, KeyError, struct.error, ... on a broken file
-        raise ValueError(f"{file} cannot be read as TDMS: {error}") from error
+        raise unreadable(file, "TDMS", error) from error
     known = [(f"{one.group_name}/{one.name}", one.name) for one in channels]
     if names is None:
         names = [_shortest(own, known) for own, one in zip(known, channels, strict=True) if _is_channel(one)]

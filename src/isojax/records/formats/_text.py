@@ -15,11 +15,20 @@ import pandas as pd
 from jaxtyping import Float
 
 from .._wording import row
+from ._bounds import check_size
+from ._clock import read_clock, seconds_since_first
 from ._layout import Layout, find_layout, numeric_cells, pick_columns
 from ._samples import Column, as_samples
 
 _LOOKED_AT = 500
 """Lines from which separator and heading are found."""
+
+_MOST_LOOKED_AT = 2**18
+"""Letters in these lines; of a table with long rows fewer lines are looked at."""
+
+_CELLS_A_ROW = 1024
+_LONGEST_LINE = 2**16
+"""Bytes of a line: 64 a column."""
 
 _SPACES = r"\s+"
 _SEPARATORS = (",", ";", "\t", _SPACES)
@@ -27,6 +36,7 @@ _SEPARATORS = (",", ";", "\t", _SPACES)
 
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", _SPACES: "spaces"}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*")
 _MARKS = "#%!"
 """Signs before a heading, as NumPy and other programs write them."""
 
@@ -54,27 +64,45 @@ class TextTable:
     decimal: str
 
     def numbers(self, column: int) -> Float[np.ndarray, " time"] | np.ndarray:
-        """Gives a column as numbers; an empty cell is NaN.
+        """Gives a column as numbers, times of day as seconds since the first; an empty cell is NaN.
 
         Raises:
             ValueError: At the first cell that holds text; names the row, the line and the text.
         """
-        cells, name = self.cells[column], self.headings[column]
+        cells = self.cells[column]
         if cells.dtype.kind in "iufb":
             return cells
+        if self.is_clock(column):
+            return self._times(column)
         found = np.full(cells.size, np.nan)
         for index, cell in enumerate(cells):
             if isinstance(cell, str):
                 text = cell.strip()
                 if not _number_test(self.decimal)(text):
-                    raise ValueError(
-                        f"{self.file}: column `{name}` holds the text {cell!r} at {row(index)}, line "
-                        f"{_line(self.text, self.first, index)} of the file, not a number{self._cause(text)}"
-                    )
+                    raise self._wrong(column, index, f"not a number{self._cause(text)}")
                 found[index] = float(re.sub("[dD]", "e", text).replace(self.decimal, "."))
             else:
                 found[index] = float(cell)
         return found
+
+    def is_clock(self, column: int) -> bool:
+        """Says whether a column starts with a time of day."""
+        first = next((cell for cell in self.cells[column] if cell == cell), None)
+        return isinstance(first, str) and read_clock(first) is not None
+
+    def _times(self, column: int) -> Float[np.ndarray, " time"]:
+        clocks = [read_clock(cell) if isinstance(cell, str) else None for cell in self.cells[column]]
+        for index, (cell, clock) in enumerate(zip(self.cells[column], clocks, strict=True)):
+            if clock is None and cell == cell:
+                raise self._wrong(column, index, "not a time of day as in the rows before")
+        return seconds_since_first(clocks)
+
+    def _wrong(self, column: int, index: int, what: str) -> ValueError:
+        cell = self.cells[column][index]
+        return ValueError(
+            f"{self.file}: column `{self.headings[column]}` holds the text {str(cell)!r} at {row(index)}, "
+            f"line {_line(self.text, self.first, index)} of the file, {what}"
+        )
 
     def _cause(self, text: str) -> str:
         if _number_test("," if self.decimal == "." else ".")(text):
@@ -99,7 +127,8 @@ def read_text_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
     table = read_table(file)
 
     def column(i: int) -> Column:
-        return Column(as_samples(table.numbers(i), file, table.headings[i]), unit=table.units[i])
+        unit = table.units[i] or ("s" if table.is_clock(i) else None)
+        return Column(as_samples(table.numbers(i), file, table.headings[i]), unit=unit)
 
     return pick_columns(file, names, table.headings, column)
 
@@ -113,9 +142,14 @@ def read_table(file: Path) -> TextTable:
     Raises:
         ValueError: If it is empty, holds no row of numbers, or its rows differ in length.
     """
-    text = decoded(file.read_bytes()).replace("\r\n", "\n").replace("\r", "\n")
+    check_size(file, file.stat().st_size)
+    raw = file.read_bytes()
+    _check_lines(file, raw)
+    text = decoded(raw).replace("\r\n", "\n").replace("\r", "\n")
     lines = text.split("\n", 5 * _LOOKED_AT)[: 5 * _LOOKED_AT]
     written = [i for i, line in enumerate(lines) if line.strip()][:_LOOKED_AT]
+    length = itertools.accumulate(len(lines[i]) for i in written)
+    written = written[: max(sum(one <= _MOST_LOOKED_AT for one in length), 1)]
     if not written:
         raise ValueError(f"{file} is empty; expected a heading and rows of numbers")
     separator, decimal = _dialect([lines[i] for i in written])
@@ -132,6 +166,8 @@ def read_table(file: Path) -> TextTable:
             f"{lines[written[0]]!r:.80}"
         )
     first = written[layout.first]
+    if layout.width > _CELLS_A_ROW:
+        raise _lying(file, f"line {first + 1} has {layout.width} columns")
     if len(layout.headings) != layout.width:
         raise ValueError(
             f"{file} has {len(layout.headings)} headings but {layout.width} columns of values "
@@ -151,6 +187,24 @@ def read_table(file: Path) -> TextTable:
     )
 
 
+def _check_lines(file: Path, raw: bytes) -> None:
+    """Refuses a line that is longer than a row of values can be, before anything is made of it."""
+    signs = np.frombuffer(raw, dtype=np.uint8)
+    ends = np.concatenate([[-1], np.flatnonzero((signs == ord("\n")) | (signs == ord("\r"))), [signs.size]])
+    length = np.diff(ends) - 1
+    at = int(np.argmax(length))
+    if length[at] > _LONGEST_LINE:
+        raise _lying(file, f"a line from byte {ends[at] + 1} on has {length[at]} bytes")
+
+
+def _lying(file: Path, found: str) -> ValueError:
+    return ValueError(
+        f"{file}: {found}; expected a row a sample, of at most {_CELLS_A_ROW} columns and {_LONGEST_LINE} "
+        "bytes. Likely cause: the samples of a channel stand in one row; transpose the table, or export "
+        "channels as columns"
+    )
+
+
 def decoded(raw: bytes) -> str:
     """Gives the text of a file in UTF-8, UTF-16 or, where it is neither, the Western European code page."""
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -167,6 +221,8 @@ def decoded(raw: bytes) -> str:
 
 def _dialect(lines: Sequence[str]) -> tuple[str, str]:
     """Gives the separator and the decimal sign with which most cells are numbers, and fewest texts."""
+    if len(lines) > 2 and "," not in lines[0] and all(map(_DECIMAL_COMMA.fullmatch, lines[1:])):
+        return ";", ","  # a heading of one column, above what would else be two columns of whole numbers
     best, chosen = -math.inf, (",", ".")
     for separator in _SEPARATORS:
         rows = [_cells(line, separator) for line in lines]

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._wording import listing
 from ._samples import Column, as_samples, find_channel, missing_extra
+from ._unreadable import unreadable
 
 _TIME_RESPONSE = (0, 1)  # function type "general" and "time response"
 _TIME_AXES = (0, 1, 17)  # abscissa "unknown", "general" and "time"; 18 is frequency
@@ -59,7 +60,7 @@ def _time_histories(file: Path) -> list[dict[str, Any]]:
             types = [int(one) for one in universal.get_set_types()]
             sets = [universal.read_sets(i) for i, one in enumerate(types) if one == 58]
         except Exception as error:  # pyuff raises bare Exceptions
-            raise ValueError(f"{file} cannot be read as a universal file: {error}") from error
+            raise unreadable(file, "a universal file", error) from error
     if not types:
         raise ValueError(f"{file} holds no dataset; expected a universal file with datasets 58")
     found = [one for one in sets if isinstance(one, dict)]

@@ -1,7 +1,7 @@
 """A first guess of the mass: force over acceleration is the mass less the stiffness over w^2."""
 
 import numpy as np
-import scipy.signal
+import scipy
 from jaxtyping import Float
 
 from .._campaign import TIME_DERIVATIVES, OutputQuantity

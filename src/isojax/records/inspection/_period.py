@@ -3,8 +3,8 @@
 from typing import cast
 
 import numpy as np
+import scipy
 from jaxtyping import Float
-from scipy.fft import next_fast_len
 
 _SHORTEST_PERIOD = 16
 """Samples below which a repetition is a sine rather than a period."""
@@ -32,7 +32,7 @@ def find_period(signal: Float[np.ndarray, " time"]) -> int | None:
     size = centred.size
     if size < 2 * _SHORTEST_PERIOD or not np.any(centred):
         return None
-    length = cast(int, next_fast_len(2 * size, real=True))
+    length = cast(int, scipy.fft.next_fast_len(2 * size, real=True))
     spectrum = np.abs(np.fft.rfft(centred, length)) ** 2
     lags = np.arange(size // 2 + 1)
     product = np.fft.irfft(spectrum, length)[: lags.size]

@@ -3,8 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-import scipy.signal
-import scipy.stats
+import scipy
 from jaxtyping import Float
 
 from ..._show import shown

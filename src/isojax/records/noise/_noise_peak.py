@@ -3,7 +3,6 @@
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from jaxtyping import Float
@@ -170,11 +169,12 @@ def _line_bases(
         basis = harmonic_basis(time, frequency, orders)
         design = np.concatenate([basis, (time / time[-1])[:, None] * basis[:, :3]], axis=1)
     known, _ = np.linalg.qr(design)
-    found = np.full((len(lines), size, 2), np.nan)
-    for place, line in enumerate(lines):
-        pair = np.stack([np.cos(2 * np.pi * line * time), np.sin(2 * np.pi * line * time)], axis=1)
-        pair -= known @ (known.T @ pair)
-        basis, sizes, _ = np.linalg.svd(pair, full_matrices=False)
-        if cast(float, sizes[-1]) ** 2 > _OBSERVABLE * 0.5 * size:
-            found[place] = basis
+    phase = 2.0 * np.pi * np.array(lines)[:, None] * time
+    pairs = np.stack([np.cos(phase), np.sin(phase)], axis=2)
+    pairs -= known @ (known.T @ pairs)
+    # All pairs at once by their 2 x 2 products: those that are used are far from parallel.
+    powers, turns = np.linalg.eigh(np.swapaxes(pairs, 1, 2) @ pairs)
+    seen = powers[:, 0] > _OBSERVABLE * 0.5 * size
+    found = np.full_like(pairs, np.nan)
+    found[seen] = pairs[seen] @ (turns[seen] / np.sqrt(powers[seen])[:, None, :])
     return found

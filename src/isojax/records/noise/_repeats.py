@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.signal
+import scipy
 from jaxtyping import Float
 
 from .._record import Record

@@ -1,8 +1,8 @@
 """The acceleration of the floor, whatever of its motion was measured."""
 
 import numpy as np
+import scipy
 from jaxtyping import Float
-from scipy.interpolate import make_interp_spline
 
 from .._campaign import TIME_DERIVATIVES, OutputQuantity
 
@@ -28,5 +28,6 @@ def floor_acceleration(
     order = TIME_DERIVATIVES["acceleration"] - TIME_DERIVATIVES[quantity]
     if order:
         time = np.arange(motion.size) / rate
-        motion = make_interp_spline(time, motion - np.mean(motion), k=_DEGREE).derivative(order)(time)
+        spline = scipy.interpolate.make_interp_spline(time, motion - np.mean(motion), k=_DEGREE)
+        motion = spline.derivative(order)(time)
     return motion - np.mean(motion)

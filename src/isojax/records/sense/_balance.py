@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from jaxtyping import Complex, Float, Int
-from scipy.optimize import minimize_scalar
 
 from ._lines import Lines
 
@@ -198,7 +198,7 @@ def find_lag(rows: Rows, course: Float[np.ndarray, " line"]) -> float:
     factors = np.arange(-count, count + 1) * (step / float(np.max(course)))
     best = int(np.argmin([rows.unexplained(factor * course) for factor in factors]))
     width = factors[1] - factors[0]
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda factor: rows.unexplained(factor * course),
         bounds=(factors[best] - width, factors[best] + width),
         method="bounded",

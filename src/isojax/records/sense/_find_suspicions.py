@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from .._campaign import Campaign
+from .._record import Record
 from ._balance import Balance, Rows, find_balance
 from ._clipping import find_clipping
 from ._readings import declared_reading, late_readings, other_readings, rows_read, sign_cause
@@ -24,6 +25,9 @@ _FREE_MASS = 10.0
 
 _FED_BACK = -0.1
 """Power factor below which the drive takes power out of a passive isolator: a tenth of what it moves."""
+
+_FEWEST_RIGHT = 2
+"""Records that feed power in, for each that takes it out, from which that one is the odd one."""
 
 _UNBALANCED = 0.25
 """Share of the target left unbalanced from which a mistake is sought, and to which one must bring it. Laws
@@ -80,8 +84,10 @@ def find_suspicions(campaign: Campaign) -> tuple[Suspicion, ...]:
 
 def _find(campaign: Campaign) -> tuple[Suspicion, ...]:
     rows = rows_read(campaign, declared_reading(campaign))
-    found = [] if rows is None else [*_balance_suspicions(campaign, rows), *_size_suspicions(campaign, rows)]
-    found += [] if rows is None else _jitter_suspicions(campaign, rows)
+    found = _odd_records(campaign)
+    if rows is not None:
+        found = found or _balance_suspicions(campaign, rows)
+        found += [*_size_suspicions(campaign, rows), *_jitter_suspicions(campaign, rows)]
     found += find_clipping(campaign)
     return tuple(sorted(found, key=lambda one: not one.contradicts))
 
@@ -128,8 +134,55 @@ def _balance_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
     return [Suspicion(check, where, figure, expected, causes, certain and trusted and not free)]
 
 
+def _odd_records(campaign: Campaign) -> list[Suspicion]:
+    """Gives the records, held-out ones as well, that have the sign of one channel against most others.
+
+    The balance of all records may not show them: the others outvote them. Alone, such a record takes power
+    out and has a negative mass; a delay, which may do the one, does not do the other.
+    """
+    reading = declared_reading(campaign)
+    balances: dict[str, Balance] = {}
+    for record in campaign.records:
+        rows = rows_read(dataclasses.replace(campaign, records=(_to_fit(record),)), reading)
+        if rows is not None:
+            balances[record.name] = find_balance(rows, _declared_mass(campaign, reading.based))
+    odd = [
+        name
+        for name, one in balances.items()
+        if _takes_power_out(one) and one.inertia + _CERTAIN * one.inertia_error < 0.0
+    ]
+    fed = [one for one in balances.values() if one.power > _CERTAIN * one.power_error]
+    if len(fed) < _FEWEST_RIGHT * len(odd):
+        return []
+    cause = Cause(
+        "sign of one record",
+        "one of its channels has the wrong sign",
+        "mend this file; the other records have the declared sign",
+    )
+    expected = "a power factor above 0, as in the other records"
+    certain = campaign.input.quantity != "command"
+    return [
+        Suspicion("power", name, _power_figure(balances[name]), expected, (cause,), certain) for name in odd
+    ]
+
+
+def _to_fit(record: Record) -> Record:
+    return record if record.role == "fit" else dataclasses.replace(record, role="fit")
+
+
+def _takes_power_out(balance: Balance) -> bool:
+    return balance.power < _FED_BACK and balance.power + _CERTAIN * balance.power_error < 0.0
+
+
+def _power_figure(balance: Balance) -> str:
+    return (
+        f"the drive takes power out of the isolator (power factor {balance.power:.2f} "
+        f"± {balance.power_error:.1g})"
+    )
+
+
 def _failed_check(campaign: Campaign, balance: Balance) -> Literal["power", "inertia", "balance"] | None:
-    if balance.power < _FED_BACK and balance.power + _CERTAIN * balance.power_error < 0.0:
+    if _takes_power_out(balance):
         return "power"
     if not np.isnan(balance.inertia) and campaign.input.quantity != "command":
         factor = _WRONG_MASS if _has_scale(campaign) else _FREE_MASS
@@ -142,8 +195,7 @@ def _failed_check(campaign: Campaign, balance: Balance) -> Literal["power", "ine
 def _figure(campaign: Campaign, check: str, balance: Balance) -> tuple[str, str]:
     if check == "power":
         return (
-            f"the drive takes power out of the isolator (power factor {balance.power:.2f} "
-            f"± {balance.power_error:.1g})",
+            _power_figure(balance),
             "a power factor above 0: a passive isolator absorbs power",
         )
     if check == "inertia":

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from .._campaign import TIME_DERIVATIVES, Campaign, InputQuantity, OutputQuantity
 from .._record import Record
@@ -86,7 +86,7 @@ def _read(record: Record, reading: Reading) -> Record:
     if reading.delay or reading.skew:
         clock = (np.arange(drive.size) + record.start) / record.rate
         acts = clock + reading.delay + reading.skew * clock
-        drive = CubicSpline(clock, drive)(np.clip(acts, clock[0], clock[-1]))
+        drive = scipy.interpolate.CubicSpline(clock, drive)(np.clip(acts, clock[0], clock[-1]))
     if (drive is record.input) and reading.drive_factor == 1.0 == reading.response_factor:
         return record
     return replace(record, input=drive * reading.drive_factor, output=response * reading.response_factor)

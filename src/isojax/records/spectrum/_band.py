@@ -4,10 +4,8 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-import scipy.signal
-import scipy.stats
+import scipy
 from jaxtyping import Float
-from scipy.fft import next_fast_len
 
 from ..._show import shown
 from .._record import Record
@@ -59,7 +57,7 @@ def power_spectrum(
     The window is a four-term Blackman-Harris: its side lobes, below -92 dB, do not lift the floor.
     """
     wanted = max(64, 2 * signal.size // (averages + 1))
-    segment = min(signal.size, cast(int, next_fast_len(wanted, real=True)))
+    segment = min(signal.size, cast(int, scipy.fft.next_fast_len(wanted, real=True)))
     frequency, density = scipy.signal.welch(
         signal - np.mean(signal), rate, window="blackmanharris", nperseg=segment, detrend="linear"
     )

@@ -1,7 +1,7 @@
 """Butterworth low-pass: applied without phase, and compensated where the test rig applied it."""
 
 import numpy as np
-import scipy.signal
+import scipy
 from jaxtyping import Float
 
 

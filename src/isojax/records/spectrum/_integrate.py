@@ -3,9 +3,8 @@ ends.
 """
 
 import numpy as np
-import scipy.fft
+import scipy
 from jaxtyping import Float
-from scipy.signal import windows
 
 from .._campaign import TIME_DERIVATIVES, OutputQuantity
 from .._record import Record
@@ -118,7 +117,8 @@ def shift_order(
     slowest = rate / signal.size if lowest_frequency is None else lowest_frequency
     pad = min(signal.size - 1, int(np.ceil(8.0 * rate / slowest)))
     length = signal.size + 2 * pad
-    extended = _mirrored(signal - mean, pad, through=order > 0) * windows.tukey(length, 1.5 * pad / length)
+    window = scipy.signal.windows.tukey(length, 1.5 * pad / length)
+    extended = _mirrored(signal - mean, pad, through=order > 0) * window
     size = int(scipy.fft.next_fast_len(extended.size + pad, real=True) or extended.size + pad)
     frequency = np.fft.rfftfreq(size, 1.0 / rate)
     weight = np.ones_like(frequency)

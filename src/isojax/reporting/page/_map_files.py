@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..._output_folder import check_folder, publish
 from ..._results import RESULTS, is_successful
-from ...models import model_to_dict, write_whole
+from ...models import model_to_dict
 from ...stability import FoldCurve, StabilityMap, continue_branch, fold_curve
-from ..plots import plot_fold_curve, plot_response_map, plot_stability_map
-from ._write import check_folder
+from ..plots import plot_fold_curve, plot_response_curves, plot_response_map, plot_stability_map
 
 _CODES = ("successful", "not_converged", "not_finite")
 """Codes of a cell's result, 0 first."""
@@ -107,7 +107,7 @@ def folds_around(smap: StabilityMap) -> FoldCurve | None:
 
 
 def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None = None) -> tuple[str, ...]:
-    """Write map.npz, map.png, response.png and, where there are folds, folds.png.
+    """Write map.npz, curves.png, map.png, response.png and, where there are folds, folds.png.
 
     Everything is ready before the first is written. A folds.png of an earlier map goes where this has none.
 
@@ -121,23 +121,22 @@ def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None
 
     Raises:
         ValueError: if something else than a folder is in the way.
+        KeptElsewhereError: if they could not be written there; it names the folder that has them.
     """
     folder = check_folder(folder)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **map_arrays(smap))  # type: ignore[arg-type]
-    contents = {
+    contents: dict[str, bytes | None] = {
         "map.npz": buffer.getvalue(),
+        "curves.png": png_bytes(plot_response_curves(smap)),
         "map.png": png_bytes(plot_stability_map(smap, folds=folds)),
         "response.png": png_bytes(plot_response_map(smap, folds=folds)),
     }
-    if folds is not None:
-        contents["folds.png"] = png_bytes(plot_fold_curve(folds, excitation=smap.model.excitation))
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, content in contents.items():
-        write_whole(folder / name, content)
-    if folds is None:
-        (folder / "folds.png").unlink(missing_ok=True)
-    return tuple(contents)
+    contents["folds.png"] = (
+        None if folds is None else png_bytes(plot_fold_curve(folds, excitation=smap.model.excitation))
+    )
+    publish(folder, contents)
+    return tuple(name for name, content in contents.items() if content is not None)
 
 
 def png_bytes(figure: Figure) -> bytes:

@@ -39,13 +39,12 @@ def map_summary(
             f"{amplitudes.size} amplitudes {_span(amplitudes, unit)}, "
             f"{frequencies.size} frequencies {_span(frequencies, 'Hz')}",
         ),
-        ("orbits", f"{count.sum()} in {count.size} cells; {_scope(smap, coexisting)}"),
+        ("orbits", f"{count.sum()} in {count.size} cells; {_scope(smap)}"),
     ]
     if count.any():
         unstable = np.any(layers >= 1.0, axis=0)
         lines.append(("unstable", f"{_cells_holding(unstable)} an unstable orbit{_where(smap, unstable)}"))
-        if coexisting:
-            lines.append(("several", f"{_cells_holding(several)} several orbits{_where(smap, several)}"))
+        lines.append(("coexisting", _coexisting_words(smap, several, coexisting)))
         row, column = np.unravel_index(int(np.nanargmax(worst)), worst.shape)
         place = f"{quantity(amplitudes[row], unit)}, {quantity(frequencies[column], 'Hz')}"
         lines.append(("largest |µ|", f"{worst[row, column]:.4f} at {place}"))
@@ -53,6 +52,8 @@ def map_summary(
         lines.append(("error", f"{smap.error:.1e} in |µ| by integration, {steps} steps a period"))
     if folds is not None:
         lines.append(("folds", _fold_curve_words(folds, unit)))
+    elif several.any():
+        lines.append(("folds", "not followed; --folds draws their curve and finds its cusps"))
     lines.append(("not found", _missing(smap, count, coexisting)))
     for name, (compiling, running) in (seconds or {}).items():
         words = f"{compiling + running:.1f} s: {compiling:.1f} s compiling, {running:.1f} s running"
@@ -82,9 +83,17 @@ def _where(smap: StabilityMap, mask: np.ndarray) -> str:
     return f" ({', '.join(spans)})"
 
 
-def _scope(smap: StabilityMap, coexisting: bool) -> str:
-    kind = "symmetric orbits only, by the half-period map" if smap.symmetric else "orbits of one drive period"
-    return kind if coexisting else f"that of smallest motion in each, others not sought; {kind}"
+def _coexisting_words(smap: StabilityMap, several: np.ndarray, sought: bool) -> str:
+    if not sought:
+        return "not sought; only the orbit of smallest motion in each cell. --coexisting seeks all"
+    if not several.any():
+        return "nowhere; each cell holds at most one orbit"
+    most = int(np.max(np.asarray(smap.count)))
+    return f"{_cells_holding(several)} several orbits, up to {most}{_where(smap, several)}"
+
+
+def _scope(smap: StabilityMap) -> str:
+    return "symmetric orbits only, by the half-period map" if smap.symmetric else "orbits of one drive period"
 
 
 def _fold_curve_words(folds: FoldCurve, unit: str) -> str:

@@ -1,5 +1,6 @@
-"""report.html: one page that holds everything, pictures included."""
+"""report.html, one page that holds everything, pictures included; report.md with its pictures beside it."""
 
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
@@ -11,6 +12,7 @@ from ...health import CampaignHealth, campaign_health
 from ...identification import OUTPUT_UNITS, Candidate, Fit, Loop, plain_unit
 from ...records import Campaign
 from ..words import (
+    GLOSSARY,
     budget_rows,
     budget_words,
     caveats,
@@ -30,7 +32,7 @@ from ..words import (
     typeset_unit,
 )
 from ..words import typeset_with_error as with_error
-from ._pictures import draw_pictures
+from ._pictures import Picture, draw_pictures
 from ._summary import error_rows, parameter_words
 
 _VERDICTS = {
@@ -52,18 +54,60 @@ def render_page(loop: Loop, health: CampaignHealth | None = None) -> str:
     Returns:
         The page.
     """
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    source = files("isojax.reporting").joinpath("report.html.jinja").read_text(encoding="utf-8")
     health = campaign_health(loop) if health is None else health
-    return environment.from_string(source).render(_content(loop, health))
+    return _rendered("report.html.jinja", page_content(loop, health))
 
 
-def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
+def render_pages(content: Mapping[str, Any], *, markdown: bool = False) -> dict[str, str | bytes]:
+    """Give the files of a report.
+
+    Args:
+        content: of the pages, as `page_content` gives it.
+        markdown: whether to give report.md and its pictures as well.
+
+    Returns:
+        Content by file name.
+    """
+    pages: dict[str, str | bytes] = {"report.html": _rendered("report.html.jinja", content)}
+    if markdown:
+        pages["report.md"] = _rendered("report.md.jinja", content)
+        pictures = [one for name, some in content.items() if name.endswith("_pictures") for one in some]
+        pages |= {picture.file: picture.png for picture in pictures}
+    return pages
+
+
+def _rendered(template: str, content: Mapping[str, Any]) -> str:
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    environment.filters["cell"] = lambda words: str(words).replace("|", "\\|")
+    source = files("isojax.reporting").joinpath(template).read_text(encoding="utf-8")
+    return environment.from_string(source).render(content)
+
+
+def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
+    """Give what the templates of a report ask for: words, rows of tables, pictures.
+
+    Args:
+        loop: the closed loop.
+        health: of its campaign.
+
+    Returns:
+        Content by its name in the templates.
+    """
     before, after = loop.before, loop.after
     same = before is after
     campaign = loop.campaign
     quantity = campaign.output.quantity
     remainder = loop.remainder
+    laws = [] if remainder is None else law_rows(remainder.pursuit)
+    bounds = [
+        (
+            effect,
+            effect_words(effect),
+            f"{typeset_number(upper, 3)} {typeset_unit(plain_unit(unit, campaign))}",
+        )
+        for effect, (upper, unit) in loop.bounds.items()
+    ]
+    pictures = draw_pictures(loop, health)
     return {
         "title": campaign.title,
         "verdict": loop.verdict,
@@ -96,16 +140,10 @@ def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
             )
             for entry in list_parameters(after.model)
         ],
-        "bounds": [
-            (
-                effect,
-                effect_words(effect),
-                f"{typeset_number(upper, 3)} {typeset_unit(plain_unit(unit, campaign))}",
-            )
-            for effect, (upper, unit) in loop.bounds.items()
-        ],
+        "contents": _contents(same, remainder is not None, len(bounds), pictures),
+        "bounds": bounds,
         "remainder": "" if remainder is None else pursuit_words(remainder.pursuit),
-        "remainder_laws": [] if remainder is None else law_rows(remainder.pursuit),
+        "remainder_laws": laws,
         "facts": _facts(loop),
         "health": (
             *health_words(health.data, after),
@@ -118,10 +156,36 @@ def _content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
         "caveats": caveats(loop),
         "fit_report_before": str(before),
         "fit_report_after": str(after),
-        **draw_pictures(loop, health),
+        **pictures,
+        "glossary": GLOSSARY,
         "version": version("isojax"),
         "seconds": f"{loop.seconds:.0f}",
     }
+
+
+def _contents(
+    same: bool, residual: bool, bounds: int, pictures: Mapping[str, Sequence[Picture]]
+) -> dict[str, dict[str, str]]:
+    """Give the sections in their order: title, and what the folded ones hold."""
+    listed = {
+        "error": ("Error" if same else "Error before and after", ""),
+        "coefficients": ("Coefficients", ""),
+        "residual": ("Unexplained residual", "") if residual else None,
+        "limits": ("Limits of this report", ""),
+        "evidence": ("Evidence", "scores of the absent effects, errors"),
+        "residual-detail": ("Laws of the residual", "where it is, and as a force") if residual else None,
+        "records": ("Model against the records", "time histories, residuals")
+        if pictures["record_pictures"]
+        else None,
+        "forces": ("Force laws", "receptance, backbone, equivalent stiffness and damping")
+        if pictures["force_pictures"]
+        else None,
+        "bounds": ("Upper bounds", f"for {bounds} effects that were not found" if bounds else "none given"),
+        "data": ("Data quality and start values", "noise, settling, folds, drift"),
+        "fit": ("Fit report", "all coefficients, correlations"),
+        "words": ("Word list", "terms of other schools"),
+    }
+    return {name: {"title": one[0], "hint": one[1]} for name, one in listed.items() if one is not None}
 
 
 def _elements(fit: Fit) -> str:

@@ -1,6 +1,7 @@
-"""The pictures of the report, drawn and encoded."""
+"""The pictures of the report, drawn."""
 
 import base64
+import re
 from collections.abc import Callable
 from io import BytesIO
 from typing import Any, NamedTuple
@@ -9,10 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._progress import step
 from ..._results import is_successful
 from ...health import CampaignHealth
 from ...identification import ClassicalGuess, Fit, Loop, residual
 from ..plots import (
+    Slice,
     centre_frequency,
     effect_on_its_own,
     measured_forces,
@@ -33,13 +36,16 @@ from ..plots import (
     plot_stiffness_scatter,
     plot_time_history,
     plot_where,
+    telling_slice,
     trace_cycles,
     visited_amplitudes,
     worst_window,
 )
 
-_DPI = 144
-_HALF, _WHOLE, _HEIGHT = 5.4, 11.0, 3.1
+_DPI = 170
+_THIRD, _WHOLE, _HEIGHT = 3.8, 11.0, 2.9
+"""Sizes [inch]: on a wide screen three pictures stand side by side, on a telephone one fills the width, and
+the letters can be read on both."""
 
 
 class Picture(NamedTuple):
@@ -48,21 +54,24 @@ class Picture(NamedTuple):
     Attributes:
         name: what it shows, a few words.
         caption: how to read it.
-        data: PNG as base64.
+        png: the file.
         wide: whether it takes the whole width.
     """
 
     name: str
     caption: str
-    data: str
+    png: bytes
     wide: bool = False
 
+    @property
+    def data(self) -> str:
+        """The file as base64."""
+        return base64.b64encode(self.png).decode("ascii")
 
-def encode(figure: Figure) -> str:
-    """Give a figure as PNG in base64."""
-    page = BytesIO()
-    figure.savefig(page, format="png", dpi=_DPI)
-    return base64.b64encode(page.getvalue()).decode("ascii")
+    @property
+    def file(self) -> str:
+        """Name of the file beside report.md."""
+        return f"report_{re.sub('[^a-z0-9]+', '_', self.name.lower())}.png"
 
 
 def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture, ...]]:
@@ -75,42 +84,79 @@ def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture
         health: of its campaign.
 
     Returns:
-        Section to its pictures: error_pictures, evidence_pictures, remainder_pictures, record_pictures,
-        force_pictures, health_pictures.
+        Section to its pictures: lead_pictures, error_pictures, evidence_pictures, remainder_pictures,
+        record_pictures, force_pictures, health_pictures.
     """
     before = loop.before if is_successful(loop.before.result) else None
     differs = loop.after is not loop.before and is_successful(loop.after.result)
     after = loop.after if differs else None
+    telling = "damping" if before is None else telling_slice(before, after)
     return {
+        "lead_pictures": () if before is None else _lead_pictures(before, after, telling),
         "error_pictures": () if before is None else _error_pictures(before, after),
-        "evidence_pictures": _evidence_pictures(loop, before, after),
+        "evidence_pictures": _evidence_pictures(loop),
         "remainder_pictures": _remainder_pictures(loop),
         "record_pictures": () if before is None else _record_pictures(before, after),
-        "force_pictures": _force_pictures(loop.guess, before, after),
+        "force_pictures": _force_pictures(loop.guess, before, after, telling),
         "health_pictures": () if before is None else _health_pictures(before, after, health),
     }
 
 
 def _draw(
-    name: str, caption: str, plot: Callable[..., Figure], *args: Any, wide: bool = False, **options: Any
+    name: str,
+    caption: str,
+    plot: Callable[..., Figure],
+    *args: Any,
+    wide: bool = False,
+    height: float = _HEIGHT,
+    **options: Any,
 ) -> tuple[Picture, ...]:
     """Draw one picture, as a row of its own to join to others."""
-    size = (_WHOLE if wide else _HALF, _HEIGHT)
+    step(f"drawing: {name}")
+    size = (_WHOLE if wide else _THIRD, height)
     ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
-    return (Picture(name, caption, encode(plot(*args, ax=ax, **options)), wide),)
+    file = BytesIO()
+    plot(*args, ax=ax, **options).savefig(file, format="png", dpi=_DPI)
+    return (Picture(name, caption, file.getvalue(), wide),)
+
+
+def _lead_pictures(before: Fit, after: Fit | None, telling: Slice) -> tuple[Picture, ...]:
+    """Draw what convinces: residual over the cycle, the force law, residual against the drive."""
+    if any(run.record.dwells for run in before.restarts.runs):
+        caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force remains."
+        residuals = _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
+    else:
+        place, low, high = worst_window(before)
+        where = {"record": place, "window": (low, high)}
+        caption = "Measured minus model, where the error before is largest."
+        residuals = _draw("largest residual", caption, plot_residual, before, after, **where)
+    left, right = residual(before), None if after is None else residual(after)
+    caption = "Inside the band, the residual is uncorrelated with the drive."
+    return (
+        *residuals,
+        *_restoring_force(before, after, telling),
+        *_draw("cross-correlation", caption, plot_correlation, left, right, what="drive"),
+    )
+
+
+def _restoring_force(before: Fit, after: Fit | None, what: Slice) -> tuple[Picture, ...]:
+    """Draw the forces of the models over displacement or velocity."""
+    caption = "Points: measured. Outside the visited range the curves extrapolate."
+    name = f"force against {'displacement' if what == 'stiffness' else 'velocity'}"
+    return _draw(name, caption, plot_restoring_force, before, after, what=what)
 
 
 def _error_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
     """Draw the errors before and after."""
     goodness = "Segments restarted, squared error over squared noise. 1 means noise alone."
-    free = "Each record simulated from start to end, nothing fed back."
+    free = "Each record simulated from start to end."
     return (
         *_draw("goodness of fit", goodness, plot_errors, before, after),
         *_draw("free-run error", free, plot_errors, before, after, measure="nrmse"),
     )
 
 
-def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tuple[Picture, ...]:
+def _evidence_pictures(loop: Loop) -> tuple[Picture, ...]:
     """Draw the ranking behind each finding, or behind the verdict, and the effects by themselves."""
     caption = "Score of each absent effect, net of what a refit would absorb; χ²/dof where refitted."
     rankings = [(one.ranking, one.effect, one.indistinguishable) for one in loop.findings]
@@ -120,18 +166,9 @@ def _evidence_pictures(loop: Loop, before: Fit | None, after: Fit | None) -> tup
     for ranking, effect, others in rankings:
         if ranking:
             name = "ranking" if effect is None else f"ranking that found {effect}"
-            figure = plot_ranking(
-                ranking,
-                effect=effect,
-                indistinguishable=others,
-                ax=Figure(
-                    figsize=(_WHOLE, 1.3 + 0.27 * min(10, max(3, len(ranking)))), layout="constrained"
-                ).add_subplot(),
-            )
-            pictures.append(Picture(name, caption, encode(figure), True))
-    if before is not None and any(run.record.dwells for run in before.restarts.runs):
-        caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force remains."
-        pictures += _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
+            options = {"effect": effect, "indistinguishable": others, "wide": True}
+            height = 1.3 + 0.27 * min(10, max(3, len(ranking)))
+            pictures += _draw(name, caption, plot_ranking, ranking, height=height, **options)
     return tuple(pictures) + _effect_pictures(loop)
 
 
@@ -146,7 +183,7 @@ def _remainder_pictures(loop: Loop) -> tuple[Picture, ...]:
             "Rms over the noise: 1 means noise alone. Shows at which level and frequency the model fails."
         )
         pictures += _draw("map of the residual", caption, plot_remainder_map, remainder.dwells)
-    caption = "Drive less inertia less model, averaged; a law of x and v has one value at each point."
+    caption = "Drive minus inertia minus model, averaged; a law of x and v has one value at each point."
     pictures += _draw("force residual over the plane", caption, plot_force_residual_map, remainder.force_map)
     if remainder.dwells:
         caption = "The worst dwell of the lowest, middle and highest level; grey: noise, ±2σ per harmonic."
@@ -185,9 +222,9 @@ def _motion(loop: Loop) -> tuple[float, float, float]:
 
 
 def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
-    """Draw the worst record against the models, and what they leave."""
+    """Draw the worst record against the models, and the residuals."""
     place, low, high = worst_window(before)
-    caption = "Free run, nothing fed back: the record with the largest error before."
+    caption = "Free run: the record with the largest error before."
     zoomed = "The same record at the cycles with the largest error before."
     left, right = residual(before), None if after is None else residual(after)
     return (
@@ -195,7 +232,7 @@ def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
         *_draw("zoom", zoomed, plot_time_history, before, after, record=place, window=(low, high)),
         *_draw(
             "residual there",
-            "Measured less model.",
+            "Measured minus model.",
             plot_residual,
             before,
             after,
@@ -217,19 +254,13 @@ def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
             left,
             right,
         ),
-        *_draw(
-            "cross-correlation",
-            "Inside the band the residual holds nothing of the drive.",
-            plot_correlation,
-            left,
-            right,
-            what="drive",
-        ),
     )
 
 
-def _force_pictures(guess: ClassicalGuess, before: Fit | None, after: Fit | None) -> tuple[Picture, ...]:
-    """Draw the force laws of the models beside what the classical route sees."""
+def _force_pictures(
+    guess: ClassicalGuess, before: Fit | None, after: Fit | None, telling: Slice
+) -> tuple[Picture, ...]:
+    """Draw the force laws of the models beside those of the classical route."""
     fits = [] if before is None else [(label, fit) for label, fit, _ in pair(before, after)]
     pictures: tuple[Picture, ...] = ()
     if guess.responses or guess.linear:
@@ -242,13 +273,7 @@ def _force_pictures(guess: ClassicalGuess, before: Fit | None, after: Fit | None
         for what in ("stiffness", "damping"):
             pictures += _draw(f"equivalent {what}", caption, plot_equivalent, guess, fits, what=what)
     if before is not None:
-        caption = (
-            "Drive less inertia; internal states at rest. Outside the visited range the curves extrapolate."
-        )
-        for what in ("stiffness", "damping"):
-            pictures += _draw(
-                f"restoring force, {what}", caption, plot_restoring_force, before, after, what=what
-            )
+        pictures += _restoring_force(before, after, "stiffness" if telling == "damping" else "damping")
     return pictures
 
 

@@ -5,54 +5,47 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..._output_folder import check_folder, publish
 from ..._results import is_successful
 from ...health import CampaignHealth, campaign_health
 from ...identification import Fit, Loop
-from ...models import model_to_dict, write_whole
-from ._page import render_page
+from ...models import model_to_dict
+from ._page import page_content, render_pages
 from ._result import result_dict
 
+MAP_FILES = ("map.npz", "map.png", "response.png", "folds.png", "curves.png")
+"""What a map writes."""
 
-def check_folder(folder: str | Path) -> Path:
-    """Refuse a folder that cannot be written to; nothing is made yet.
-
-    Args:
-        folder: where results shall go.
-
-    Returns:
-        Its path.
-
-    Raises:
-        ValueError: if something else than a folder is in the way.
-    """
-    folder = Path(folder)
-    for part in (folder, *folder.parents):
-        if part.exists() and not part.is_dir():
-            raise ValueError(f"{folder} must be a folder, but {part} is a file.")
-    return folder
+MODEL_FILES = ("model.json", "fit.txt", "report.html", "result.json", "report.md", "report_*.png")
+"""What a fit or a loop writes, as patterns."""
 
 
-def write_report(loop: Loop, folder: str | Path, health: CampaignHealth | None = None) -> None:
+def write_report(
+    loop: Loop, folder: str | Path, health: CampaignHealth | None = None, *, markdown: bool = False
+) -> None:
     """Write report.html, result.json and model.json; everything is ready before the first is written.
 
-    Where the last fit failed there is no model: no model.json is written, and one of before is removed.
+    Where the last fit failed there is no model: no model.json is written, and one of before is removed. So
+    are the other files that isojax wrote there: they belong to another run.
 
     Args:
         loop: the closed loop.
-        folder: where they go; made if it is not there. Other files in it stay as they are.
+        folder: where they go; made if it is not there. Files that isojax did not write stay as they are.
         health: of its campaign; computed here if omitted.
+        markdown: whether to write report.md as well, with its pictures report_*.png beside it.
 
     Raises:
         ValueError: if something else than a folder is in the way, or a model that was found is not finite.
+        KeptElsewhereError: if they could not be written there; it names the folder that has them.
     """
     folder = check_folder(folder)
     health = campaign_health(loop) if health is None else health
     texts = {
         "model.json": model_text(loop.after),
-        "report.html": render_page(loop, health),
+        **render_pages(page_content(loop, health), markdown=markdown),
         "result.json": json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n",
     }
-    write_texts(folder, texts)
+    write_model_files(folder, texts)
 
 
 def model_text(fit: Fit) -> str | None:
@@ -77,16 +70,14 @@ def model_text(fit: Fit) -> str | None:
     return json.dumps(model_to_dict(fit.model), indent=1, allow_nan=False) + "\n"
 
 
-def write_texts(folder: Path, texts: Mapping[str, str | bytes | None]) -> None:
-    """Write files whole; the folder is made now that everything to write is ready.
+def write_model_files(folder: Path, contents: Mapping[str, str | bytes | None]) -> None:
+    """Write what belongs to a model; what an earlier run wrote there, a map included, belongs to another.
 
     Args:
         folder: where they go.
-        texts: content by file name; None removes the file that an earlier run left.
+        contents: content by file name; no model.json where that is None.
+
+    Raises:
+        KeptElsewhereError: if they could not be written there; it names the folder that has them.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        if text is None:
-            (folder / name).unlink(missing_ok=True)
-        else:
-            write_whole(folder / name, text)
+    publish(folder, contents, (*MODEL_FILES, *MAP_FILES))

@@ -23,10 +23,12 @@ from ._evidence_plots import plot_ranking as plot_ranking
 from ._evidence_plots import plot_stiffness_scatter as plot_stiffness_scatter
 from ._fold_curve_plot import plot_fold_curve as plot_fold_curve
 from ._force_cycles import trace_cycles as trace_cycles
+from ._force_plots import Slice as Slice
 from ._force_plots import effect_on_its_own as effect_on_its_own
 from ._force_plots import measured_forces as measured_forces
 from ._force_plots import plot_effect as plot_effect
 from ._force_plots import plot_restoring_force as plot_restoring_force
+from ._force_plots import telling_slice as telling_slice
 from ._inspection_plot import plot_inspection as plot_inspection
 from ._map_plots import plot_response_map as plot_response_map
 from ._map_plots import plot_stability_map as plot_stability_map
@@ -40,6 +42,7 @@ from ._residual_plots import plot_correlation as plot_correlation
 from ._residual_plots import plot_cycle_residual as plot_cycle_residual
 from ._residual_plots import plot_residual as plot_residual
 from ._residual_plots import plot_where as plot_where
+from ._response_curves_plot import plot_response_curves as plot_response_curves
 from ._sensitivity_plot import plot_sensitivity as plot_sensitivity
 from ._stability_style import drive_unit as drive_unit
 from ._stability_style import quantity as quantity

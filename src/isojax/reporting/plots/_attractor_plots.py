@@ -48,8 +48,7 @@ def plot_bifurcation_diagram(diagram: BifurcationDiagram, *, ax: Axes | None = N
         if diagram.parameter == "amplitude"
         else quantity(float(diagram.amplitudes[0]), drive_unit(diagram.model.excitation))
     )
-    entitle(ax, f"Settled motion at {fixed}{_periods(diagram)}")
-    ax.legend(handles=list(shown.values()), fontsize=7.5, frameon=False)
+    entitle(ax, f"Settled motion at {fixed}{_periods(diagram)}", list(shown.values()))
     return figure
 
 
@@ -103,7 +102,6 @@ def plot_phase_portrait(
                 label=f"at {np.degrees(phase):.0f}° of the drive",
                 zorder=3,
             )
-        ax.legend(fontsize=7.5, frameon=False)
     ax.set_xlabel("displacement [mm]")
     ax.set_ylabel("velocity [mm/s]")
     bounded = np.isfinite(x).all()
@@ -158,10 +156,7 @@ def plot_basins(basins: BasinsOfAttraction, *, ax: Axes | None = None) -> Figure
     ax.set_ylim(*_ends(v))
     ax.set_xlabel("displacement at t = 0 [mm]")
     ax.set_ylabel("velocity at t = 0 [mm/s]")
-    entitle(ax, "Basins of attraction")
-    ax.legend(
-        handles=handles, fontsize=7.5, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2
-    )
+    entitle(ax, "Basins of attraction", handles)
     return figure
 
 
@@ -206,5 +201,4 @@ def plot_return(back: ReturnToOrbit, *, ax: Axes | None = None) -> Figure:
     rate = float(back.rate)
     measured = f"; measured rate {rate:.3f} a period" if np.isfinite(rate) else ""
     entitle(ax, f"Disturbed motion: {ending}{measured}")
-    ax.legend(fontsize=7.5, frameon=False)
     return figure

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -18,7 +19,7 @@ from ._stability_style import (
     level_colours,
     parameter_label,
     quantity,
-    stability_legend,
+    stability_handles,
 )
 from ._style import MEASURED, NEUTRAL, axes_for, entitle
 
@@ -57,8 +58,8 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
         kinds |= set(draw_special_points(ax, [_placed(one, point) for point in one.special_points]))
     ax.set_xlabel(parameter_label(branch.model, branch.parameter))
     ax.set_ylabel("response, half peak to peak [mm]")
-    entitle(ax, "Periodic response" + (f" at {_level(branch, 0)}" if len(curves) == 1 else ""))
-    stability_legend(ax, kinds, unstable=unstable)
+    title = "Periodic response" + (f" at {_level(branch, 0)}" if len(curves) == 1 else "")
+    entitle(ax, title, stability_handles(ax, kinds, unstable=unstable))
     return figure
 
 
@@ -106,8 +107,7 @@ def plot_frequency_response(
     ax.set_ylabel(
         "response, half peak to peak [mm]" if what == "displacement" else "phase after the drive [°]"
     )
-    entitle(ax, "Frequency response")
-    stability_legend(ax, kinds, unstable=unstable, extra=extra)
+    entitle(ax, "Frequency response", stability_handles(ax, kinds, unstable=unstable, extra=extra))
     return figure
 
 
@@ -128,8 +128,7 @@ def plot_backbone(backbone: BackboneCurve, *, ax: Axes | None = None) -> Figure:
     ax.set_ylim(bottom=0.0)
     missing = int(np.sum(~np.isfinite(np.asarray(backbone.frequency))))
     note = f"\nphase resonance not found at {missing} of {backbone.frequency.size} points" if missing else ""
-    entitle(ax, f"Backbone{note}")
-    ax.legend(handles=handles, fontsize=7.5, frameon=False)
+    entitle(ax, f"Backbone{note}", handles)
     return figure
 
 
@@ -148,7 +147,7 @@ def plot_transmissibility(transmissibility: Transmissibility, *, ax: Axes | None
     ratio = np.atleast_2d(np.asarray(transmissibility.magnitude))
     stable = np.atleast_2d(np.asarray(transmissibility.stable))
     unstable = False
-    for x, y, held in _threads(frequency, ratio, stable):
+    for x, y, held in threads(frequency, ratio, stable):
         unstable |= _any_unstable(y, held)
         draw_curve(ax, x, y, held, level_colours(1)[0])
     ax.axhline(1.0, color=MEASURED, linewidth=0.8, linestyle=":")
@@ -158,15 +157,26 @@ def plot_transmissibility(transmissibility: Transmissibility, *, ax: Axes | None
     ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("transmissibility [1]")
-    entitle(ax, "Transmissibility of the fundamental; isolates below 1")
-    stability_legend(ax, unstable=unstable)
+    title = "Transmissibility of the fundamental; isolates below 1"
+    entitle(ax, title, stability_handles(ax, unstable=unstable))
     return figure
 
 
-def _threads(
-    frequency: np.ndarray, values: np.ndarray, stable: np.ndarray
+def threads(
+    frequency: Float[np.ndarray, " frequency"],
+    values: Float[np.ndarray, "orbit frequency"],
+    stable: Bool[np.ndarray, "orbit frequency"],
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Give coexisting orbits as curves; where their number changes, one goes on into the nearest."""
+    """Give coexisting orbits as curves; where their number changes, one goes on into the nearest.
+
+    Args:
+        frequency: ascending [Hz].
+        values: of each orbit, by rising size; NaN where there is none.
+        stable: whether it is stable.
+
+    Returns:
+        Frequency, value and stability along each curve.
+    """
     count = np.sum(np.isfinite(values), axis=0)
     breaks = np.flatnonzero(np.diff(count)) + 1
     curves = []

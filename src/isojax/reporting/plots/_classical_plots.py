@@ -59,8 +59,6 @@ def plot_receptance(
             _backbone(guess, fit, label, colour, width, ax)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("receptance [mm/kN]" if what == "receptance" else "displacement amplitude [mm]")
-    ax.margins(x=0.03, y=0.05 if len(guess.responses) <= 4 else 0.2)
-    ax.legend(fontsize=6.5, ncols=2 if len(guess.responses) > 4 else 1, loc="upper right")
     entitle(ax, "measured receptance" if what == "receptance" else "measured amplitude and model backbone")
     return figure
 
@@ -171,7 +169,5 @@ def plot_equivalent(
     side = "displacement amplitude X [mm]" if what == "stiffness" else "velocity amplitude V [mm/s]"
     ax.set_xlabel(side)
     ax.set_ylabel(r"$K_\mathrm{eq}$ [N/mm]" if what == "stiffness" else r"$C_\mathrm{eq}$ [N s/mm]")
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(fontsize=7.5)
     entitle(ax, f"equivalent {what} at {frequency:.3g} Hz, visited amplitudes")
     return figure

@@ -59,6 +59,4 @@ def plot_dwell_stability(
         ax.set_ylim(0.0, 1.2 * reach)
         ax.set_ylabel("change of drive to the fold [%]")
         entitle(ax, "how far the nearest fold of its branch is")
-    if len(groups) > 1:
-        ax.legend(fontsize=7, ncols=2 if len(groups) > 4 else 1, loc="best")
     return figure

@@ -64,8 +64,6 @@ def plot_ranking(
     ax.set_xlim(0.5 * np.min(sizes, initial=1.0), 2.0 * np.max(sizes, initial=10.0))
     ax.grid(False, axis="y")
     ax.set_xlabel("score |z| [standard deviations]")
-    if shown:
-        ax.legend(fontsize=7.5, loc="upper right", bbox_to_anchor=(1.0, -0.16), ncols=4, frameon=False)
     entitle(ax, "score of each absent effect")
     return figure
 
@@ -105,10 +103,10 @@ def plot_errors(
     """
     figure, ax = axes_for(ax, width=3.4)
     roles = [role for role in ROLES if before.errors[role] is not None]
-    scale, label, form = {
-        "chi2_per_dof": (1.0, "χ²/dof [1]", "{:.3f}"),
-        "nrmse": (100.0, "NRMSE of free runs [%]", "{:.2f}"),
-        "nrmse_segments": (100.0, "NRMSE, segments restarted [%]", "{:.2f}"),
+    scale, label, form, title = {
+        "chi2_per_dof": (1.0, "χ²/dof [1]", "{:.3g}", "squared error over squared noise"),
+        "nrmse": (100.0, "NRMSE [%]", "{:.2f}", "error of free runs"),
+        "nrmse_segments": (100.0, "NRMSE [%]", "{:.2f}", "error, segments restarted"),
     }[measure]
     shifts = (0.0,) if after is None else (-0.2, 0.2)
     for (name, fit, colour), shift in zip(pair(before, after), shifts, strict=True):
@@ -125,7 +123,7 @@ def plot_errors(
     ax.set_xlim(-0.6, len(roles) - 0.4)
     ax.grid(False, axis="x")
     ax.set_ylabel(label)
-    ax.legend(fontsize=7.5, loc="upper right", ncols=3)
+    entitle(ax, title)
     return figure
 
 
@@ -156,6 +154,5 @@ def plot_stiffness_scatter(before: Fit, after: Fit | None = None, *, ax: Axes | 
     ax.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
     ax.set_xlabel("record, in the order of the test")
     ax.set_ylabel("deviation of k1 [%]")
-    ax.legend(fontsize=7.5)
     entitle(ax, "linear stiffness from record to record")
     return figure

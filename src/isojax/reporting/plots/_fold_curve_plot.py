@@ -46,13 +46,12 @@ def plot_fold_curve(curve: FoldCurve, *, excitation: str = "force", ax: Axes | N
     ax.margins(0.08)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel(drive_words(excitation))
-    ax.legend(handles=handles, fontsize=7.5, frameon=False)
     state = "closed" if bool(curve.closed) else "leaves the window"
     ends = [
         f"{np.nanmin(values):.4g} to {np.nanmax(values):.4g} {unit}"
         for values, unit in ((frequency, "Hz"), (amplitude, drive_unit(excitation)))
     ]
-    entitle(ax, f"Folds: inside, orbits coexist and one is unstable ({state})\n{ends[0]}, {ends[1]}")
+    entitle(ax, f"Folds: inside, orbits coexist and one is unstable ({state})\n{ends[0]}, {ends[1]}", handles)
     return figure
 
 

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -45,7 +46,18 @@ def trace_cycles(model: Isolator, amplitudes: Float[np.ndarray, " amplitude"], f
     """
     omega = 2.0 * np.pi * frequency
     phase = 2.0 * np.pi * np.arange(_POINTS) / _POINTS
-    size = jnp.asarray(amplitudes)
+    force = _forces(model, jnp.asarray(amplitudes), jnp.asarray(omega))
+    x = amplitudes * np.sin(phase)[:, None]
+    v = omega * amplitudes * np.cos(phase)[:, None]
+    return Cycles(phase, x, v, np.asarray(force[-_POINTS:]))
+
+
+@eqx.filter_jit
+def _forces(
+    model: Isolator, size: Float[Array, " amplitude"], omega: Float[Array, ""]
+) -> Float[Array, "time amplitude"]:
+    """Give the force at every point of every cycle, compiled once for each set of elements."""
+    phase = 2.0 * np.pi * np.arange(_POINTS) / _POINTS
     step = 2.0 * np.pi / _POINTS / omega
 
     def state(angle: Array, internal: tuple[Array, ...]) -> State:
@@ -69,10 +81,7 @@ def trace_cycles(model: Isolator, amplitudes: Float[np.ndarray, " amplitude"], f
 
     cycles = 1 if model.internal_states == 0 else 1 + _SETTLING
     start = (jnp.zeros_like(size),) * model.internal_states
-    _, force = jax.lax.scan(advance, start, jnp.tile(jnp.asarray(phase), cycles))
-    x = amplitudes * np.sin(phase)[:, None]
-    v = omega * amplitudes * np.cos(phase)[:, None]
-    return Cycles(phase, x, v, np.asarray(force[-_POINTS:]))
+    return jax.lax.scan(advance, start, jnp.tile(jnp.asarray(phase), cycles))[1]
 
 
 def equivalent_curves(

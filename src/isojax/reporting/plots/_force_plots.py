@@ -16,6 +16,9 @@ from ...records import Record, measured_state
 from ._force_cycles import trace_cycles
 from ._style import AFTER, BAND, CURVES, MEASURED, NEUTRAL, axes_for, entitle, fits_meant, pair
 
+Slice = Literal["stiffness", "damping"]
+"""An axis of the plane of x and v: force over displacement at v = 0, or over velocity at x = 0."""
+
 _MOST_POINTS = 4000
 
 
@@ -46,7 +49,7 @@ def plot_restoring_force(
     before: Fit,
     after: Fit | None = None,
     *,
-    what: Literal["stiffness", "damping"] = "stiffness",
+    what: Slice = "stiffness",
     ax: Axes | None = None,
 ) -> Figure:
     """Draw the force of the models over displacement at v = 0, or over velocity at x = 0.
@@ -87,9 +90,31 @@ def plot_restoring_force(
     ax.set_xlim(1e3 * grid[0], 1e3 * grid[-1])
     ax.set_xlabel("displacement [mm]" if what == "stiffness" else "velocity [mm/s]")
     ax.set_ylabel("force [N]")
-    ax.legend(fontsize=7.5, loc="upper left")
-    entitle(ax, "restoring force at v = 0" if what == "stiffness" else "restoring force at x = 0")
+    entitle(
+        ax, "restoring force over x, at v = 0" if what == "stiffness" else "restoring force over v, at x = 0"
+    )
     return figure
+
+
+def telling_slice(before: Fit, after: Fit | None = None) -> Slice:
+    """Say along which axis the forces of two models differ most, within the visited range.
+
+    Args:
+        before: the declared model, fitted.
+        after: the extended model, fitted; omitted where there is none.
+
+    Returns:
+        "damping" where there is one model only: most of what an isolator's model lacks depends on velocity.
+    """
+    if after is None:
+        return "damping"
+    visited = [measured_forces(before, record)[:2] for record in before.campaign.fit_records]
+    gaps: dict[Slice, float] = {}
+    for place, what in enumerate(("stiffness", "damping")):
+        reach = max(float(np.max(np.abs(motion[place]))) for motion in visited)
+        grid = np.linspace(-reach, reach, 801)
+        gaps[what] = float(np.max(np.abs(_slice(after.model, grid, what) - _slice(before.model, grid, what))))
+    return "stiffness" if gaps["stiffness"] > gaps["damping"] else "damping"
 
 
 def _crossings(
@@ -153,8 +178,6 @@ def plot_effect(
         )
     ax.set_xlabel("displacement [mm]")
     ax.set_ylabel("force [N]")
-    ax.margins(y=0.2)
-    ax.legend(fontsize=7.5, loc="upper right", ncols=2)
     words = next(element.words for element in fit.model.elements if element.name == effect)
     entitle(ax, f"{words} by itself, a cycle at {frequency:.3g} Hz")
     return figure

@@ -78,8 +78,7 @@ def _draw_spectra(ax: Axes, file: FileInspection, channels: Sequence[tuple[Chann
     ax.set_xscale("log")
     ax.set_xlabel("frequency [Hz]" if file.rate is not None else "cycles per sample")
     ax.set_ylabel("power density [dB]")
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(fontsize=8, loc="lower left")
+    entitle(ax, "spectra")
 
 
 def _label(channel: ChannelInspection) -> str:

@@ -60,10 +60,8 @@ def plot_stability_map(
     if _crosses(radius, 1.0):
         ax.contour(*_centres(smap), radius, levels=[1.0], colors=_OUTLINE, linewidths=0.8)
         handles.append(Line2D([], [], color=_OUTLINE, linewidth=0.8, label="|µ| = 1"))
-    _finish(smap, radius, handles, folds, figure, ax)
-    entitle(
-        ax, f"Largest multiplier over one drive period{_which(smap, orbit, 'least stable')}{_caption(smap)}"
-    )
+    title = f"Largest multiplier over one drive period{_which(smap, orbit, 'least stable')}{_caption(smap)}"
+    _finish(smap, radius, title, handles, folds, ax)
     return figure
 
 
@@ -91,8 +89,8 @@ def plot_response_map(
     bar = figure.colorbar(mesh, ax=ax, pad=0.02)
     bar.set_label("response, half peak to peak [mm]", fontsize=9)
     bar.ax.tick_params(labelsize=8)
-    _finish(smap, response, [], folds, figure, ax)
-    entitle(ax, f"Displacement of the periodic response{_which(smap, orbit, 'largest')}{_caption(smap)}")
+    title = f"Displacement of the periodic response{_which(smap, orbit, 'largest')}{_caption(smap)}"
+    _finish(smap, response, title, [], folds, ax)
     return figure
 
 
@@ -210,9 +208,9 @@ def _outline(
 def _finish(
     smap: StabilityMap,
     values: Float[np.ndarray, "amplitude frequency"],
+    title: str,
     handles: list[Line2D | Patch],
     folds: FoldCurve | None,
-    figure: Figure,
     ax: Axes,
 ) -> None:
     """Draw what every map shows: several orbits, folds, empty cells; axes and legend."""
@@ -232,5 +230,4 @@ def _finish(
     ax.set_ylim(max(y[0], 0.0), y[-1])
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel(drive_words(smap.model.excitation))
-    if handles:
-        ax.legend(handles=handles, fontsize=7.5, loc="upper right", framealpha=0.9, edgecolor="none")
+    entitle(ax, title, handles)

@@ -86,7 +86,7 @@ def draw_signal(
 
 
 def finish_time_axes(ax: Axes, low: float, high: float, words: str, unit: str) -> None:
-    """Write what the axes are, leave room for a legend, and show it.
+    """Write what the axes are.
 
     Args:
         ax: the axes.
@@ -98,6 +98,3 @@ def finish_time_axes(ax: Axes, low: float, high: float, words: str, unit: str) -
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"{words} [{typeset_unit(unit)}]")
     ax.set_xlim(low, high)
-    ax.margins(y=0.18)
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(fontsize=8, loc="upper right", ncols=3)

@@ -55,8 +55,7 @@ def plot_remainder_map(dwells: Sequence[DwellRemainder], *, ax: Axes | None = No
     levelled = all(one.level is not None for one in dwells)
     ax.set_xlabel("drive frequency [Hz]")
     ax.set_ylabel("excitation level" if levelled else "amplitude [mm]")
-    ax.margins(y=0.25)
-    ax.legend(fontsize=7.5, loc="upper right", ncols=2)
+    ax.margins(y=0.1)
     entitle(ax, "where the residual exceeds the noise")
     return figure
 
@@ -122,8 +121,6 @@ def plot_force_residual_loops(
         )
     ax.set_xlabel("displacement [mm]" if against == "displacement" else "velocity [mm/s]")
     ax.set_ylabel("force residual [N]")
-    ax.margins(y=0.28)
-    ax.legend(fontsize=7.5, loc="upper right", ncols=3)
     entitle(ax, f"force residual over a cycle, against {against}")
     return figure
 

@@ -90,9 +90,7 @@ def plot_correlation(
     ax.axhspan(-band, band, color=BAND, zorder=0, label="white noise, 99 %")
     ax.set_xlabel("lag [samples]")
     ax.set_ylabel(("autocorrelation" if what == "residual" else "cross-correlation") + " [1]")
-    ax.margins(y=0.2)
-    ax.legend(fontsize=8, loc="upper right")
-    entitle(ax, f"residual against {'itself' if what == 'residual' else 'the drive'}, one curve a record")
+    entitle(ax, f"residual against {'itself' if what == 'residual' else 'the drive'}, by record")
     return figure
 
 
@@ -124,8 +122,6 @@ def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None)
     ax.axhline(1.0, color="black", linewidth=0.8)
     ax.set_xlabel("drive frequency [Hz]" if dwelling else "time in the record [s]")
     ax.set_ylabel("rms residual / noise [1]")
-    ax.margins(y=0.25)
-    ax.legend(fontsize=7.5, loc="upper right", ncols=2)
     entitle(ax, "residual over the noise: one point a " + ("dwell" if dwelling else "window"))
     return figure
 
@@ -173,8 +169,6 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
     ax.set_ylabel(f"mean residual [{typeset_unit(OUTPUT_UNITS[quantity])}]")
     ax.set_xlim(0.0, 360.0)
     ax.set_xticks(np.arange(0, 361, 60))
-    ax.margins(y=0.18)
-    ax.legend(fontsize=8, loc="upper right", ncols=3)
     entitle(ax, f"cycle-averaged residual: {record.name} at {dwell.frequency:.3g} Hz")
     return figure
 

@@ -72,7 +72,6 @@ def plot_sensitivity(
             linewidth=1.0,
             label=words,
         )
-        ax.legend(fontsize=7.5, frameon=False)
     ax.axvline(0.0, color=MEASURED, linewidth=0.8)
     ax.set_yticks(rows, [_words(sensitivity.parameters[place]) for place in known])
     ax.invert_yaxis()

@@ -144,16 +144,19 @@ def mark_handle(kind: str) -> Line2D:
     return Line2D([], [], label=MARKS[kind].words, **_form(MARKS[kind]))
 
 
-def stability_legend(
+def stability_handles(
     ax: Axes, kinds: Iterable[str] = (), *, unstable: bool = True, extra: Iterable[Any] = ()
-) -> None:
-    """Write what solid, dashed and the markers mean, below what is labelled already.
+) -> list[Any]:
+    """Give the entries of a legend: what is labelled, then what solid, dashed and the markers mean.
 
     Args:
         ax: the axes.
         kinds: bifurcations that were drawn.
         unstable: whether anything dashed was drawn.
         extra: more handles, after these.
+
+    Returns:
+        The handles.
     """
     handles, _ = ax.get_legend_handles_labels()
     grey = "#555555"
@@ -161,8 +164,7 @@ def stability_legend(
     if unstable:
         handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_DASHES, label="unstable"))
     handles += [mark_handle(kind) for kind in MARKS if kind in set(kinds)]
-    handles += list(extra)
-    ax.legend(handles=handles, fontsize=7.5, frameon=False)
+    return [*handles, *extra]
 
 
 def level_colours(count: int) -> tuple[str, ...]:

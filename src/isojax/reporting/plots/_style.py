@@ -1,9 +1,11 @@
 """How pictures look: colours that mean the same everywhere, and axes to draw on."""
 
 import functools
-from collections.abc import Callable, Mapping
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar, cast
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -21,6 +23,10 @@ CURVES = (3.0, 1.4)
 
 LEVELS = ("#0b3c6f", "#2a9d8f", "#e08e0b", "#a23b72", "#5f0f40", "#6b705c")
 """Colours of excitation levels, lowest first."""
+
+_LEGEND_SIZE, _LEGEND_ROW, _LEGEND_HANDLE, _LEGEND_LETTER = 7.5, 11.0, 28.0, 3.9
+_TITLE_LETTER = 4.9
+"""Sizes of the text over axes [points]: a line of the legend, what stands before its words, a letter."""
 
 ROLES: Mapping[str, str] = {"fit": "fitted", "holdout": "held out"}
 """What the roles of records are called."""
@@ -77,18 +83,50 @@ def axes_for(ax: Axes | None, width: float = 7.0, height: float = 3.2) -> tuple[
     """
     if ax is None:
         ax = Figure(figsize=(width, height), layout="constrained").add_subplot()
-    figure = ax.figure
-    while not isinstance(figure, Figure):
-        figure = figure.figure
     ax.grid(True, color="#e6e9ed", linewidth=0.6)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
     ax.tick_params(labelsize=8)
     ax.xaxis.label.set_fontsize(9)
     ax.yaxis.label.set_fontsize(9)
-    return figure, ax
+    return _figure(ax), ax
 
 
-def entitle(ax: Axes, title: str) -> None:
-    """Write the title over axes, to the left."""
-    ax.set_title(title, fontsize=9.5, loc="left")
+def _figure(ax: Axes) -> Figure:
+    """Give the figure that holds axes, also where they stand in a part of it."""
+    figure = ax.figure
+    while not isinstance(figure, Figure):
+        figure = figure.figure
+    return figure
+
+
+def entitle(ax: Axes, title: str, handles: Sequence[Artist] | None = None) -> None:
+    """Write the title over axes, to the left, and between both the legend, where it hides no data.
+
+    Args:
+        ax: axes on which everything is drawn.
+        title: its words; wrapped where the axes are too narrow for them.
+        handles: entries of the legend; what is labelled, if omitted.
+    """
+    entries = ax.get_legend_handles_labels()[0] if handles is None else list(handles)
+    width = 72.0 * _figure(ax).get_figwidth() * ax.get_position().width
+    lines = [textwrap.fill(line, max(20, int(width / _TITLE_LETTER))) for line in title.split("\n")]
+    rows = 0
+    if entries:
+        lengths = [len(str(entry.get_label())) * _LEGEND_LETTER + _LEGEND_HANDLE for entry in entries]
+        columns = max(1, min(len(entries), int(width / max(lengths))))
+        rows = -(-len(entries) // columns)
+        ax.legend(
+            handles=entries,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            borderaxespad=0.2,
+            borderpad=0.0,
+            labelspacing=0.25,
+            columnspacing=1.2,
+            handlelength=1.6,
+            fontsize=_LEGEND_SIZE,
+            ncols=columns,
+            frameon=False,
+        )
+    ax.set_title("\n".join(lines), fontsize=9.5, loc="left", pad=6.0 + rows * _LEGEND_ROW)

@@ -15,6 +15,7 @@ from ..._quantities import typeset_unit as typeset_unit
 from ..._quantities import typeset_with_error as typeset_with_error
 from ._check_first_words import check_first_dicts as check_first_dicts
 from ._check_first_words import check_first_words as check_first_words
+from ._glossary import GLOSSARY as GLOSSARY
 from ._health_words import budget_rows as budget_rows
 from ._health_words import budget_words as budget_words
 from ._health_words import dwell_words as dwell_words

@@ -113,16 +113,19 @@ def _verdict_words(loop: Loop) -> str:
         return f"{_capital(effects)}, {verb} missing; {error}."
     if loop.verdict == "partly_explained" and len(found) > 2 and loop.bounds:
         return (
-            f"{_capital(effects)}, explain the records together; so many may together imitate one law "
-            f"which is not known here; {error} (noise alone: 1)."
+            f"{_capital(effects)}, explain the records together, but so many effects can imitate a single "
+            f"law outside the catalogue; {error} (noise alone: 1)."
         )
     if loop.verdict == "partly_explained" and found:
-        return f"{_capital(effects)}, {verb} missing, but something else is too; {error} (noise alone: 1)."
+        return (
+            f"{_capital(effects)}, {verb} missing, and something else is missing too; {error} "
+            "(noise alone: 1)."
+        )
     pending = loop.last.finding
     if pending is not None and not found:
         return (
-            f"Something is missing, and {effect_words(pending.effect)} explains it best, but no effect "
-            f"might be added; {error} (noise alone: 1)."
+            f"Something is missing. {_capital(effect_words(pending.effect))} explains it best but was not "
+            f"added; {error} (noise alone: 1)."
         )
     known = f" even with {effects}" if found else ""
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
@@ -154,8 +157,8 @@ def finding_words(finding: Finding) -> tuple[str, ...]:
     chance = typeset_p_value(finding.p_value)
     chance = chance if chance.startswith("<") else f"= {chance}"
     lines = [
-        f"Adding it removes {typeset_share(finding.excess_explained)} of what the model left beyond the "
-        f"noise (family-wise p {chance})."
+        f"Adding it removes {typeset_share(finding.excess_explained)} of the excess over the noise "
+        f"(family-wise p {chance})."
     ]
     if math.isfinite(finding.transfer):
         # Above one chi2 is below its degrees of freedom there; next to no excess, a share means nothing.
@@ -219,8 +222,9 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
             f"{one.record} at {one.dwell.frequency:.3g} Hz ({typeset_share(one.change)})" for one in worst
         )
         lines.append(
-            f"{len(health.unsettled)} of {health.dwells} dwells never settled"
-            + (f"; the worst: {examples}." if worst else ".")
+            f"{len(health.unsettled)} of {health.dwells} dwells never settled; the worst: {examples}."
+            if worst
+            else f"All {health.dwells} dwells settled."
         )
     if health.brief_blows:
         names = ", ".join(f"{blow.record} ({blow.samples})" for blow in health.brief_blows)
@@ -260,14 +264,14 @@ def caveats(loop: Loop) -> tuple[str, ...]:
     """
     after = loop.after
     lines = [
-        f"Effects are named from a catalogue of {len(CATALOGUE)}; other causes can only show as unexplained.",
-        "χ²/dof is measured against the noise of the output channel; an error in that noise scales it.",
+        f"The search covers a catalogue of {len(CATALOGUE)} effects; any other cause shows as unexplained.",
+        "χ²/dof is relative to the estimated noise of the output; an error of that estimate scales it.",
     ]
     if after.errors["holdout"] is None:
-        lines.append("No record was held out: the error after says nothing of unseen data.")
+        lines.append("No record was held out, so no error here is one on unseen data.")
     if loop.last.hidden:
         names = ", ".join(effect_words(name) for name in loop.last.hidden)
-        lines.append(f"These data cannot show beside the fitted coefficients: {names}.")
+        lines.append(f"Invisible in these data beside the fitted coefficients: {names}.")
     held = {entry.name for entry in list_parameters(loop.before.model)}
     for entry in list_parameters(after.model):
         if not entry.spec.fitted and entry.name not in held:

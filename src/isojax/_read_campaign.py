@@ -1,12 +1,11 @@
 """A campaign that can be identified: every name in its [model] is in the catalogue."""
 
-from collections.abc import Mapping
+import difflib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...elements import CATALOGUE
-from ...records import Campaign, read_declaration, read_measurements
-from ._declared_model import catalogue_names
+from .records import Campaign, read_declaration, read_measurements
 
 
 def read_campaign(
@@ -55,6 +54,9 @@ def read_campaign(
         ('kN', 200.0)
     """
     declared = read_declaration(source, data)
+
+    from .elements import CATALOGUE  # starts JAX, which a declaration that is wrong need not wait for
+
     model = declared.sections["model"]
     names = catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"])
     for name in names:
@@ -66,23 +68,43 @@ def read_campaign(
     return read_measurements(declared)
 
 
-def as_campaign(value: object) -> Campaign:
-    """Give the campaign that is meant.
+def _catalogue_name(file: Path, field: str, found: str, suffix: str) -> str:
+    """Give the catalogue's name for a declared one, short (`cubic`) or in full (`cubic_stiffness`)."""
+    from .elements import CATALOGUE
+
+    for name in (found + suffix, found):
+        if name in CATALOGUE:
+            return name
+    short = [name.removesuffix(suffix) for name in CATALOGUE if suffix and name.endswith(suffix)]
+    near = difflib.get_close_matches(found, [*short, *CATALOGUE], n=1, cutoff=0.0)[0]
+    raise ValueError(
+        f"Field `{field}` of {file} must name effects of the catalogue, but has {found!r}; nearest: {near!r}."
+    )
+
+
+def catalogue_names(
+    file: Path, stiffness: Sequence[str], damping: Sequence[str], elements: Sequence[str]
+) -> tuple[str, ...]:
+    """List the catalogue names that the [model] of a campaign.toml means.
 
     Args:
-        value: a campaign, or the path of its campaign.toml or its folder.
+        file: the campaign.toml.
+        stiffness: springs, short (`cubic`) or in full (`cubic_stiffness`).
+        damping: dampers, likewise.
+        elements: further effects.
 
     Returns:
-        The campaign.
+        Their names, as written and in this order.
 
     Raises:
-        ValueError: if it is neither, and as `read_campaign` does.
+        ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
     """
-    if isinstance(value, str | Path):
-        return read_campaign(value)
-    if not isinstance(value, Campaign):
-        raise ValueError(
-            "Argument `campaign` must be a campaign, such as `read_campaign(path)` gives it, or a path, but "
-            f"is of type {type(value).__name__}."
+    return tuple(
+        _catalogue_name(file, field, found, suffix)
+        for field, names, suffix in (
+            ("model.stiffness", stiffness, "_stiffness"),
+            ("model.damping", damping, "_damping"),
+            ("model.elements", elements, ""),
         )
-    return value
+        for found in names
+    )

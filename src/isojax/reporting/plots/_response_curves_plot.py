@@ -1,0 +1,63 @@
+"""Curves of a stability map: the response over frequency at some of its drive amplitudes."""
+
+import numpy as np
+from jaxtyping import Int
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...stability import StabilityMap
+from ._branch_plots import threads
+from ._stability_style import MILLIMETRES, draw_curve, drive_unit, level_colours, quantity, stability_handles
+from ._style import axes_for, entitle
+
+_CURVES = 5
+
+
+def plot_response_curves(smap: StabilityMap, *, curves: int = _CURVES, ax: Axes | None = None) -> Figure:
+    """Draw the response over frequency, solid where stable and dashed where unstable.
+
+    The drive amplitudes are rows of the map at equal steps, the largest among them; where orbits coexist,
+    the nearest one gives way to the row with the most cells of several orbits.
+
+    Args:
+        smap: the map.
+        curves: how many rows, if the map has as many.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ValueError: if `curves` is no positive count.
+    """
+    if curves < 1:
+        raise ValueError(f"Argument `curves` must be a positive count, but is {curves}.")
+    figure, ax = axes_for(ax, 7.2, 4.2)
+    frequency, amplitudes = np.asarray(smap.frequencies), np.asarray(smap.amplitudes)
+    shape = (-1, amplitudes.size, frequency.size)
+    response = MILLIMETRES * np.asarray(smap.response).reshape(shape)
+    stable = np.asarray(smap.stable).reshape(shape)
+    unit, unstable = drive_unit(smap.model.excitation), False
+    rows = _rows(np.asarray(smap.count), curves)
+    for row, colour in zip(rows, level_colours(len(rows)), strict=True):
+        label = quantity(amplitudes[row], unit)
+        for x, y, held in threads(frequency, response[:, row], stable[:, row]):
+            draw_curve(ax, x, y, held, colour, label)
+            unstable |= bool(np.any(np.isfinite(y) & ~held))
+            label = ""
+    ax.set_ylim(bottom=0.0)
+    ax.set_xlabel("frequency [Hz]")
+    ax.set_ylabel("response, half peak to peak [mm]")
+    handles = stability_handles(ax, unstable=unstable)
+    entitle(ax, "Response over frequency, by drive amplitude", handles)
+    return figure
+
+
+def _rows(count: Int[np.ndarray, "amplitude frequency"], curves: int) -> list[int]:
+    """Give the rows that are drawn, lowest first."""
+    steps = min(curves, count.shape[0])
+    rows = np.unique(np.linspace(0, count.shape[0] - 1, steps + 1).round().astype(int)[1:])
+    several = np.sum(count > 1, axis=1)
+    if several.any():
+        rows[np.argmin(np.abs(rows - np.argmax(several)))] = np.argmax(several)
+    return rows.tolist()
