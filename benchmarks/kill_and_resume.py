@@ -22,15 +22,15 @@ from pathlib import Path
 import numpy as np
 
 
-def cut_demo(folder: Path, dwells: int = 2) -> Path:
-    """Give the records of the demo at 150 N up to the end of their first dwells."""
+def cut_demo(folder: Path, dwells: int | None = None) -> Path:
+    """Give the records of the demo at 150 N, whole or up to the end of their first dwells."""
     from isojax.demo import campaign_folder
 
     shutil.copytree(campaign_folder(), folder)
     head, *records = (folder / "campaign.toml").read_text(encoding="utf-8").split("[[record]]")
     kept = "[[record]]".join([head, *(text for text in records if "150N" in text)])
     (folder / "campaign.toml").write_text(kept, encoding="utf-8")
-    for schedule in folder.glob("*150N*.csv"):
+    for schedule in folder.glob("*150N*.csv") if dwells else ():
         rows = schedule.read_text(encoding="utf-8").splitlines()
         stop = round(float(rows[dwells + 1].split(",")[0]) * 500.0)
         schedule.write_text("\n".join(rows[: dwells + 1]) + "\n", encoding="utf-8")
@@ -66,7 +66,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as work:
         folder, log = Path(work), Path(work) / "log"
         os.environ.setdefault("ISOJAX_CACHE", str(folder / "cache"))
-        campaign = asked.campaign or cut_demo(folder / "campaign")
+        campaign = asked.campaign or cut_demo(folder / "campaign", dwells=2)
         seconds = 0.0
         for _ in range(2):  # the first run fills the cache of compiled code
             shutil.rmtree(folder / "whole", ignore_errors=True)

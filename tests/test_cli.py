@@ -9,12 +9,13 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import isojax
 from isojax._cli import main
 from isojax.demo import campaign_folder
+from kill_and_resume import cut_demo
 
 
 def test_effects_lists_the_whole_catalogue_unabridged(capsys):
@@ -120,25 +121,8 @@ def test_module_runs_as_a_command():
     assert done.stderr == ""
 
 
-def small_campaign(folder, dwells=None):
-    """Two records of the demo, whole or up to the end of their first dwells."""
-    shutil.copytree(campaign_folder(), folder)
-    head, *records = (folder / "campaign.toml").read_text(encoding="utf-8").split("[[record]]")
-    kept = "[[record]]".join([head, *(text for text in records if "150N" in text)])
-    (folder / "campaign.toml").write_text(kept, encoding="utf-8")
-    for schedule in folder.glob("*150N*.csv") if dwells else ():
-        rows = schedule.read_text(encoding="utf-8").splitlines()
-        stop = round(float(rows[dwells + 1].split(",")[0]) * 500.0)
-        schedule.write_text("\n".join(rows[: dwells + 1]) + "\n", encoding="utf-8")
-        data = schedule.with_name(schedule.name.replace("_schedule.csv", ".npz"))
-        with np.load(data) as arrays:
-            shorter = {name: arrays[name][:stop] for name in arrays}
-        np.savez(data, **shorter)
-    return folder
-
-
 def test_fit_shows_a_line_a_stage_and_verbose_its_steps_as_well(tmp_path, capsys):
-    campaign = small_campaign(tmp_path / "campaign", dwells=2)
+    campaign = cut_demo(tmp_path / "campaign", dwells=2)
     for option, stages_only in ((), True), (("--verbose",), False):
         assert main(["fit", str(campaign), *option]) in (0, 1)
         shown = capsys.readouterr().err.splitlines()
@@ -150,7 +134,7 @@ def test_fit_shows_a_line_a_stage_and_verbose_its_steps_as_well(tmp_path, capsys
 
 
 def test_fit_prints_its_report_and_writes_it(tmp_path, capsys):
-    campaign = small_campaign(tmp_path / "campaign")
+    campaign = cut_demo(tmp_path / "campaign")
     assert main(["fit", str(campaign), "--out", str(tmp_path / "out"), "--quiet"]) == 0
     shown = capsys.readouterr()
     assert shown.err == ""
@@ -163,7 +147,7 @@ def test_fit_prints_its_report_and_writes_it(tmp_path, capsys):
 
 def failing_campaign(folder):
     """Four dwells of the demo with a force of the wrong sign: no spring and no damper fits them."""
-    campaign = small_campaign(folder, dwells=2)
+    campaign = cut_demo(folder, dwells=2)
     file = campaign / "campaign.toml"
     text = file.read_text(encoding="utf-8").replace('unit = "N"', 'unit = "N"\ngain = -40.0', 1)
     file.write_text(text, encoding="utf-8")
@@ -209,7 +193,7 @@ def test_help_says_what_the_exit_codes_mean(capsys):
 
 
 def test_an_unknown_effect_is_refused_before_a_data_file_is_opened(tmp_path, capsys):
-    campaign = small_campaign(tmp_path / "campaign")
+    campaign = cut_demo(tmp_path / "campaign")
     for data in campaign.glob("*.npz"):
         data.unlink()
     file = campaign / "campaign.toml"
@@ -301,7 +285,7 @@ def stop_at(monkeypatch, place, error):
 def test_an_interrupted_loop_keeps_what_it_did_and_resumes_with_the_same_result(
     calm_loop, tmp_path, capsys, monkeypatch
 ):
-    campaign, out = small_campaign(tmp_path / "campaign", dwells=2), tmp_path / "out"
+    campaign, out = cut_demo(tmp_path / "campaign", dwells=2), tmp_path / "out"
     words = ["close-loop", str(campaign), "--out", str(out)]
     with monkeypatch.context() as patch:
         stop_at(patch, 8, KeyboardInterrupt())

@@ -1,15 +1,19 @@
 """Answers kept in a file: a loop that was killed at any moment goes on and ends with the same digits."""
 
 import json
+import sys
+from contextlib import nullcontext
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import isojax
 from isojax._kept import digest, kept_answers, recall
 from isojax._progress import Resumed, Stage
 from isojax.reporting import result_dict
-from test_cli import small_campaign
+from kill_and_resume import cut_demo
 
 CANDIDATES = ("coulomb_friction", "dahl_friction", "cubic_damping")
 """Effects that the loop here looks for: one of them is in the demo."""
@@ -23,7 +27,8 @@ class Questions:
         self.said = []
 
     def ask(self, path, identity="one", times=3):
-        with kept_answers(path, {"campaign": identity}, self.said.append):
+        keep = kept_answers(path, {"campaign": identity}, self.said.append) if path else nullcontext()
+        with keep:
             return [self._answer(place) for place in range(times)]
 
     def _answer(self, place):
@@ -100,10 +105,10 @@ def test_nothing_is_kept_where_nothing_is_asked_for(tmp_path):
 
 
 def test_digest_distinguishes_values_and_not_places_in_memory(tmp_path):
-    campaign = isojax.read_campaign(small_campaign(tmp_path / "one", dwells=2))
-    moved = isojax.read_campaign(small_campaign(tmp_path / "two", dwells=2))
+    campaign = isojax.read_campaign(cut_demo(tmp_path / "one", dwells=2))
+    moved = isojax.read_campaign(cut_demo(tmp_path / "two", dwells=2))
     assert digest(campaign) == digest(moved)
-    other = isojax.read_campaign(small_campaign(tmp_path / "three", dwells=3))
+    other = isojax.read_campaign(cut_demo(tmp_path / "three", dwells=3))
     assert digest(campaign) != digest(other)
     words = {digest(part) for part in (1, 1.0, "1", (1,), [1], None, np.ones(1), np.ones(1, np.float32))}
     assert len(words) == 8
@@ -111,7 +116,7 @@ def test_digest_distinguishes_values_and_not_places_in_memory(tmp_path):
 
 @pytest.mark.slow
 def test_a_loop_that_was_cut_off_at_any_moment_ends_with_the_same_digits(tmp_path):
-    campaign = isojax.read_campaign(small_campaign(tmp_path / "campaign", dwells=2))
+    campaign = isojax.read_campaign(cut_demo(tmp_path / "campaign", dwells=2))
     path = tmp_path / "answers"
     stages = []
     others = tuple(name for name in isojax.CATALOGUE if name not in CANDIDATES)

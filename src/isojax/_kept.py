@@ -45,20 +45,15 @@ def recall(question: str, compute: Callable[[], Answer], *inputs: Any) -> Answer
 
 
 @contextmanager
-def kept_answers(
-    path: Path | None, identity: Mapping[str, str], progress: Callable[[str], None]
-) -> Iterator[None]:
+def kept_answers(path: Path, identity: Mapping[str, str], progress: Callable[[str], None]) -> Iterator[None]:
     """Keep the answers of the computations inside, and give those that an earlier run kept.
 
     Args:
-        path: the file; None keeps nothing.
+        path: the file.
         identity: what the answers belong to, by words for what it is. A file of another identity is begun
             anew.
         progress: hears whose answers are used, or why they are not.
     """
-    if path is None:
-        yield
-        return
     path.parent.mkdir(parents=True, exist_ok=True)
     path.touch()
     # Unbuffered: what was written survives the process, however it ends.

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from jaxtyping import Float
+from made_campaign import campaign_of
 from scipy.signal import butter, lfilter, sosfilt
 
-from isojax.records import Campaign, Dwell, Filter, InputChannel, OutputChannel, Record, estimate_noise
+from isojax.records import Dwell, Filter, Record, estimate_noise
 
 RATE, SIGMA = 250.0, 0.01
 FREQUENCIES = (4.0, 4.4, 4.9, 5.3, 5.7, 6.2)
@@ -42,23 +43,6 @@ def periodic(seed: int, share: float) -> Record:
     held = drive, output, drive, output
     return Record(
         "p", Path("p"), np.arange(drive.size) / RATE, RATE, *held, period=1000, settle=0, kind="periodic"
-    )
-
-
-def campaign_of(*records: Record, noise: float | None = None, low: Filter | None = None) -> Campaign:
-    return Campaign(
-        title="made",
-        file=Path("campaign.toml"),
-        mass=1.0,
-        mass_free=False,
-        input=InputChannel("force", "f", "N"),
-        output=OutputChannel("displacement", "x", "m", noise=noise),
-        filter=low,
-        rate=RATE,
-        stiffness=(),
-        damping=(),
-        elements=(),
-        records=records,
     )
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.signal
+from made_campaign import campaign_of
 
 from isojax import read_campaign
-from isojax.records import Campaign, Filter, InputChannel, OutputChannel, Record, data_health, estimate_noise
+from isojax.records import Filter, Record, data_health, estimate_noise
 
 RATE, SIGMA = 500.0, 0.013
 EXAMPLES = ["quiet", "friction", "relaxation", "asymmetry"]
@@ -22,23 +23,6 @@ def test_noise_of_the_examples_is_found_within_three_per_cent(example: str, shar
     assert noise.method == "cycle_scatter"
     assert noise.sigma == pytest.approx(truth, rel=0.03)
     np.testing.assert_allclose(noise.per_record, truth, rtol=0.05)
-
-
-def campaign_of(*records: Record, noise: float | None = None, low: Filter | None = None) -> Campaign:
-    return Campaign(
-        title="made",
-        file=Path("campaign.toml"),
-        mass=1.0,
-        mass_free=False,
-        input=InputChannel("force", "f", "N"),
-        output=OutputChannel("displacement", "x", "m", noise=noise),
-        filter=low,
-        rate=RATE,
-        stiffness=(),
-        damping=(),
-        elements=(),
-        records=records,
-    )
 
 
 def response(force: np.ndarray, stiffness: float = 1500.0) -> np.ndarray:

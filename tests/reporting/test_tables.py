@@ -1,5 +1,7 @@
 """Tables for the terminal and for notebooks."""
 
+import numpy as np
+
 import isojax as ij
 
 
@@ -40,3 +42,12 @@ def test_ranking_table_keeps_the_order_of_the_ranking(found):
 def test_a_notebook_shows_a_table_by_itself(found):
     shown = ij.error_table(found.before)._repr_mimebundle_([], [])
     assert "NRMSE" in shown["text/html"]
+
+
+def test_the_unit_of_a_heading_is_shown_and_not_read_as_markup():
+    time = np.arange(4000) / 500.0
+    seen = ij.records.inspect_file("run [b]", data={"t [s]": time, "F [N]": np.sin(30 * time), "a [g]": time})
+    shown = str(ij.reporting.inspection_summary([seen]))
+    assert "run [b]" in shown
+    assert "F [N] " in shown
+    assert "a [g] " in shown

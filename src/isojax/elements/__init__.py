@@ -6,6 +6,7 @@ Read `_effect.py` (what every effect declares) and the three contracts `_force.p
 the shortest, `_maxwell_branch.py` has an internal state, `_sensor_gain.py` is an instrument.
 """
 
+from .._parameters import parameter as parameter
 from ._abs_quadratic_damping import AbsQuadraticDamping as AbsQuadraticDamping
 from ._abs_quadratic_stiffness import AbsQuadraticStiffness as AbsQuadraticStiffness
 from ._ac_coupling import AcCoupling as AcCoupling

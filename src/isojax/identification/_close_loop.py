@@ -185,12 +185,14 @@ def close_loop(
     start, campaign = time.perf_counter(), as_campaign(campaign)
     if not anyway:
         refuse_contradictions(campaign)
+    if checkpoint is None:
+        return _loop(campaign, max_iterations, excluded, solver, progress, rules, start)
     identity = {
         "version of isojax": package_digest(),
         "campaign": digest(campaign),
         "question": digest(max_iterations, excluded, solver, rules),
     }
-    with kept_answers(None if checkpoint is None else Path(checkpoint), identity, progress):
+    with kept_answers(Path(checkpoint), identity, progress):
         return _loop(campaign, max_iterations, excluded, solver, progress, rules, start)
 
 

@@ -36,5 +36,6 @@ from ._solve import solve_record as solve_record
 from ._storage import load_model as load_model
 from ._storage import model_from_dict as model_from_dict
 from ._storage import model_to_dict as model_to_dict
+from ._storage import read_json as read_json
 from ._storage import save_model as save_model
 from ._storage import write_whole as write_whole

@@ -97,13 +97,27 @@ def load_model(path: str | Path) -> Isolator:
     """
     check_float64()
     path = Path(path)
+    return model_from_dict(read_json(path), path)
+
+
+def read_json(path: Path) -> Any:
+    """Give what a JSON file holds.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Numbers, words, lists and dictionaries.
+
+    Raises:
+        ValueError: if it is missing or is no JSON file.
+    """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror}).") from None
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: is no JSON file ({error}).") from None
-    return model_from_dict(content, path)
 
 
 def model_from_dict(content: Any, path: Path) -> Isolator:

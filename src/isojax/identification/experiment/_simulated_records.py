@@ -137,7 +137,7 @@ def trial_run(
 
     *path, reading = recall("trial run", compute, model, experiment, problem.quantity, rest)
 
-    def in_turn(values: Float[np.ndarray, "time lanes"]) -> Float[np.ndarray, "record time"]:
+    def in_turn(values: Float[np.ndarray, "time lanes"]) -> Float[np.ndarray, "record sample"]:
         return values[length:].T.reshape(rows, total)
 
     displacement = in_turn(path[0])

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from ..._results import RESULTS, name_of_result, result_named
 from ..._show import Row, shown
-from ...models import Isolator, model_from_dict, model_to_dict, write_whole
+from ...models import Isolator, model_from_dict, model_to_dict, read_json, write_whole
 from ...records import Colour, NoiseEstimate
 from ._coefficients import Coefficient, Coefficients
 from ._errors import Errors
@@ -180,12 +180,7 @@ def load_fit(path: str | Path) -> SavedFit:
         True
     """
     path = Path(path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror}).") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: is no JSON file ({error}).") from None
+    content = read_json(path)
     if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("version") != 1:
         raise ValueError(f'{path}: must hold "format": "{FORMAT}", "version": 1, but does not.')
 

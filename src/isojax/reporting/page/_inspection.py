@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from rich.console import Group, RenderableType
+from rich.console import RenderableType
+from rich.markup import escape
 from rich.text import Text
 
 from ...records import ChannelInspection, FileInspection
-from ._summary import _table
+from ._summary import PlainGroup, _table
 
 _CLIPPED_SHARE = 1e-4
 """Share of clipped samples from which it is worth a word."""
@@ -22,12 +23,12 @@ def inspection_summary(files: Sequence[FileInspection]) -> RenderableType:
     Returns:
         For the terminal; `render_text` makes it plain text.
     """
-    return Group(*(part for file in files for part in _of_file(file)))
+    return PlainGroup(*(part for file in files for part in _of_file(file)))
 
 
 def _of_file(file: FileInspection) -> tuple[RenderableType, ...]:
     table = _table(
-        str(file.file),
+        escape(str(file.file)),
         "channel",
         "measures",
         "unit",
@@ -41,9 +42,9 @@ def _of_file(file: FileInspection) -> tuple[RenderableType, ...]:
     )
     for one in file.channels:
         table.add_row(
-            one.name,
+            escape(one.name),  # `Acc [g]` has no markup in it
             one.quantity or "?",
-            one.unit or "?",
+            escape(one.unit or "?"),
             *(f"{value:.4g}" for value in (one.low, one.high, one.mean, one.rms)),
             f"{one.noise:.2g}",
             f"{100.0 * one.drift:+.1f} %",
