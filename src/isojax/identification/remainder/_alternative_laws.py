@@ -27,6 +27,8 @@ class AlternativeLaw(NamedTuple):
         unit: unit of the coefficient.
         rise: chi2 with the law less chi2 with the findings, over max(chi2/dof, 1); below zero where the law
             explains more.
+        likeness: correlation of its trace in the records with that of the findings, the other coefficients
+            free; 1 for the same law.
         model: the isolator with the law in the place of the findings, coefficients by one linear step.
     """
 
@@ -36,7 +38,13 @@ class AlternativeLaw(NamedTuple):
     error: float
     unit: str
     rise: float
+    likeness: float
     model: Isolator
+
+    @property
+    def is_the_same(self) -> bool:
+        """Whether the records show no difference from the findings themselves."""
+        return abs(self.likeness) > 1.0 - 1e-6
 
     def _headline(self) -> str:
         return f"{self.formula}, {amount(self.coefficient, self.unit, self.error)}, χ² {self.rise:+.3g}"
@@ -115,7 +123,8 @@ def _alternatives(
     done[-1] = 1.0
     for place in found:
         name, _, parameter = fitted.names[place].partition(".")
-        if parameter == fitted.model.element(name).strength:
+        element = fitted.model.element(name)
+        if element is not None and parameter == element.strength:
             done[place] = float(fitted.model[fitted.names[place]]) / traces.units[place]
     inverse = np.linalg.pinv(matrix[np.ix_(kept, kept)], rcond=1e-12, hermitian=True)
     left = matrix - matrix[:, kept] @ inverse @ matrix[kept]
@@ -125,6 +134,9 @@ def _alternatives(
     size, score = np.diag(left)[columns], (left @ done)[columns]
     seen = size > search.rules.smallest_visibility**2 * traces.point.reduced.raw[count:]
     gain = np.where(seen, score**2 / np.where(seen, size, 1.0), 0.0)
+    force = done.copy()
+    force[-1] = 0.0
+    trace = (left @ force)[columns] / np.sqrt(max(force @ left @ force, 1e-300))
     inflation = max(1.0, fitted.chi2 / fitted.dof)
     rise = (done @ left @ done - gain - with_findings) / inflation
     margin = least_difference(fitted, search.rules)
@@ -144,6 +156,7 @@ def _alternatives(
                 float(np.sqrt(inflation / size[place]) * unit * wording.factor),
                 wording.unit,
                 float(rise[place]),
+                float(trace[place] / np.sqrt(size[place])),
                 _in_place(fitted, effects, kept, traces.units[kept] * step, law),
             )
         )

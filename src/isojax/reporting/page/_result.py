@@ -7,7 +7,7 @@ from ..._parameters import list_parameters
 from ..._results import is_successful
 from ...health import CampaignHealth
 from ...identification import Errors, Finding, Fit, Loop, plain_unit
-from ..words import check_first_dicts, finite_or_none, health_dict, remainder_dict
+from ..words import alternatives_list, check_first_dicts, finite_or_none, health_dict, remainder_dict
 
 SCHEMA = 1
 
@@ -34,6 +34,7 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
         "before": _fit_dict(loop.before),
         "verdict": loop.verdict,
         "findings": [_finding_dict(finding) for finding in loop.findings],
+        "alternatives": alternatives_list(loop),
         "after": _fit_dict(loop.after),
         "bounds": {
             effect: {"upper": finite_or_none(upper), "unit": plain_unit(unit, loop.campaign)}
