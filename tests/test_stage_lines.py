@@ -81,6 +81,18 @@ def test_time_left_is_the_pace_so_far_times_the_share_to_come():
     assert pace.left == 20.0
 
 
+def test_a_stage_that_counts_tells_its_own_time_left():
+    clock = Clock()
+    pace = Pace(clock)
+    pace.open(Stage("map", to_come=(0.0,)))
+    clock.now = 30.0
+    assert pace.left is None
+    pace.count(0.25)  # a quarter took 30 s
+    assert (pace.left, pace.words) == (90.0, "about 2 min left")
+    pace.open(Stage("pictures"))
+    assert pace.left is None
+
+
 def test_what_was_kept_says_nothing_of_the_time_left():
     clock = Clock()
     pace = Pace(clock)

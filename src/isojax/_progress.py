@@ -31,6 +31,22 @@ class KeyFigure(str):
     """A line that gives the result of the stage before it is over, such as "chi2/dof 1.02"."""
 
 
+class Counted(str):
+    """A step that knows how much of its stage is done, such as "2048 of 40000 orbits".
+
+    Attributes:
+        done: share of the stage, 0 to 1.
+    """
+
+    done: float
+
+    def __new__(cls, words: str, done: float) -> "Counted":
+        """Give the line."""
+        counted = super().__new__(cls, words)
+        counted.done = done
+        return counted
+
+
 LOOP_SHARES = (5.0, 8.0, 60.0, 12.0, 3.0, 6.0, 8.0)
 """Usual shares of the time of a loop that finds one effect, as `Stage.to_come` has them: classical guess,
 fit, first diagnosis, each further one, separating experiments, other laws, free runs. Most of the time is

@@ -9,7 +9,7 @@ from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextCol
 from rich.table import Column
 from rich.text import Text
 
-from ._progress import KeyFigure, Notice, Resumed, Stage
+from ._progress import Counted, KeyFigure, Notice, Resumed, Stage
 
 
 def _seconds(elapsed: float) -> str:
@@ -26,7 +26,8 @@ class _Elapsed(ProgressColumn):
 class Pace:
     """Where a task stands: which stage of how many, and how long the rest will take.
 
-    The time left is that of the stages that are over, times the usual share of what is to come over theirs.
+    The time left is that of the stages that are over, times the usual share of what is to come over theirs;
+    of a stage that counts what it does, the time of what is done, times what is not over what is.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter):
@@ -39,7 +40,7 @@ class Pace:
         self._stage = Stage("")
         self._opened = clock()
         self._begun = 0
-        self._over = self._spent = 0.0
+        self._over = self._spent = self._done = 0.0
 
     def open(self, stage: Stage) -> None:
         """Close the stage that is open, and open another.
@@ -51,6 +52,15 @@ class Pace:
             self._over += self._stage.share
             self._spent += self._clock() - self._opened
         self._stage, self._opened, self._begun = stage, self._clock(), self._begun + 1
+        self._done = 0.0
+
+    def count(self, done: float) -> None:
+        """Note how much of the stage that is open is done.
+
+        Args:
+            done: its share, 0 to 1.
+        """
+        self._done = done
 
     def forget(self) -> None:
         """Begin to measure here: what came before took no time."""
@@ -63,12 +73,14 @@ class Pace:
 
     @property
     def left(self) -> float | None:
-        """Seconds that are left [s]; None before a stage is over whose share is known."""
-        if self._over == 0.0 or self._stage.share + sum(self._stage.to_come) == 0.0:
+        """Seconds that are left [s]; None before a stage is over whose share is known, or a part counted."""
+        counted, later = self._done > 0.0, sum(self._stage.to_come)
+        if not counted and (self._over == 0.0 or self._stage.share + later == 0.0):
             return None
-        pace = self._spent / self._over
-        here = max(0.0, pace * self._stage.share - (self._clock() - self._opened))
-        return here + pace * sum(self._stage.to_come)
+        elapsed = self._clock() - self._opened
+        pace = self._spent / self._over if self._over else 0.0
+        here = elapsed * (1.0 / self._done - 1.0) if counted else max(0.0, pace * self._stage.share - elapsed)
+        return here + pace * later
 
     @property
     def words(self) -> str:
@@ -143,6 +155,8 @@ def stage_lines(console: Console, steps: bool = False) -> Iterator[Callable[[str
             else:
                 if isinstance(line, Resumed):
                     pace.forget()
+                if isinstance(line, Counted):
+                    pace.count(line.done)
                 live.update(task, step=line, refresh=True)
             if steps or isinstance(line, Notice):
                 leave(line, begin)

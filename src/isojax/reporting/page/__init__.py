@@ -9,12 +9,12 @@ maps, `_inspection.py`, and `_plain.py` (files and maps as JSON).
 from ._inspection import inspection_summary as inspection_summary
 from ._map_files import folds_around as folds_around
 from ._map_files import map_arrays as map_arrays
-from ._map_files import png_bytes as png_bytes
 from ._map_files import write_map as write_map
 from ._map_summary import map_summary as map_summary
 from ._page import render_page as render_page
 from ._plain import inspection_dict as inspection_dict
 from ._plain import map_dict as map_dict
+from ._png import png_bytes as png_bytes
 from ._result import result_dict as result_dict
 from ._summary import catalogue_table as catalogue_table
 from ._summary import error_table as error_table

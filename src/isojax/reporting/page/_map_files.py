@@ -5,13 +5,13 @@ import json
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ..._output_folder import check_folder, publish
 from ..._results import RESULTS, is_successful
 from ...models import model_to_dict
 from ...stability import FoldCurve, StabilityMap, continue_branch, fold_curve
 from ..plots import plot_fold_curve, plot_response_curves, plot_response_map, plot_stability_map
+from ._png import png_bytes
 
 _CODES = ("successful", "not_converged", "not_finite")
 """Codes of a cell's result, 0 first."""
@@ -31,8 +31,6 @@ _ARRAYS = (
     "count",
     "y0",
 )
-
-_DOTS = 160
 
 _BESIDE = (0.1, 0.2)
 """How far past the map's frequencies and amplitudes its folds are followed, as shares: cusps lie there."""
@@ -137,10 +135,3 @@ def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None
     )
     publish(folder, contents)
     return tuple(name for name, content in contents.items() if content is not None)
-
-
-def png_bytes(figure: Figure) -> bytes:
-    """Give a figure as the content of a PNG file."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DOTS)
-    return buffer.getvalue()

@@ -3,7 +3,6 @@
 import base64
 import re
 from collections.abc import Callable
-from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,8 +40,8 @@ from ..plots import (
     visited_amplitudes,
     worst_window,
 )
+from ._png import png_bytes
 
-_DPI = 170
 _THIRD, _WHOLE, _HEIGHT = 3.8, 11.0, 2.9
 """Sizes [inch]: on a wide screen three pictures stand side by side, on a telephone one fills the width, and
 the letters can be read on both."""
@@ -115,9 +114,7 @@ def _draw(
     step(f"drawing: {name}")
     size = (_WHOLE if wide else _THIRD, height)
     ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
-    file = BytesIO()
-    plot(*args, ax=ax, **options).savefig(file, format="png", dpi=_DPI)
-    return (Picture(name, caption, file.getvalue(), wide),)
+    return (Picture(name, caption, png_bytes(plot(*args, ax=ax, **options)), wide),)
 
 
 def _lead_pictures(before: Fit, after: Fit | None, telling: Slice) -> tuple[Picture, ...]:

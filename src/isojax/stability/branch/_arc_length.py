@@ -24,9 +24,9 @@ _CLOSES_FROM, _CLOSES_WITHIN = 5, 0.2
 """Points after which a curve may close, and the distance of its first point from a step, over the step, below
 which it does."""
 
-_RAN_OUT, REACHED_BOUND, RETURNED, _STALLED, _NEVER_STARTED = range(5)
+_RAN_OUT, REACHED_BOUND, RETURNED, _STALLED, _NEVER_STARTED, _TURNED = range(6)
 """Why a curve ends: out of points, on a bound, back at its first point, no step short enough, no first
-point."""
+point, past its first turn."""
 
 
 class Departure(NamedTuple):
@@ -49,10 +49,12 @@ class Stride(NamedTuple):
     Attributes:
         longest: largest step, in scaled unknowns.
         most: points to make room for.
+        to_turn: whether the curve ends at the first point after which the last unknown falls.
     """
 
     longest: float
     most: int
+    to_turn: bool = False
 
 
 class Followed(NamedTuple):
@@ -109,7 +111,7 @@ def follow(
     Bifurcation and Chaos 1:493.
     """
     first, row, tangent = departure
-    step, most = stride
+    step, most, to_turn = stride
     size = first.shape[0]
     units = jnp.eye(size)
     unbounded = jnp.full(free, jnp.inf)
@@ -148,6 +150,8 @@ def follow(
         predicted, row, landing = predict(found, ahead, following)
         count = past.found + 1
         ending = jnp.where(closed, RETURNED, jnp.where(done, REACHED_BOUND, past.ending))
+        if to_turn:
+            ending = jnp.where((ahead[-1] <= 0.0) & ~done, _TURNED, ending)
         followed = Followed(
             past.unknowns.at[past.found].set(found), past.tangents.at[past.found].set(ahead), count, ending
         )
@@ -172,7 +176,7 @@ def follow(
         )
 
     def improve(walk: _Walk) -> _Walk:
-        value, slope = equations(walk.here), jax.jacfwd(equations)(walk.here)
+        slope, value = jax.jacfwd(lambda here: (equations(here),) * 2, has_aux=True)(walk.here)
         across = jnp.dot(walk.row, walk.here - walk.predicted)
         change = jnp.linalg.solve(
             jnp.concatenate([slope, walk.row[None]]), jnp.concatenate([value, across[None]])

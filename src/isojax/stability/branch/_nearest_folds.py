@@ -29,7 +29,7 @@ _CLOSED_TO = 1e-6
 """Largest last step of Newton's method, over the size of the motion: at a kink of the law it may stall far
 above rounding."""
 
-_STRIDE = Stride(longest=0.1, most=96)
+_STRIDE = Stride(longest=0.1, most=96, to_turn=True)
 """Steps along a branch, over the size of the motion and the reach, and points to make room for."""
 
 _FOLLOWED_AT_ONCE = 128
@@ -197,17 +197,18 @@ def _orbits(
             moved = period_map(model, integrator, drive, tuple(scaled * scale), turns=turns)
             return jnp.stack(moved) / scale
 
-        def newton(_: Array | int, carry: tuple[Array, Array]) -> tuple[Array, Array]:
-            scaled, _last = carry
-            slope = jax.jacfwd(image)(scaled)
-            change = jnp.linalg.solve(jnp.eye(scaled.size) - slope, image(scaled) - scaled)
+        def newton(_: Array | int, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+            scaled = carry[0]
+            slope, moved = jax.jacfwd(lambda at: (image(at),) * 2, has_aux=True)(scaled)
+            change = jnp.linalg.solve(jnp.eye(scaled.size) - slope, moved - scaled)
             size = jnp.max(jnp.abs(change))
             # Far off, a full step may leave the basin of the orbit that the start is near to.
-            return scaled + jnp.minimum(1.0, 0.3 / jnp.maximum(size, 1e-300)) * change, size
+            return scaled + jnp.minimum(1.0, 0.3 / jnp.maximum(size, 1e-300)) * change, size, slope
 
-        begin = (jnp.stack(settled) / scale, jnp.asarray(jnp.inf))
-        scaled, last = jax.lax.fori_loop(0, _ORBIT_STEPS, newton, begin)
-        roots = multipliers(scale[:, None] * jax.jacfwd(image)(scaled) / scale[None])
+        first = jnp.stack(settled) / scale
+        begin = (first, jnp.asarray(jnp.inf), jnp.zeros((first.size, first.size)))
+        scaled, last, slope = jax.lax.fori_loop(0, _ORBIT_STEPS, newton, begin)
+        roots = multipliers(scale[:, None] * slope / scale[None])
         roots = roots * roots if turns == 0.5 else roots
         path = trajectory(model, integrator, drive, tuple(scaled * scale))
         own = state_scale(path)

@@ -12,6 +12,7 @@ import numpy as np
 from jax.experimental import multihost_utils
 
 from ..._cores import usable_cores
+from ..._progress import Counted
 from ...models import write_whole
 from ._batched_newton import CellSolver, Found
 from ._starts import Candidates
@@ -61,22 +62,28 @@ def run_chunks(
     states = 2 + solver.model.internal_states
     kinks = solver.surface.tables.shape[0] - states - 1
     processes, own = jax.process_count(), jax.process_index()
+    paths = [None if folder is None else folder / f"{name}-{place:05d}.npz" for place in range(len(begins))]
+    kept = [path is not None and path.exists() for path in paths]
+    sizes = [min(lanes, total - begin) for begin in begins]
+    asked = sum(size for place, size in enumerate(sizes) if place % processes == own and not kept[place])
+    done: list[int] = []
 
     def one(place: int) -> Found:
-        begin = begins[place]
+        begin, path = begins[place], paths[place]
         if place % processes != own:
-            return _blank(min(lanes, total - begin), states, kinks)
-        path = None if folder is None else folder / f"{name}-{place:05d}.npz"
-        if path is not None and path.exists():
-            with np.load(path) as kept:
-                return Found(*(kept[field] for field in Found._fields))
+            return _blank(sizes[place], states, kinks)
+        if path is not None and kept[place]:
+            with np.load(path) as finished:
+                return Found(*(finished[field] for field in Found._fields))
         part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
         if path is not None:
             buffer = io.BytesIO()
             np.savez(buffer, **part._asdict())
             write_whole(path, buffer.getvalue())
         if progress is not None:
-            progress(f"{min(begin + lanes, total)} of {total} orbits")
+            done.append(sizes[place])
+            computed = sum(done)
+            progress(Counted(f"{computed} of {asked} orbits", computed / asked))
         return part
 
     # A batch keeps one core busy; each core runs its own. Chunks over several devices go one by one.
