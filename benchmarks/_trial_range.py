@@ -55,7 +55,7 @@ def miss(loop: Loop, plant: rig.Plant, levels: tuple[float, ...], frequencies: t
     """
     fit = loop.after
     models = [fit.model, *(law.model for one in loop.alternatives[-1:] for law in one.laws)]
-    places = [place for place, entry in enumerate(list_parameters(fit.model)) if entry.name in fit.names]
+    places = [place for place, entry in enumerate(list_parameters(fit.model)) if entry.name in fit.free]
     covariance = np.nan_to_num(np.asarray(fit.covariance))
     outside, errors = [], []
     for level in levels:

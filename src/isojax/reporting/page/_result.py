@@ -15,8 +15,9 @@ SCHEMA = 1
 def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, Any]:
     """Give a closed loop as schema 1 of result.json.
 
-    "remainder" is there only where the verdict is "unexplained" or "partly_explained"; "integration", beside
-    the coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records.
+    "alternatives", other force laws in the place of the findings, is there only where something was found;
+    "remainder" only where the verdict is "unexplained" or "partly_explained"; "integration", beside the
+    coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records.
 
     Args:
         loop: the closed loop.
@@ -34,13 +35,13 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
         "before": _fit_dict(loop.before),
         "verdict": loop.verdict,
         "findings": [_finding_dict(finding) for finding in loop.findings],
-        "alternatives": alternatives_list(loop),
         "after": _fit_dict(loop.after),
         "bounds": {
             effect: {"upper": finite_or_none(upper), "unit": plain_unit(unit, loop.campaign)}
             for effect, (upper, unit) in loop.bounds.items()
         },
         "seconds": finite_or_none(loop.seconds),
+        **({"alternatives": alternatives_list(loop)} if loop.alternatives else {}),
         **({} if health is None else {"health": health_dict(health)}),
         **({} if remainder is None else {"remainder": remainder_dict(remainder)}),
     }
