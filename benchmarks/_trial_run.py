@@ -11,6 +11,7 @@ import numpy as np
 
 from _trial_campaign import Secret, Sketch, file_campaign, secrets, sketch
 from _trial_effects import EFFECTS, element_of, exact_class
+from _trial_range import miss
 from _trial_wall_time import run_wall_time
 from isojax._parameters import own_parameters
 from isojax._results import is_successful
@@ -24,8 +25,12 @@ from isojax.identification import (
     scales,
 )
 from isojax.records import Campaign
+from isojax.rig import Law
 
 Row = dict[str, Any]
+VISITED = (4.3, 5.0, 5.6)
+"""Frequencies at which the force of what was found is compared with the true one [Hz]."""
+
 TRIES = 4
 """Times that the size is halved where the plant runs away."""
 
@@ -55,10 +60,19 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
             campaign = read_campaign(path)
         row |= _facts(drawn, hidden, size)
         if task == "loop":
-            row |= _said_of(close_loop(campaign))
+            loop = close_loop(campaign)
+            row |= _said_of(loop)
         elif task == "leave_out":
             excluded = exact_class(hidden[0].name)
-            row |= {"excluded": excluded} | _said_of(close_loop(campaign, excluded=excluded))
+            loop = close_loop(campaign, excluded=excluded)
+            row |= {"excluded": excluded} | _said_of(loop)
+        laws = [secret.law for secret in hidden if isinstance(secret.law, Law)]
+        if (
+            (kind == "outside" or task == "leave_out")
+            and row["verdict"] == "found"
+            and len(laws) == len(hidden)
+        ):
+            row["miss"] = miss(loop, drawn.plant.plus(*laws), drawn.levels[:3], VISITED)
         if kind != "outside" and (task == "coverage" or (kind != "none" and task == "loop")):
             row |= _oracle(drawn, hidden, campaign, with_errors=task == "loop")
     except Exception as problem:  # one campaign that fails is a failure of the trial, not its end
@@ -142,6 +156,10 @@ def _said_of(loop: Loop) -> Row:
         "after": _errors(loop.after),
         "scatter": loop.before.stats.stiffness_scatter,
         "reason": loop.last.reason,
+        "alternatives": [
+            {"effects": one.effects, "laws": [[law.formula, round(law.rise, 2)] for law in one.laws[:6]]}
+            for one in loop.alternatives
+        ],
         "ranking": [
             [entry.effect, round(entry.z, 2), entry.p_value, entry.admissible]
             for entry in (loop.extensions[0].verdict if loop.extensions else loop.last).ranking[:6]

@@ -104,7 +104,11 @@ def results():
     )
     verdict = identification.Verdict("found", finding, RANKING, ("bouc_wen",), 0.03, (), {}, fit, "Good.")
     extension = identification.Extension(fit, fit, verdict)
-    loop = identification.Loop(campaign, guess, fit, (extension,), fit, "none", verdict, {}, 12.5)
+    law = identification.AlternativeLaw("x^2 v", "damping", 3e8, 2e7, "N s/m^3", -40.0, 0.97, fit.model)
+    others = (identification.Alternatives(("coulomb_friction",), (law,) * 40, 137, 16.0),)
+    loop = identification.Loop(
+        campaign, guess, fit, (extension,), fit, "none", verdict, {}, 12.5, alternatives=others
+    )
     model, drive = ij.paper.y_direction(), ij.Harmonic(amplitude=150.0, frequency=4.3)
     orbit = ij.find_periodic_orbit(model, drive)
     return {

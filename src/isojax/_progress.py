@@ -47,10 +47,10 @@ class Counted(str):
         return counted
 
 
-LOOP_SHARES = (5.0, 8.0, 60.0, 12.0, 3.0, 8.0)
+LOOP_SHARES = (5.0, 8.0, 60.0, 12.0, 3.0, 6.0, 8.0)
 """Usual shares of the time of a loop that finds one effect, as `Stage.to_come` has them: classical guess,
-fit, first diagnosis, each further one, separating experiments, free runs. Most of the time is compiling, once
-a law."""
+fit, first diagnosis, each further one, separating experiments, other laws, free runs. Most of the time is
+compiling, once a law."""
 
 REPLACE_SHARE = 12.0
 """Usual share of the test whether a finding replaces another, which not every loop needs."""

@@ -11,7 +11,7 @@ INPUT_WORDS = {
 }
 """What the input of each quantity is once it is read, and its SI unit."""
 
-_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_RAISED = str.maketrans("0123456789-.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·")
 _UNKNOWN = "–"
 
 
@@ -24,7 +24,19 @@ def typeset_unit(unit: str) -> str:
     Returns:
         Such as "N s²/m²".
     """
-    return "" if unit == "1" else re.sub(r"\^(-?\d+)", lambda found: found.group(1).translate(_RAISED), unit)
+    return "" if unit == "1" else typeset_formula(unit)
+
+
+def typeset_formula(formula: str) -> str:
+    """Give a formula with raised exponents.
+
+    Args:
+        formula: such as "|x|^1.5 v".
+
+    Returns:
+        Such as "|x|¹·⁵ v".
+    """
+    return re.sub(r"\^(-?\d+(?:\.\d+)?)", lambda found: found.group(1).translate(_RAISED), formula)
 
 
 def finite_or_none(value: float) -> float | None:

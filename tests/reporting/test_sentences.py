@@ -4,11 +4,12 @@ import math
 import pytest
 
 from isojax.elements import StribeckFriction
-from isojax.identification import DriftBudget, Errors, Fit
+from isojax.identification import AlternativeLaw, Alternatives, DriftBudget, Errors, Fit
 from isojax.identification._close_loop import overall_verdict
 from isojax.records import NoisePeak, Spikes, data_health
 from isojax.records.noise._health import UnsettledDwell
-from isojax.reporting import render_text, verdict_summary
+from isojax.reporting import render_text, result_dict, verdict_summary
+from isojax.reporting.words import alternative_words
 from isojax.reporting.words._health_words import budget_words
 from isojax.reporting.words._sentences import caveats, finding_words, headline, health_words
 
@@ -155,3 +156,34 @@ def test_diagnosis_prints_verdict_reason_and_ranking(found):
     assert text.startswith("found: dry (Coulomb) friction")
     assert "It fits." in text
     assert "bouc_wen" in text
+
+
+ONE_LAW = (
+    "In the place of dry (Coulomb) friction, 1 of 137 free force laws explains the records as well or better "
+    "(change of χ²): x² v"
+)
+
+
+@pytest.mark.parametrize(
+    ("rise", "likeness", "verdict", "said"),
+    [
+        (3.0, 0.97, "found", f"{ONE_LAW} (+3)."),
+        (-40.2, 0.97, "partly_explained", f"{ONE_LAW} (−40)."),
+        (
+            0.0,
+            1.0,
+            "found",
+            "None of 137 free force laws explains the records as well as dry (Coulomb) friction.",
+        ),
+    ],
+)
+def test_the_range_of_laws_is_told_and_a_better_one_forbids_the_name(found, rise, likeness, verdict, said):
+    law = AlternativeLaw("x^2 v", "damping-like", 3e8, 2e7, "N s/m^3", rise, likeness, found.after.model)
+    others = (Alternatives(("coulomb_friction",), (law,), 137, 16.0),)
+    assert overall_verdict(found.before, found.after, 1, found.last, found.rules, others) == verdict
+    loop = dataclasses.replace(found, verdict=verdict, alternatives=others)
+    assert alternative_words(loop) == (said,)
+    assert ("clearly better in its place" in headline(loop)) == (verdict == "partly_explained")
+    (entry,) = result_dict(loop)["alternatives"]
+    assert entry["effects"] == ["coulomb_friction"]
+    assert entry["laws"][0]["delta_chi2"] == rise

@@ -56,6 +56,8 @@ from .guess import linear_response as linear_response
 from .guess import normalised_law as normalised_law
 from .guess import paper_table as paper_table
 from .guess import scales as scales
+from .remainder import AlternativeLaw as AlternativeLaw
+from .remainder import Alternatives as Alternatives
 from .remainder import DwellRemainder as DwellRemainder
 from .remainder import ForceMap as ForceMap
 from .remainder import PursuedLaw as PursuedLaw

@@ -32,11 +32,12 @@ from .diagnosis import (
 from .experiment import with_separating_experiment
 from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of
 from .guess import ClassicalGuess, as_campaign, classical_guess
-from .remainder import Remainder, explain_remainder
+from .remainder import Alternatives, Remainder, explain_remainder, find_alternatives
 
-_GUESS, _FIT, _DIAGNOSIS, _NEXT, _EXPERIMENT, _RUNS = LOOP_SHARES
+_GUESS, _FIT, _DIAGNOSIS, _NEXT, *_LAST = LOOP_SHARES
+_EXPERIMENT, _LAWS, _RUNS = _LAST
 
-Doubt = Literal["", "diverges", "worse", "not down to noise"]
+Doubt = Literal["", "diverges", "worse", "not down to noise", "another law"]
 
 
 @shown
@@ -56,6 +57,7 @@ class Loop:
             final model, with its unit; empty where its fit is not good.
         seconds: wall time.
         rules: the numbers that decided.
+        alternatives: for each finding, and for all together, the force laws that explain the records as well.
     """
 
     campaign: Campaign
@@ -68,6 +70,7 @@ class Loop:
     bounds: dict[str, tuple[float, str]]
     seconds: float
     rules: Rules = Rules()
+    alternatives: tuple[Alternatives, ...] = ()
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -81,10 +84,10 @@ class Loop:
 
     @cached_property
     def doubt(self) -> Doubt:
-        """What held-out records say against the findings; "" where there is nothing."""
+        """What held-out records, or other force laws, say against the findings; "" where there is nothing."""
         if not self.findings or not is_successful(self.after.result):
             return ""
-        return held_out_doubt(self.before, self.after, self.rules)
+        return doubt_of(self.before, self.after, self.alternatives, self.rules)
 
     @cached_property
     def remainder(self) -> Remainder | None:
@@ -209,11 +212,10 @@ def _loop(
     progress(Stage("fit of the declared model", _FIT, LOOP_SHARES[2:]))
     before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
-    extensions, verdict = search_effects(
-        before, search_of(campaign, rules, solver, progress), max_iterations, excluded
-    )
+    search = search_of(campaign, rules, solver, progress)
+    extensions, verdict = search_effects(before, search, max_iterations, excluded)
     if extensions:
-        progress(Stage("search for separating experiments", _EXPERIMENT, (_RUNS,)))
+        progress(Stage("search for separating experiments", _EXPERIMENT, (_LAWS, _RUNS)))
         extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
     after = extensions[-1].after if extensions else before
     if not is_successful(after.result):
@@ -221,6 +223,11 @@ def _loop(
     elif verdict.after is not None:
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
+    names = tuple(finding.effect for finding in findings_in(after.model, extensions))
+    alternatives: tuple[Alternatives, ...] = ()
+    if names and is_successful(after.result):
+        progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
+        alternatives = find_alternatives(after.estimate, names, search)
     # Asked for here, so that the time of the loop counts it.
     progress(Stage("free runs of every record", _RUNS))
     progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
@@ -230,11 +237,12 @@ def _loop(
         before,
         extensions,
         after,
-        overall_verdict(before, after, len(findings_in(after.model, extensions)), verdict, rules),
+        overall_verdict(before, after, len(names), verdict, rules, alternatives),
         verdict,
         verdict.bounds,
         time.perf_counter() - start,
         rules,
+        alternatives,
     )
 
 
@@ -253,7 +261,7 @@ def search_effects(
         return extensions, verdict
     final = extensions[-1].after.estimate
     search.progress(
-        Stage("test whether the later findings replace an earlier one", REPLACE_SHARE, (_EXPERIMENT, _RUNS))
+        Stage("test whether the later findings replace an earlier one", REPLACE_SHARE, tuple(_LAST))
     )
     earlier = tuple(
         step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
@@ -293,42 +301,52 @@ def _grow(
 
 def _diagnosis(added: int, most: int) -> Stage:
     """Open a diagnosis: the first is expected to find an effect, those after it are not."""
-    later = (_EXPERIMENT, _RUNS) if added else (_NEXT, _EXPERIMENT, _RUNS) if most else (_RUNS,)
+    later = tuple(_LAST) if added else (_NEXT, *_LAST) if most else (_RUNS,)
     later = (REPLACE_SHARE, *later) if added > 1 else later
     return Stage(f"diagnosis {added + 1}: which effect is missing", _NEXT if added else _DIAGNOSIS, later)
 
 
-def held_out_doubt(before: Fit, final: Fit, rules: Rules) -> Doubt:
-    """Say what held-out records say against the findings.
+def doubt_of(before: Fit, final: Fit, alternatives: tuple[Alternatives, ...], rules: Rules) -> Doubt:
+    """Say what speaks against the findings, although the fit is good.
 
     Args:
         before: the declared model, fitted.
         final: the model with the findings, fitted.
+        alternatives: laws that explain the fitted records as well.
         rules: when a fit is good, and what chance does not explain.
 
     Returns:
-        Whether the final model diverges on them, predicts them worse than without the findings, or not down
-        to their noise; "" where nothing speaks against it or no record was held out.
+        Whether the final model diverges on held-out records, predicts them worse than without the findings,
+        or not down to their noise; whether another law explains the fitted ones better; "" where nothing
+        speaks against it.
     """
+    other: Doubt = "another law" if any(one.better is not None for one in alternatives) else ""
     first, last = before.errors["holdout"], final.errors["holdout"]
     if first is None or last is None:
-        return ""
+        return other
     if not math.isfinite(last.chi2_per_dof):
         return "diverges"
     chance = scipy.stats.chi2.sf(last.chi2_per_dof * last.dof, last.dof)
     if last.chi2_per_dof <= rules.good or chance > rules.significance:
-        return ""
+        return other
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
     rise = last.chi2_per_dof - first.chi2_per_dof
     return "worse" if rise > 3.0 * 2.0 * math.sqrt(max(rise, 0.0) / last.dof) else "not down to noise"
 
 
-def overall_verdict(before: Fit, final: Fit, findings: int, last: Verdict, rules: Rules) -> VerdictWord:
+def overall_verdict(
+    before: Fit,
+    final: Fit,
+    findings: int,
+    last: Verdict,
+    rules: Rules,
+    alternatives: tuple[Alternatives, ...] = (),
+) -> VerdictWord:
     """Give the verdict over all iterations."""
     first, found = before.estimate, final.estimate
     if not findings or not is_successful(final.result):
         return last.verdict
     if findings <= rules.most_at_once and is_good(final, rules):
-        return "partly_explained" if held_out_doubt(before, final, rules) else "found"
+        return "partly_explained" if doubt_of(before, final, alternatives, rules) else "found"
     explained = 1.0 - found.excess / max(first.excess, 1.0)
     return "partly_explained" if explained >= rules.most_of_it else "unexplained"

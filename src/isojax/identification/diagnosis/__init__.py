@@ -20,6 +20,7 @@ from ._imitations import find_superfluous as find_superfluous
 from ._projection import Projection as Projection
 from ._projection import project as project
 from ._refit import bic as bic
+from ._refit import least_difference as least_difference
 from ._refit import refit_from as refit_from
 from ._separation import AGAIN as AGAIN
 from ._separation import Experiment as Experiment

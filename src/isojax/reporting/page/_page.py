@@ -13,6 +13,7 @@ from ...identification import OUTPUT_UNITS, Candidate, Fit, Loop, plain_unit
 from ...records import Campaign
 from ..words import (
     GLOSSARY,
+    alternative_words,
     budget_rows,
     budget_words,
     caveats,
@@ -125,6 +126,7 @@ def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
             }
             for one in loop.findings
         ],
+        "alternatives": alternative_words(loop),
         "last_ranking": [_candidate(candidate, campaign) for candidate in loop.last.ranking[:_RANKS_ON_PAGE]],
         "unit": typeset_unit(OUTPUT_UNITS[quantity]),
         "errors": error_rows(before, after),

@@ -7,7 +7,7 @@ from ..._parameters import list_parameters
 from ..._results import is_successful
 from ...health import CampaignHealth
 from ...identification import Errors, Finding, Fit, Loop, plain_unit
-from ..words import check_first_dicts, finite_or_none, health_dict, remainder_dict
+from ..words import alternatives_list, check_first_dicts, finite_or_none, health_dict, remainder_dict
 
 SCHEMA = 1
 
@@ -15,8 +15,9 @@ SCHEMA = 1
 def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, Any]:
     """Give a closed loop as schema 1 of result.json.
 
-    "remainder" is there only where the verdict is "unexplained" or "partly_explained"; "integration", beside
-    the coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records.
+    "alternatives", other force laws in the place of the findings, is there only where something was found;
+    "remainder" only where the verdict is "unexplained" or "partly_explained"; "integration", beside the
+    coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records.
 
     Args:
         loop: the closed loop.
@@ -40,6 +41,7 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
             for effect, (upper, unit) in loop.bounds.items()
         },
         "seconds": finite_or_none(loop.seconds),
+        **({"alternatives": alternatives_list(loop)} if loop.alternatives else {}),
         **({} if health is None else {"health": health_dict(health)}),
         **({} if remainder is None else {"remainder": remainder_dict(remainder)}),
     }

@@ -14,6 +14,7 @@ from ...elements import CATALOGUE
 from ...identification import OUTPUT_UNITS, Candidate, Finding, Fit, Loop, Verdict, plain_unit
 from ..plots import ROLES, fits_meant
 from ..words import (
+    alternative_words,
     check_first_words,
     effect_words,
     finding_words,
@@ -221,7 +222,7 @@ def loop_summary(loop: Loop) -> RenderableType:
     return PlainGroup(
         *(Text(line, style="bold red") for line in check_first_words(loop.check_first)),
         Text(headline(loop), style="bold"),
-        *(Text(line) for line in (*lines, *remainder_summary(loop))),
+        *(Text(line) for line in (*lines, *alternative_words(loop), *remainder_summary(loop))),
         error_table(loop.before, loop.after),
         parameter_table(loop.before, loop.after),
     )

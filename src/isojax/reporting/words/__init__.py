@@ -2,7 +2,7 @@
 
 In: findings, fits, data health, an unexplained remainder. Out: strings, typeset with unit and error, and
 plain dictionaries for result.json. Read `isojax/_quantities.py` (one number), `_sentences.py` (the verdict),
-then the words on data health and on the remainder.
+then the words on other laws that would do, on data health and on the remainder.
 """
 
 from ..._quantities import INPUT_WORDS as INPUT_WORDS
@@ -13,6 +13,8 @@ from ..._quantities import typeset_p_value as typeset_p_value
 from ..._quantities import typeset_share as typeset_share
 from ..._quantities import typeset_unit as typeset_unit
 from ..._quantities import typeset_with_error as typeset_with_error
+from ._alternative_words import alternative_words as alternative_words
+from ._alternative_words import alternatives_list as alternatives_list
 from ._check_first_words import check_first_dicts as check_first_dicts
 from ._check_first_words import check_first_words as check_first_words
 from ._glossary import GLOSSARY as GLOSSARY

@@ -1,14 +1,18 @@
 """The unexplained residual in words, tables and plain numbers."""
 
 import math
-import re
 from typing import Any
 
-from ..._quantities import finite_or_none, typeset_goodness, typeset_number, typeset_share, typeset_unit
+from ..._quantities import (
+    finite_or_none,
+    typeset_formula,
+    typeset_goodness,
+    typeset_number,
+    typeset_share,
+    typeset_unit,
+)
 from ..._quantities import typeset_with_error as with_error
 from ...identification import Loop, Pursuit, Remainder
-
-_RAISED_FACTORS = str.maketrans("0123456789.", "⁰¹²³⁴⁵⁶⁷⁸⁹·")
 
 
 def remainder_summary(loop: Loop) -> tuple[str, ...]:
@@ -37,10 +41,9 @@ def pursuit_words(pursuit: Pursuit) -> str:
         return f"None of {pursuit.tried} free force laws explains a significant share of it."
     names = ["c"] if len(pursuit.laws) == 1 else [f"c{place + 1}" for place in range(len(pursuit.laws))]
     named = list(zip(names, pursuit.laws, strict=True))
-    terms = " + ".join(f"{name} {_typeset_formula(law.formula)}" for name, law in named)
+    terms = " + ".join(f"{name} {typeset_formula(law.formula)}" for name, law in named)
     strengths = ", ".join(
-        f"{name} = {with_error(law.coefficient, law.error, _typeset_formula(law.unit))}"
-        for name, law in named
+        f"{name} = {with_error(law.coefficient, law.error, typeset_formula(law.unit))}" for name, law in named
     )
     refit = f" ({typeset_goodness(pursuit.refitted)} refitted)" if math.isfinite(pursuit.refitted) else ""
     return (
@@ -48,11 +51,6 @@ def pursuit_words(pursuit: Pursuit) -> str:
         f"{typeset_share(pursuit.laws[-1].share)} of it: χ²/dof {typeset_goodness(pursuit.chi2_per_dof)} → "
         f"{typeset_goodness(pursuit.linear)} by a linear step{refit}. It is a description and no finding."
     )
-
-
-def _typeset_formula(formula: str) -> str:
-    """Give a force law with raised exponents: "|x|¹·⁵ v" for "|x|^1.5 v"."""
-    return re.sub(r"\^([0-9.]+)", lambda match: match[1].translate(_RAISED_FACTORS), formula)
 
 
 def law_rows(pursuit: Pursuit) -> list[dict[str, str]]:
@@ -66,12 +64,12 @@ def law_rows(pursuit: Pursuit) -> list[dict[str, str]]:
     """
     return [
         {
-            "formula": _typeset_formula(law.formula),
+            "formula": typeset_formula(law.formula),
             "words": law.words,
-            "coefficient": with_error(law.coefficient, law.error, _typeset_formula(law.unit)),
+            "coefficient": with_error(law.coefficient, law.error, typeset_formula(law.unit)),
             "force": f"{typeset_number(abs(law.force), 3)} {typeset_unit('N')}",
             "share": typeset_share(law.share),
-            "alike": ", ".join(_typeset_formula(formula) for formula in law.alike[:5]) or "none",
+            "alike": ", ".join(typeset_formula(formula) for formula in law.alike[:5]) or "none",
         }
         for law in pursuit.laws
     ]

@@ -86,6 +86,7 @@ _DOUBTS = {
     "not down to noise": (
         "The model does not explain the held-out records down to their noise: another law may act there."
     ),
+    "another law": "A force law outside the catalogue explains the records clearly better in its place.",
 }
 
 
