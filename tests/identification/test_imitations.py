@@ -1,13 +1,25 @@
 """Two effects at once: neither an imitation of both nor a name given too early may stand."""
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
 
 from isojax import rig
 from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
-from isojax.identification import Rules, close_loop, diagnose, fit, scales
+from isojax.identification import (
+    Extension,
+    Finding,
+    Rules,
+    Verdict,
+    _close_loop,
+    close_loop,
+    diagnose,
+    fit,
+    scales,
+)
+from isojax.identification.diagnosis import findings_in
 from isojax.identification.diagnosis._imitations import find_simpler_pair, find_superfluous
 from isojax.identification.diagnosis._refit import Refit, refit_candidate
 from isojax.identification.diagnosis._score import absent_effects, score_test
@@ -37,7 +49,8 @@ def thin(simulated):
 
 def _superfluous(campaign, start, *names):
     found = fit(start, campaign, integrator=Integrator())
-    return find_superfluous(found.estimate, names, Search(scales(campaign)))
+    doubtful = find_superfluous(found.estimate, names, Search(scales(campaign)))
+    return None if doubtful is None else doubtful.effect
 
 
 @pytest.mark.slow
@@ -61,6 +74,25 @@ def test_what_the_plant_has_is_not_superfluous(thin):
 def test_what_the_plant_lacks_is_superfluous(thin):
     start = START.with_elements(MaxwellBranch(5e3, 0.03), CoulombFriction(3.0, 2e-4), CubicStiffness(1e11))
     assert _superfluous(thin, start, "maxwell_branch", "coulomb_friction") == "maxwell_branch"
+
+
+@pytest.mark.slow
+def test_a_superfluous_finding_is_dropped_where_the_search_without_it_finds_nothing_better(thin, monkeypatch):
+    def step(before, name, *added):
+        after = fit(START.with_elements(MaxwellBranch(5e3, 0.03), *added), thin, integrator=Integrator())
+        finding = Finding(name, (), 1e-9, 0.9, math.nan, (), "")
+        return Extension(before, after, Verdict("found", finding, (), (), 0.0, (), {}, after, "It fits."))
+
+    before = fit(START, thin, integrator=Integrator())
+    first = step(before, "maxwell_branch")
+    second = step(first.after, "cubic_stiffness", CoulombFriction(3.0, 2e-4), CubicStiffness(1e11))
+    answers = [((first, second), second.verdict), ((), first.verdict)]
+    monkeypatch.setattr(_close_loop, "_grow", lambda *_: answers.pop(0))
+    extensions, _ = _close_loop.search_effects(before, Search(scales(thin)), 3)
+    final = extensions[-1].after
+    assert [one.effect for one in findings_in(final.model, extensions)] == ["cubic_stiffness"]
+    assert final.stats.chi2 == pytest.approx(second.after.stats.chi2, abs=10.0)
+    assert float(final.model["coulomb_friction.force_level"]) == pytest.approx(4.0, rel=0.05)
 
 
 def _outdone(campaign, law, rival):

@@ -19,7 +19,8 @@ class InputHold(AbstractElement):
     delay.
 
     Attributes:
-        share: s, 0 for the declared hold and 1 for the other [1].
+        share: s, 0 for the declared hold and 1 for the other; no hold gives more, the rest of its range is
+            for the error of an estimate [1].
         order: which other: 0 constant until the next sample, 1 straight between samples, 2 band-limited [1].
 
     Source: Astrom & Wittenmark 1997, sec. 2.3; Pintelon & Schoukens 2012, sec. 13.2.
@@ -31,7 +32,7 @@ class InputHold(AbstractElement):
     channels: ClassVar[tuple[str, ...]] = _ORDERS
     group: ClassVar[Group] = "The drive and the floor"
 
-    share: Scalar = parameter(symbol="s", unit="1", lower=0.0)
+    share: Scalar = parameter(symbol="s", unit="1", lower=0.0, upper=1.5)
     order: Scalar = parameter(symbol="n", unit="1", fitted=False)
 
     @classmethod

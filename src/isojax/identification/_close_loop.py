@@ -30,7 +30,7 @@ from .diagnosis import (
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, fit, search_of
+from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, complete, fit, search_of
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Alternatives, Remainder, explain_remainder, find_alternatives
 
@@ -255,7 +255,10 @@ def _without_evidence(failed: Fit) -> Verdict:
 def search_effects(
     before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...] = ()
 ) -> tuple[tuple[Extension, ...], Verdict]:
-    """Add effects while they are significant; search again without one that later ones made superfluous."""
+    """Add effects while they are significant; search again without one that later ones made superfluous.
+
+    Where that search finds nothing better, the effect is dropped all the same.
+    """
     extensions, verdict = _grow(before, search, max_iterations, excluded)
     if len(extensions) < 2:
         return extensions, verdict
@@ -269,13 +272,19 @@ def search_effects(
     doubtful = find_superfluous(final, earlier, search)
     if doubtful is None:
         return extensions, verdict
-    search.progress(KeyFigure(f"{doubtful} is not needed beside the later findings: search again without it"))
-    again, last = _grow(before, search, max_iterations, (*excluded, doubtful))
-    if not again:
+    name = doubtful.effect
+    search.progress(KeyFigure(f"{name} is not needed beside the later findings: search again without it"))
+    again, last = _grow(before, search, max_iterations, (*excluded, name))
+    best = doubtful.without if doubtful.is_better else final
+    if again:
+        new = again[-1].after.estimate
+        inflation = max(1.0, min(new.chi2 / new.dof, best.chi2 / best.dof))
+        if bic(new, inflation) <= bic(best, inflation):
+            return again, last
+    if best is final:
         return extensions, verdict
-    new = again[-1].after.estimate
-    inflation = max(1.0, min(new.chi2 / new.dof, final.chi2 / final.dof))
-    return (again, last) if bic(new, inflation) <= bic(final, inflation) else (extensions, verdict)
+    dropped = complete(best, before.model, before.campaign, before.noise)
+    return (*extensions[:-1], extensions[-1]._replace(fit=dropped)), verdict
 
 
 def _grow(

@@ -11,6 +11,20 @@ from ._refit import Refit, bic, follows_freely, is_determined, refit_candidate, 
 from ._score import absent_effects, score_test
 
 
+class Superfluous(NamedTuple):
+    """An effect that a model would do better without.
+
+    Attributes:
+        effect: catalogue name.
+        without: the model without it, fitted.
+        is_better: whether that model is no worse by Schwarz's criterion; if not, one with another effect is.
+    """
+
+    effect: str
+    without: Estimate
+    is_better: bool
+
+
 class _Opponent(NamedTuple):
     """The model that a smaller one with a partner must beat.
 
@@ -73,7 +87,7 @@ def find_simpler_pair(fitted: Estimate, usable: list[Refit], search: Search) -> 
     return f"{rival.score.element.words} and {pair.model.elements[-1].words}"
 
 
-def find_superfluous(final: Estimate, names: tuple[str, ...], search: Search) -> str | None:
+def find_superfluous(final: Estimate, names: tuple[str, ...], search: Search) -> Superfluous | None:
     """Find an effect, among those added one after the other, that the final model would do better without.
 
     The first effect of several was named while the others were missing. It is superfluous if the model
@@ -85,7 +99,7 @@ def find_superfluous(final: Estimate, names: tuple[str, ...], search: Search) ->
         search: how to search.
 
     Returns:
-        Its catalogue name, or None where each is needed.
+        The effect, or None where each is needed.
     """
     for name in names:
         if final.model.element(name) is None:  # a later one contains it
@@ -101,8 +115,6 @@ def find_superfluous(final: Estimate, names: tuple[str, ...], search: Search) ->
             inflation = max(1.0, min(final.chi2 / final.dof, other.chi2 / other.dof))
             return bic(final, inflation) - bic(other, inflation)
 
-        if gained(without) >= 0.0:
-            return name
-        if _best_addition(without, name, _Opponent(final, gained), search):
-            return name
+        if gained(without) >= 0.0 or _best_addition(without, name, _Opponent(final, gained), search):
+            return Superfluous(name, without, gained(without) >= 0.0)
     return None
