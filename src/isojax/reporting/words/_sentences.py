@@ -265,8 +265,8 @@ def caveats(loop: Loop) -> tuple[str, ...]:
     """
     after = loop.after
     lines = [
-        f"The search covers a catalogue of {len(CATALOGUE)} effects. Another cause shows as unexplained, or as "
-        "one of them beside the laws that would do as well.",
+        f"The search covers a catalogue of {len(CATALOGUE)} effects. Another cause shows as unexplained, "
+        "or as one of them beside the laws that would do as well.",
         "χ²/dof is relative to the estimated noise of the output; an error of that estimate scales it.",
     ]
     if after.errors["holdout"] is None:
