@@ -1,4 +1,5 @@
 import base64
+import dataclasses
 import re
 import shutil
 from html.parser import HTMLParser
@@ -6,7 +7,7 @@ from html.parser import HTMLParser
 import pytest
 
 from isojax import ClosedLoop
-from isojax.reporting import write_report
+from isojax.reporting import render_page, result_dict, write_report
 from isojax.reporting.plots import telling_slice
 
 
@@ -175,6 +176,18 @@ def test_fit_report_of_both_models_is_on_the_page(page, found):
     text = "".join(read(page).text)
     assert str(found.before) in text
     assert str(found.after) in text
+
+
+def test_what_contradicts_the_declaration_stands_above_the_verdict(found):
+    flipped = tuple(
+        dataclasses.replace(record, input=-record.input, raw_input=-record.raw_input)
+        for record in found.campaign.records
+    )
+    loop = dataclasses.replace(found, campaign=dataclasses.replace(found.campaign, records=flipped))
+    assert loop.check_first
+    text = "".join(read(render_page(loop)).text)
+    assert text.index("wrong sign") < text.index("Verdict")
+    assert "wrong sign" in str(result_dict(loop)["check_first"])
 
 
 def test_closed_loop_shows_its_parts_and_prints_them(found):
