@@ -64,7 +64,8 @@ def _slopes(
     """Give the residual at a point and its derivative by state and share."""
 
     def open_end(u: Array) -> tuple[Array, Array]:
-        return (family.open_end(method, scale, u),) * 2
+        value = family.open_end(method, scale, u)
+        return value, value
 
     slope, value = jax.jacfwd(open_end, has_aux=True)(here)
     return value, slope
@@ -138,7 +139,7 @@ def _locate(
         def halve(
             _: Array | int, carry: tuple[Array, Array, Array, Array]
         ) -> tuple[Array, Array, Array, Array]:
-            low, high, *_ = carry
+            low, high = carry[:2]
             middle, slope = correct(0.5 * (low + high))
             ahead = jnp.linalg.solve(
                 jnp.concatenate([slope, chord[None]]), jnp.zeros(states + 1).at[-1].set(1.0)
