@@ -22,7 +22,7 @@ EARLIER = """
 def test_about_thirty_names_are_listed():
     assert (
         NAMESPACES
-        == "elements excitations identification models paper plot records reporting stability".split()
+        == "elements excitations identification inference models paper plot records reporting stability".split()
     )
     assert 30 <= len(dir(ij)) <= 40
     assert not [name for name in dir(ij) if name.startswith(("_", "plot_"))]
@@ -32,7 +32,7 @@ def test_the_journey_from_records_to_sensitivities_is_listed():
     journey = """
         read_campaign classical_guess fit residual diagnose extend close_loop paper Harmonic simulate
         load_model find_periodic_orbit stability_map continue_branch fold_curve bifurcation_diagram
-        sensitivity
+        sensitivity uncertainty
     """
     assert set(journey.split()) <= set(dir(ij))
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import isojax as ij
-from isojax import _show
+from isojax import _show, inference
 from isojax._quantities import typeset_with_error
 from isojax.demo import campaign_folder
 from reporting.conftest import RANKING, cut
@@ -23,6 +23,7 @@ ROOMS = (
     ij.elements,
     ij.excitations,
     ij.identification,
+    inference,
     ij.models,
     ij.records,
     ij.reporting,
@@ -117,6 +118,7 @@ def results():
         "saved": fit.saved,
         "residual": ij.residual(fit),
         "budget": identification.drift_budget(fit),
+        "uncertain": ij.uncertainty(fit, lambda one: one["linear_stiffness.coefficient"]),
         "orbit": orbit,
         "map": ij.stability_map(model, np.array([100.0, 175.0]), np.array([4.2, 5.0]), coexisting=True),
         "branch": ij.continue_branch(model, parameter="amplitude", frequency=4.2, start=140.0, stop=200.0),

@@ -26,6 +26,7 @@ _ROOMS = (
     "models",
     "identification",
     "stability",
+    "inference",
     "reporting",
     "reporting.plots",
 )

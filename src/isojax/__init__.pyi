@@ -5,6 +5,7 @@ import typing
 from . import elements as elements
 from . import excitations as excitations
 from . import identification as identification
+from . import inference as inference
 from . import models as models
 from . import paper as paper
 from . import plot as plot
@@ -24,6 +25,7 @@ from .identification import fit as fit
 from .identification import load_fit as load_fit
 from .identification import read_campaign as read_campaign
 from .identification import residual as residual
+from .inference import uncertainty as uncertainty
 from .models import Integrator as Integrator
 from .models import Isolator as Isolator
 from .models import load_model as load_model

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from isojax import RESULTS
-from isojax.identification import fit_report, uncertainty
+from isojax.identification import fit_report
+from isojax.identification.fitting import invert_information
 from isojax.identification.fitting._fit_result import _within
 from isojax.records import data_health
 from isojax.reporting.words._sentences import health_words
 
 
 def with_uncertainty(fit, matrix):
-    found = fit.estimate._replace(uncertainty=uncertainty(matrix))
+    found = fit.estimate._replace(uncertainty=invert_information(matrix))
     return fit._replace(estimate=found)
 
 

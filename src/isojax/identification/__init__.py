@@ -41,7 +41,6 @@ from .fitting import fit_report as fit_report
 from .fitting import load_fit as load_fit
 from .fitting import plain_unit as plain_unit
 from .fitting import residual as residual
-from .fitting import uncertainty as uncertainty
 from .guess import CircleFit as CircleFit
 from .guess import ClassicalGuess as ClassicalGuess
 from .guess import HalfPower as HalfPower

@@ -11,7 +11,7 @@ from ._as_fit import as_fit as as_fit
 from ._coefficients import Coefficient as Coefficient
 from ._coefficients import Coefficients as Coefficients
 from ._covariance import Uncertainty as Uncertainty
-from ._covariance import uncertainty as uncertainty
+from ._covariance import invert_information as invert_information
 from ._drift_budget import DriftBudget as DriftBudget
 from ._drift_budget import Share as Share
 from ._drift_budget import drift_budget as drift_budget

@@ -49,7 +49,7 @@ class Uncertainty(NamedTuple):
     partners: tuple[tuple[int, ...], ...]
 
 
-def uncertainty(matrix: Float[np.ndarray, "column column"], inflation: float = 1.0) -> Uncertainty:
+def invert_information(matrix: Float[np.ndarray, "column column"], inflation: float = 1.0) -> Uncertainty:
     """Invert an information matrix.
 
     `C = inflation (J'J)^-1` with J the whitened derivatives after the nuisances. The matrix is first scaled

@@ -17,7 +17,7 @@ from ...models import Isolator
 from ...records import Record
 from .._rules import Rules
 from ..jacobian import STIFFNESS_SCALE_UNIT, has_stiffness_scale
-from ._covariance import Uncertainty, uncertainty, unknown
+from ._covariance import Uncertainty, invert_information, unknown
 from ._descent import descend
 from ._elimination import Nuisances, Spread
 from ._initial_states import HELD, best_nuisances
@@ -254,7 +254,7 @@ def estimate(
     point = found.point
     dof = max(1.0, point.free_samples - len(places))
     error = (
-        uncertainty(point.reduced.matrix[:-1, :-1], max(1.0, point.chi2 / dof))
+        invert_information(point.reduced.matrix[:-1, :-1], max(1.0, point.chi2 / dof))
         if is_successful(found.result)
         else unknown(len(places))
     )

@@ -1,0 +1,8 @@
+"""How sure an answer is: the covariance of a fit carried into what is asked of its model.
+
+In: a fit and a function of its model. Out: an `UncertainQuantity`, value, standard error and interval.
+Read `_uncertainty.py`.
+"""
+
+from ._uncertainty import UncertainQuantity as UncertainQuantity
+from ._uncertainty import uncertainty as uncertainty

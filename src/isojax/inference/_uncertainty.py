@@ -1,0 +1,206 @@
+"""Value, standard error and interval of a quantity of a fitted model."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.special import ndtri
+
+from .._parameters import list_parameters, replace_parameters
+from .._results import RESULTS, is_successful
+from .._show import Row, brief, shown
+from .._types import check_float64
+from ..identification import Fit, SavedFit, as_fit
+from ..models import Isolator
+
+_CLOSE = 0.1
+"""Share of an interval by which delta method and draws may differ."""
+
+_ROUNDS = 50
+"""Times that draws outside the bounds of a coefficient are drawn again."""
+
+
+@shown
+class UncertainQuantity(NamedTuple):
+    """A quantity of a fitted model with its error.
+
+    Attributes:
+        value: at the fitted coefficients, in the quantity's own shape.
+        standard_error: by the delta method; where `curved`, standard deviation of the draws.
+        interval: lower and upper end, first axis; where `curved`, quantiles of the draws.
+        confidence: chance that the interval is meant to hold the truth.
+        curved: where the quantity bends so much within the error of the coefficients that an end of the
+            interval by the delta method differs from that by draws by more than a tenth of its width.
+        draws: the quantity at coefficients drawn from their normal distribution, draw first.
+        failed: share of the draws that gave no finite number; they count nowhere.
+    """
+
+    value: Float[np.ndarray, "..."]
+    standard_error: Float[np.ndarray, "..."]
+    interval: Float[np.ndarray, "2 ..."]
+    confidence: float
+    curved: np.ndarray
+    draws: Float[np.ndarray, "draw ..."]
+    failed: float
+
+    def _headline(self) -> str:
+        bent = (
+            f", curved in {np.count_nonzero(self.curved)} of {self.curved.size}" if self.curved.any() else ""
+        )
+        lost = f", {self.failed:.0%} of the draws failed" if self.failed else ""
+        return f"{self.confidence:.0%} interval, {len(self.draws)} draws{bent}{lost}"
+
+    def _rows(self) -> list[Row]:
+        flat = [np.ravel(one) for one in (self.value, self.standard_error, *self.interval)]
+        return [
+            Row(f"[{place}]", f"{value:.6g} ± {error:.2g}", f"{low:.6g} to {high:.6g}")
+            for place, (value, error, low, high) in enumerate(zip(*flat, strict=True))
+        ]
+
+
+def uncertainty(
+    fit: Fit | SavedFit | Any,
+    quantity: Callable[[Isolator], Any],
+    *,
+    confidence: float = 0.95,
+    draws: int = 1000,
+    seed: int = 0,
+) -> UncertainQuantity:
+    """Carry the error of a fit into a quantity of its model.
+
+    The delta method takes exact derivatives and the covariance of the coefficients. Draws from their normal
+    distribution, those outside the bounds of a coefficient drawn again, show where a first derivative is not
+    enough; there their quantiles are the interval.
+
+    Args:
+        fit: a fit, a saved one, or what ends with one: an extension, a closed loop.
+        quantity: function of an isolator that gives real numbers: one, or an array. It must be differentiable
+            by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one.
+        confidence: chance that the interval is to hold the truth.
+        draws: how many; at least 100.
+        seed: of the draws.
+
+    Returns:
+        Value, standard error and interval.
+
+    Raises:
+        ValueError: if the fit failed, the data do not determine a coefficient, the quantity is complex or not
+            finite at the fitted coefficients, or `confidence` or `draws` is out of range.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Seber & Wild 1989, Nonlinear Regression, sec. 5.1 (delta method); JCGM 101:2008 (draws).
+
+    Example:
+        With the fit of `fit`'s example, the amplitude of the motion at 100 N and 5 Hz:
+
+        >>> def amplitude(model):
+        ...     return ij.find_periodic_orbit(model, ij.Harmonic(100.0, 5.0)).amplitude
+        >>> answer = ij.uncertainty(fitted, amplitude)
+        >>> bool(answer.interval[0] < answer.value < answer.interval[1])
+        True
+    """
+    check_float64()
+    held = fit if isinstance(fit, SavedFit) else as_fit(fit)
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
+    if draws < 100:
+        raise ValueError(f"Argument `draws` must be at least 100, but is {draws}.")
+    values, root = _distribution(held)
+    model, places = held.model, _places(held)
+    numbers = [entry.value for entry in list_parameters(model)]
+
+    def at(steps: Float[Array, " coefficient"]) -> Array:
+        moved = list(numbers)
+        for place, number in zip(places, values + root @ steps, strict=True):
+            moved[place] = number
+        return jnp.asarray(quantity(replace_parameters(model, moved)))
+
+    still = jnp.zeros(len(places))
+    value = at(still)
+    if jnp.iscomplexobj(value) or not np.all(np.isfinite(value)):
+        raise ValueError(
+            "Argument `quantity` must give finite real numbers at the fitted coefficients, but gave "
+            f"{brief(value)}."
+        )
+    value = jnp.asarray(value, dtype=float)
+    error = jnp.linalg.norm(jax.jacfwd(at)(still), axis=-1)
+    drawn = _quantity_at(at, _drawn_steps(held, values, root, draws, seed))
+    finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
+    if not finite.any():
+        raise ValueError(
+            "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
+        )
+    half = 0.5 * (1.0 - confidence)
+    spread = -float(ndtri(half)) * np.asarray(error)
+    straight = np.stack([np.asarray(value) - spread, np.asarray(value) + spread])
+    ends = np.quantile(drawn[finite], [half, 1.0 - half], axis=0)
+    curved = np.max(np.abs(ends - straight), axis=0) > _CLOSE * 2.0 * spread
+    return UncertainQuantity(
+        np.asarray(value),
+        np.where(curved, np.std(drawn[finite], axis=0), np.asarray(error)),
+        np.where(curved, ends, straight),
+        confidence,
+        np.asarray(curved),
+        drawn,
+        float(1.0 - finite.mean()),
+    )
+
+
+def _places(held: Fit | SavedFit) -> tuple[int, ...]:
+    names = [entry.name for entry in list_parameters(held.model)]
+    return tuple(names.index(name) for name in held.free)
+
+
+def _distribution(
+    held: Fit | SavedFit,
+) -> tuple[Float[np.ndarray, " coefficient"], Float[np.ndarray, "coefficient coefficient"]]:
+    """Give the fitted coefficients, and the root of their covariance."""
+    if not is_successful(held.result):
+        raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[held.result]}")
+    covariance = np.asarray(held.covariance, dtype=float)
+    size = np.sqrt(np.diag(covariance))
+    lost = [name for name, one in zip(held.free, size, strict=True) if not np.isfinite(one)]
+    if lost:
+        raise ValueError(
+            "Argument `fit` must determine each free coefficient, but its data do not determine "
+            f"{', '.join(lost)}."
+        )
+    # Scaled before the roots are taken: stiffness in N/m and in N/m^3 differ by many orders.
+    safe = np.where(size > 0.0, size, 1.0)
+    shares, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
+    root = safe[:, None] * vectors * np.sqrt(np.maximum(shares, 0.0))
+    values = np.array([float(held.model[name]) for name in held.free])
+    return values, root
+
+
+def _drawn_steps(
+    held: Fit | SavedFit,
+    values: Float[np.ndarray, " coefficient"],
+    root: Float[np.ndarray, "coefficient coefficient"],
+    draws: int,
+    seed: int,
+) -> Float[np.ndarray, "draw coefficient"]:
+    """Draw standard normal steps whose coefficients keep to their bounds."""
+    generator = np.random.default_rng(seed)
+    specs = [list_parameters(held.model)[place].spec for place in _places(held)]
+    lower, upper = (np.array([getattr(spec, end) for spec in specs]) for end in ("lower", "upper"))
+    steps = generator.standard_normal((draws, values.size))
+    for _ in range(_ROUNDS):
+        moved = values + steps @ root.T
+        outside = np.any((moved < lower) | (moved > upper), axis=1)
+        if not outside.any():
+            break
+        steps[outside] = generator.standard_normal((np.count_nonzero(outside), values.size))
+    return steps
+
+
+def _quantity_at(
+    at: Callable[[Float[Array, " coefficient"]], Array], steps: Float[np.ndarray, "draw coefficient"]
+) -> Float[np.ndarray, "draw ..."]:
+    try:
+        return np.asarray(jax.jit(jax.vmap(at))(jnp.asarray(steps)), dtype=float)
+    except jax.errors.JAXTypeError:
+        return np.stack([np.asarray(at(jnp.asarray(step)), dtype=float) for step in steps])

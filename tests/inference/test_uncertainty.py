@@ -1,0 +1,111 @@
+"""The error of a fit carried into quantities, against closed forms and central differences."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.stats import norm, truncnorm
+
+import isojax as ij
+from isojax.demo import campaign_folder
+
+STIFFNESS, DAMPING = "linear_stiffness.coefficient", "linear_damping.coefficient"
+
+
+@pytest.fixture(scope="module")
+def fit():
+    """A fit to the demo, from a start next to it: its covariance is what counts here."""
+    campaign = ij.read_campaign(campaign_folder())
+    return ij.fit(ij.classical_guess(campaign).model, campaign)
+
+
+@pytest.fixture(scope="module")
+def wide(fit, tmp_path_factory):
+    """The same, saved, with a linear stiffness that is uncertain by a tenth, alone."""
+    path = tmp_path_factory.mktemp("fit") / "fit.json"
+    fit.save(path)
+    saved = ij.load_fit(path)
+    covariance = np.zeros_like(saved.covariance)
+    place = saved.free.index(STIFFNESS)
+    covariance[place, place] = (0.1 * float(saved.model[STIFFNESS])) ** 2
+    return saved._replace(covariance=covariance)
+
+
+def test_of_a_linear_quantity_the_error_is_that_of_the_covariance(fit):
+    weights = np.zeros(len(fit.free))
+    weights[fit.free.index(STIFFNESS)], weights[fit.free.index(DAMPING)] = 2.0, -30.0
+    found = ij.uncertainty(fit, lambda model: 2.0 * model[STIFFNESS] - 30.0 * model[DAMPING])
+    expected = np.sqrt(weights @ fit.covariance @ weights)
+    assert float(found.standard_error) == pytest.approx(expected, rel=1e-9)
+    assert not found.curved.any()
+    np.testing.assert_allclose(found.interval - found.value, norm.ppf([0.025, 0.975]) * expected, rtol=1e-9)
+    assert np.std(found.draws) == pytest.approx(expected, rel=0.1)
+    assert found.failed == 0.0
+
+
+def test_of_a_curved_quantity_the_interval_is_that_of_its_distribution(wide):
+    centre = float(wide.model[STIFFNESS])
+    found = ij.uncertainty(
+        wide, lambda m: jnp.stack([m[STIFFNESS] / centre, jnp.exp(8.0 * m[STIFFNESS] / centre)]), draws=20_000
+    )
+    assert found.curved.tolist() == [False, True]
+    # The logarithm of the second is normal, with mean 8 and standard deviation 0.8.
+    np.testing.assert_allclose(found.interval[:, 1], np.exp(norm.ppf([0.025, 0.975], 8.0, 0.8)), rtol=0.05)
+    spread = np.exp(8.0 + 0.32) * np.sqrt(np.expm1(0.64))
+    assert found.standard_error[1] == pytest.approx(spread, rel=0.05)
+    assert found.standard_error[0] == pytest.approx(0.1, rel=1e-9)
+
+
+def test_of_an_orbit_the_error_is_that_of_central_differences(fit):
+    def amplitude(model):
+        return ij.find_periodic_orbit(model, ij.Harmonic(amplitude=60.0, frequency=5.0)).amplitude
+
+    found = ij.uncertainty(fit, amplitude, draws=100)
+    slopes = []
+    for name, error in fit.standard_errors.items():
+        moved = [
+            float(amplitude(fit.model.replace(**{name.replace(".", "__"): float(fit.model[name]) + h})))
+            for h in (-error, error)
+        ]
+        slopes.append((moved[1] - moved[0]) / (2.0 * error))
+    assert list(fit.standard_errors) == list(fit.free)
+    expected = np.sqrt(np.array(slopes) @ fit.covariance @ np.array(slopes))
+    assert float(found.standard_error) == pytest.approx(expected, rel=1e-4)
+
+
+def test_bounds_hold_and_draws_that_fail_are_counted(wide):
+    seen = float(wide.model[STIFFNESS])
+    rough = wide._replace(
+        model=wide.model.with_elements(ij.CoulombFriction(1.0, 1e-4)),
+        free=(*wide.free, "coulomb_friction.force_level"),
+        covariance=np.pad(wide.covariance, ((0, 1), (0, 1))),
+    )
+    rough.covariance[-1, -1] = 1.0
+    drawn = ij.uncertainty(rough, lambda model: model["coulomb_friction.force_level"], draws=20_000)
+    # A normal law of mean and standard deviation one, cut at zero.
+    np.testing.assert_allclose(drawn.interval, truncnorm.ppf([0.025, 0.975], -1.0, np.inf, 1.0), atol=0.05)
+    assert drawn.curved
+    found = ij.uncertainty(wide, lambda m: jnp.where(m[STIFFNESS] > seen * 1.05, jnp.nan, m[STIFFNESS]))
+    assert found.failed == pytest.approx(norm.sf(0.5), abs=0.05)
+
+
+def test_a_function_that_cannot_be_mapped_is_drawn_one_by_one(wide):
+    def numpy_only(model):
+        return model[STIFFNESS] if bool(model[DAMPING] > 0.0) else -model[STIFFNESS]
+
+    found = ij.uncertainty(wide._replace(free=wide.free), numpy_only, draws=100)
+    assert found.draws.shape == (100,)
+
+
+def test_what_cannot_be_carried_is_refused(wide):
+    lost = np.array(wide.covariance)
+    lost[0] = lost[:, 0] = np.nan
+    with pytest.raises(ValueError, match=f"do not determine {wide.free[0]}"):
+        ij.uncertainty(wide._replace(covariance=lost), lambda model: model[STIFFNESS])
+    with pytest.raises(ValueError, match="finite real numbers"):
+        ij.uncertainty(wide, lambda model: 1j * model[STIFFNESS])
+    with pytest.raises(ValueError, match="`confidence` must lie between 0 and 1"):
+        ij.uncertainty(wide, lambda model: model[STIFFNESS], confidence=95.0)
+    with pytest.raises(ValueError, match="`draws` must be at least 100"):
+        ij.uncertainty(wide, lambda model: model[STIFFNESS], draws=10)
+    with pytest.raises(ValueError, match="must have succeeded"):
+        ij.uncertainty(wide._replace(result=ij.RESULTS.not_converged), lambda model: model[STIFFNESS])
