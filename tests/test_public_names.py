@@ -20,10 +20,8 @@ EARLIER = """
 
 
 def test_about_thirty_names_are_listed():
-    assert (
-        NAMESPACES
-        == "elements excitations identification inference models paper plot records reporting stability".split()
-    )
+    namespaces = "elements excitations identification inference models paper plot records reporting stability"
+    assert namespaces.split() == NAMESPACES
     assert 30 <= len(dir(ij)) <= 40
     assert not [name for name in dir(ij) if name.startswith(("_", "plot_"))]
 
