@@ -9,7 +9,7 @@ from ..._show import shown
 from .._blow import blow_samples
 from .._campaign import Campaign
 from .._record import Dwell, Record
-from ..spectrum import dwell_harmonics, harmonic_basis
+from ..spectrum import dwell_harmonics, harmonic_basis, without
 from ._noise_peak import NoisePeak, noise_peak
 from ._repeats import repeat_groups
 from ._spikes import Spikes, spikes
@@ -169,12 +169,11 @@ def cycle_change(record: Record, dwell: Dwell) -> tuple[float, float] | None:
     time = (np.arange(start, dwell.stop) - start) / record.rate
     orders = max(_FREE_ORDERS, min(_COMMON_ORDERS, int(0.2 * cycle)))
     common = harmonic_basis(time, dwell.frequency, orders)
-    shared = signal - common @ np.linalg.lstsq(common, signal, rcond=None)[0]
+    shared = without(common, signal)
     own = shared.copy()
     few = harmonic_basis(time, dwell.frequency, _FREE_ORDERS)
     for first, last in zip(edges[:-1] - start, edges[1:] - start, strict=True):
-        part = few[first:last]
-        own[first:last] -= part @ np.linalg.lstsq(part, shared[first:last], rcond=None)[0]
+        own[first:last] = without(few[first:last], shared[first:last])
     before, after = float(shared @ shared), float(own @ own)
     gained = (_LAST_CYCLES - 1) * few.shape[1]
     left = signal.size - common.shape[1] - gained

@@ -168,10 +168,11 @@ def _line_bases(
         orders = min(MOST_HARMONICS, int(_HIGHEST_LINE * highest / frequency), max(1, size // 8))
         basis = harmonic_basis(time, frequency, orders)
         design = np.concatenate([basis, (time / time[-1])[:, None] * basis[:, :3]], axis=1)
-    known, _ = np.linalg.qr(design)
-    phase = 2.0 * np.pi * np.array(lines)[:, None] * time
-    pairs = np.stack([np.cos(phase), np.sin(phase)], axis=2)
-    pairs -= known @ (known.T @ pairs)
+    known = design @ np.linalg.inv(np.linalg.cholesky(design.T @ design)).T
+    phase = 2.0 * np.pi * np.outer(time, lines)
+    columns = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
+    columns -= known @ (known.T @ columns)
+    pairs = np.stack([columns[:, : len(lines)].T, columns[:, len(lines) :].T], axis=2)
     # All pairs at once by their 2 x 2 products: those that are used are far from parallel.
     powers, turns = np.linalg.eigh(np.swapaxes(pairs, 1, 2) @ pairs)
     seen = powers[:, 0] > _OBSERVABLE * 0.5 * size

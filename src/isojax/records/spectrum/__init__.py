@@ -11,6 +11,7 @@ from ._band import excited_band as excited_band
 from ._band import power_spectrum as power_spectrum
 from ._band import ringing_frequency as ringing_frequency
 from ._band import spectral_floor as spectral_floor
+from ._basis import without as without
 from ._dwell_end import MOST_HARMONICS as MOST_HARMONICS
 from ._dwell_end import Rest as Rest
 from ._dwell_end import dwell_rest as dwell_rest

@@ -37,6 +37,21 @@ def harmonic_basis(
     return basis
 
 
+def without(
+    basis: Float[np.ndarray, "time column"], signal: Float[np.ndarray, " time"]
+) -> Float[np.ndarray, " time"]:
+    """Gives what the columns leave of a signal, by the normal equations.
+
+    Args:
+        basis: (time, column); over whole cycles, harmonics are all but orthogonal.
+        signal: (time,).
+
+    Returns:
+        (time,).
+    """
+    return signal - basis @ np.linalg.solve(basis.T @ basis, basis.T @ signal)
+
+
 def meeting_order(frequency: float, line: float, seconds: float) -> int | None:
     """Gives the harmonic that a window cannot separate from a line, such as the tenth of 5 Hz from 50 Hz.
 
