@@ -10,7 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from _trial_judge import table
 from _trial_run import crowded, run_one
 
-SAMPLE = {1000: "none", 1003: "one", 1013: "one", 1017: "outside", 1018: "two"}
+SAMPLE = {1000: "none", 1003: "one", 1017: "outside", 1018: "two"}
 
 
 def _mark(rows, criterion):
@@ -19,7 +19,7 @@ def _mark(rows, criterion):
 
 @pytest.mark.slow
 def test_a_small_sample_is_judged_right():
-    """Five campaigns: too few for the marks of the whole trial, enough to see that nothing is broken."""
+    """Four campaigns: too few for the marks of the whole trial, enough to see that nothing is broken."""
     rows = []
     for seed, kind in SAMPLE.items():
         rows.append(run_one(seed, kind, "loop"))
@@ -28,7 +28,7 @@ def test_a_small_sample_is_judged_right():
     assert not [row["error"] for row in rows if "error" in row]
     judged = {
         "an effect named": (1, 0.0),
-        "right family": (2, 1.0),
+        "right family": (1, 1.0),
         "two effects": (1, 1.0),
         "outside": (1, 1.0),
     }

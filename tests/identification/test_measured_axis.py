@@ -13,11 +13,8 @@ from measured import EMPS
 
 RIVALS = {
     "coulomb_friction",
-    "asymmetric_friction",
     "stribeck_friction",
     "abs_quadratic_damping",
-    "cubic_damping",
-    "input_delay",
 }
 """Effects that are weighed here; the whole catalogue is in the benchmark of measured records."""
 
