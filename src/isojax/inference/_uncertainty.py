@@ -16,10 +16,10 @@ from .._types import check_float64
 from ..identification import Fit, SavedFit, as_fit
 from ..models import Isolator
 
-_CLOSE = 0.1
+_BEND = 0.1
 """Share of an interval by which delta method and draws may differ."""
 
-_ROUNDS = 50
+_DRAWN_AGAIN = 50
 """Times that draws outside the bounds of a coefficient are drawn again."""
 
 
@@ -137,7 +137,7 @@ def uncertainty(
     spread = -float(ndtri(half)) * np.asarray(error)
     straight = np.stack([np.asarray(value) - spread, np.asarray(value) + spread])
     ends = np.quantile(drawn[finite], [half, 1.0 - half], axis=0)
-    curved = np.max(np.abs(ends - straight), axis=0) > _CLOSE * 2.0 * spread
+    curved = np.max(np.abs(ends - straight), axis=0) > _BEND * 2.0 * spread
     return UncertainQuantity(
         np.asarray(value),
         np.where(curved, np.std(drawn[finite], axis=0), np.asarray(error)),
@@ -188,7 +188,7 @@ def _drawn_steps(
     specs = [list_parameters(held.model)[place].spec for place in _places(held)]
     lower, upper = (np.array([getattr(spec, end) for spec in specs]) for end in ("lower", "upper"))
     steps = generator.standard_normal((draws, values.size))
-    for _ in range(_ROUNDS):
+    for _ in range(_DRAWN_AGAIN):
         moved = values + steps @ root.T
         outside = np.any((moved < lower) | (moved > upper), axis=1)
         if not outside.any():
