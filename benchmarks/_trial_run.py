@@ -157,7 +157,10 @@ def _said_of(loop: Loop) -> Row:
         "scatter": loop.before.stats.stiffness_scatter,
         "reason": loop.last.reason,
         "alternatives": [
-            {"effects": one.effects, "laws": [[law.formula, round(law.rise, 2)] for law in one.laws[:6]]}
+            {
+                "effects": one.effects,
+                "laws": [[law.formula, round(law.delta_chi2, 2)] for law in one.laws[:6]],
+            }
             for one in loop.alternatives
         ],
         "ranking": [

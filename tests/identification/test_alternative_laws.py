@@ -41,7 +41,7 @@ def test_the_true_law_does_better_than_a_wrong_name_and_has_its_coefficient(rang
     # A fit of the same law, of all coefficients at once, comes to the same chi2 and to the same numbers.
     refitted = fit(best.model, found.campaign)
     inflation = max(1.0, found.stats.chi2 / found.stats.dof)
-    assert (refitted.stats.chi2 - found.stats.chi2) / inflation == pytest.approx(best.rise, rel=0.05)
+    assert (refitted.stats.chi2 - found.stats.chi2) / inflation == pytest.approx(best.delta_chi2, rel=0.05)
     linear = "linear_damping.coefficient"
     assert abs(float(refitted.model[linear]) - float(best.model[linear])) < refitted.standard_errors[linear]
 
@@ -52,9 +52,9 @@ def test_a_right_name_is_beaten_by_none_and_is_one_of_them(range_of):
     assert alternatives.better is None
     same = [law for law in alternatives.laws if law.is_the_same]
     assert [law.formula for law in same] == ["x^2 v"]
-    assert same[0].rise == pytest.approx(0.0, abs=0.1)
+    assert same[0].delta_chi2 == pytest.approx(0.0, abs=0.1)
     assert abs(same[0].coefficient - 4e8) < 4.0 * same[0].error
-    assert all(abs(law.rise) <= alternatives.margin for law in alternatives.laws)
+    assert all(abs(law.delta_chi2) <= alternatives.margin for law in alternatives.laws)
 
 
 def test_without_a_law_nothing_does_better():

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 import scipy.signal
 from jaxtyping import Float
+from made_campaign import campaign_of
 
 from isojax.records import (
     Campaign,
     Filter,
-    InputChannel,
-    OutputChannel,
     Record,
     brief_blows,
     data_health,
@@ -27,12 +26,12 @@ LOW = Filter("butterworth", 4, 60.0, applied=True)
 
 
 def found_in(output: Float[np.ndarray, " time"], low: Filter | None = None) -> float:
-    noise = estimate_noise(campaign_of(output, np.sin(np.arange(output.size) / RATE), "broadband", low))
+    noise = estimate_noise(made_of(output, np.sin(np.arange(output.size) / RATE), "broadband", low))
     assert noise.method == "high_frequency"
     return noise.sigma
 
 
-def campaign_of(
+def made_of(
     output: Float[np.ndarray, " time"],
     drive: Float[np.ndarray, " time"],
     kind: ExcitationKind,
@@ -40,20 +39,7 @@ def campaign_of(
 ) -> Campaign:
     time = np.arange(output.size) / RATE
     record = Record("a", Path("a.npz"), time, RATE, drive, output, drive, output, kind=kind)
-    return Campaign(
-        title="made",
-        file=Path("campaign.toml"),
-        mass=1.0,
-        mass_free=False,
-        input=InputChannel("force", "f", "N"),
-        output=OutputChannel("displacement", "x", "m"),
-        filter=low,
-        rate=RATE,
-        stiffness=(),
-        damping=(),
-        elements=(),
-        records=(record,),
-    )
+    return campaign_of(record, low=low)
 
 
 def signal_of(kind: str, seed: int, size: int) -> Float[np.ndarray, " time"]:
@@ -144,7 +130,7 @@ def test_a_blow_is_no_noise(width: int) -> None:
     found = []
     for seed in range(SEEDS):
         noisy = output + SIGMA * np.random.default_rng(seed).normal(size=output.size)
-        noise = estimate_noise(campaign_of(noisy, force, "impulse"))
+        noise = estimate_noise(made_of(noisy, force, "impulse"))
         assert noise.method == "high_frequency"
         found.append(noise.sigma)
     assert np.mean(found) == pytest.approx(SIGMA, rel=0.01 + 2.0 * np.std(found) / SIGMA / np.sqrt(SEEDS))
@@ -155,7 +141,7 @@ def test_the_jump_of_a_release_is_no_noise() -> None:
     motion = np.where(time < 0.0, 0.0, 8.0 * np.exp(-np.maximum(time, 0.0)) * np.cos(2 * np.pi * 5.0 * time))
     found = [
         estimate_noise(
-            campaign_of(
+            made_of(
                 motion + SIGMA * np.random.default_rng(seed).normal(size=time.size),
                 np.zeros(time.size),
                 "free_decay",
@@ -170,8 +156,8 @@ def test_the_jump_of_a_release_is_no_noise() -> None:
 def test_a_blow_of_fewer_than_four_samples_is_named(width: int, seen: int) -> None:
     output, force = blow(width)
     noisy = force + np.random.default_rng(0).normal(size=force.size)
-    campaign = campaign_of(output, noisy, "impulse")
+    campaign = made_of(output, noisy, "impulse")
     expected = [("a", seen)] if seen < 4 else []
     assert [(one.record, one.samples) for one in brief_blows(campaign)] == expected
     assert data_health(campaign).brief_blows == brief_blows(campaign)
-    assert brief_blows(campaign_of(output, noisy, "broadband")) == ()
+    assert brief_blows(made_of(output, noisy, "broadband")) == ()

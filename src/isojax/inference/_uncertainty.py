@@ -13,7 +13,7 @@ from .._parameters import list_parameters, replace_parameters
 from .._results import RESULTS, is_successful
 from .._show import Row, brief, shown
 from .._types import check_float64
-from ..identification import Fit, SavedFit, as_fit
+from ..identification import Fit, Fitted, SavedFit, as_fit
 from ..models import Isolator
 
 _BEND = 0.1
@@ -62,7 +62,7 @@ class UncertainQuantity(NamedTuple):
 
 
 def uncertainty(
-    fit: Fit | SavedFit | Any,
+    fit: Fit | Fitted | SavedFit,
     quantity: Callable[[Isolator], Any],
     *,
     confidence: float = 0.95,
@@ -192,9 +192,12 @@ def _drawn_steps(
         moved = values + steps @ root.T
         outside = np.any((moved < lower) | (moved > upper), axis=1)
         if not outside.any():
-            break
+            return steps
         steps[outside] = generator.standard_normal((np.count_nonzero(outside), values.size))
-    return steps
+    raise ValueError(
+        "Argument `fit` must leave its coefficients room between their bounds, but almost no draw falls "
+        "there."
+    )
 
 
 def _quantity_at(

@@ -25,8 +25,8 @@ class AlternativeLaw(NamedTuple):
         coefficient: factor before the formula [unit].
         error: its standard error, times sqrt(chi2/dof) where that exceeds one [unit].
         unit: unit of the coefficient.
-        rise: chi2 with the law less chi2 with the findings, over max(chi2/dof, 1); below zero where the law
-            explains more.
+        delta_chi2: chi2 with the law less chi2 with the findings, over max(chi2/dof, 1); below zero where
+            the law explains more.
         likeness: correlation of its trace in the records with that of the findings, the other coefficients
             free; 1 for the same law.
         model: the isolator with the law in the place of the findings, coefficients by one linear step.
@@ -37,7 +37,7 @@ class AlternativeLaw(NamedTuple):
     coefficient: float
     error: float
     unit: str
-    rise: float
+    delta_chi2: float
     likeness: float
     model: Isolator
 
@@ -47,7 +47,7 @@ class AlternativeLaw(NamedTuple):
         return abs(self.likeness) > 1.0 - 1e-6
 
     def _headline(self) -> str:
-        return f"{self.formula}, {amount(self.coefficient, self.unit, self.error)}, χ² {self.rise:+.3g}"
+        return f"{self.formula}, {amount(self.coefficient, self.unit, self.error)}, χ² {self.delta_chi2:+.3g}"
 
 
 @shown
@@ -69,7 +69,7 @@ class Alternatives(NamedTuple):
     @property
     def better(self) -> AlternativeLaw | None:
         """The law that explains clearly more than the findings; None where none does."""
-        return self.laws[0] if self.laws and self.laws[0].rise < -self.margin else None
+        return self.laws[0] if self.laws and self.laws[0].delta_chi2 < -self.margin else None
 
     def _headline(self) -> str:
         named = " and ".join(self.effects)
@@ -138,11 +138,11 @@ def _alternatives(
     force[-1] = 0.0
     trace = (left @ force)[columns] / np.sqrt(max(force @ left @ force, 1e-300))
     inflation = max(1.0, fitted.chi2 / fitted.dof)
-    rise = (done @ left @ done - gain - with_findings) / inflation
+    delta_chi2 = (done @ left @ done - gain - with_findings) / inflation
     margin = least_difference(fitted, search.rules)
     alternatives = []
-    for place in np.argsort(rise):
-        if not (seen[place] and rise[place] <= margin):
+    for place in np.argsort(delta_chi2):
+        if not (seen[place] and delta_chi2[place] <= margin):
             continue
         share = score[place] / size[place]
         step = inverse @ (matrix[kept] @ done - share * matrix[kept, count + place])
@@ -155,7 +155,7 @@ def _alternatives(
                 float(share * unit * wording.factor),
                 float(np.sqrt(inflation / size[place]) * unit * wording.factor),
                 wording.unit,
-                float(rise[place]),
+                float(delta_chi2[place]),
                 float(trace[place] / np.sqrt(size[place])),
                 _in_place(fitted, effects, kept, traces.units[kept] * step, law),
             )

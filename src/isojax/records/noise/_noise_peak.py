@@ -168,7 +168,7 @@ def _line_bases(
         orders = min(MOST_HARMONICS, int(_HIGHEST_LINE * highest / frequency), max(1, size // 8))
         basis = harmonic_basis(time, frequency, orders)
         design = np.concatenate([basis, (time / time[-1])[:, None] * basis[:, :3]], axis=1)
-    known = design @ np.linalg.inv(np.linalg.cholesky(design.T @ design)).T
+    known, _ = np.linalg.qr(design)  # a short window may not separate all harmonics
     phase = 2.0 * np.pi * np.outer(time, lines)
     columns = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
     columns -= known @ (known.T @ columns)

@@ -36,7 +36,7 @@ def _sentence(alternatives: Alternatives) -> str:
 
 
 def _law(law: AlternativeLaw) -> str:
-    return f"{typeset_formula(law.formula)} ({law.rise:+.0f})".replace("-", "−")
+    return f"{typeset_formula(law.formula)} ({law.delta_chi2:+.0f})".replace("-", "−")
 
 
 def alternatives_list(loop: Loop) -> list[dict[str, Any]]:
@@ -58,7 +58,7 @@ def alternatives_list(loop: Loop) -> list[dict[str, Any]]:
                     "coefficient": finite_or_none(law.coefficient),
                     "standard_error": finite_or_none(law.error),
                     "unit": law.unit,
-                    "delta_chi2": finite_or_none(law.rise),
+                    "delta_chi2": finite_or_none(law.delta_chi2),
                     "likeness": finite_or_none(law.likeness),
                 }
                 for law in one.laws

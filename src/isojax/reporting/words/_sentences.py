@@ -4,6 +4,7 @@ import math
 
 from ..._parameters import Parameter, list_parameters
 from ..._quantities import (
+    typeset_formula,
     typeset_goodness,
     typeset_number,
     typeset_p_value,
@@ -14,6 +15,7 @@ from ..._quantities import (
 from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE
 from ...identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
+from ...identification.diagnosis import is_good
 from ...records import DataHealth
 
 
@@ -86,7 +88,7 @@ _DOUBTS = {
     "not down to noise": (
         "The model does not explain the held-out records down to their noise: another law may act there."
     ),
-    "another law": "A force law outside the catalogue explains the records clearly better in its place.",
+    "another law": "",  # the verdict itself says it
 }
 
 
@@ -116,6 +118,18 @@ def _verdict_words(loop: Loop) -> str:
         return (
             f"{_capital(effects)}, explain the records together, but so many effects can imitate a single "
             f"law outside the catalogue; {error} (noise alone: 1)."
+        )
+    better = next((one.better for one in loop.alternatives if one.better is not None), None)
+    if (
+        loop.verdict == "partly_explained"
+        and found
+        and better is not None
+        and is_good(loop.after, loop.rules)
+    ):
+        return (
+            "Something is missing, but its law is not identified: "
+            f"a force c {typeset_formula(better.formula)} explains the records clearly better than "
+            f"{effects}; {error}."
         )
     if loop.verdict == "partly_explained" and found:
         return (

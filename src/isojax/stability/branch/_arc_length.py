@@ -7,6 +7,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from ..orbit import value_and_jacobian
+
 _TOLERANCE = 1e-8
 """Largest step of Newton's method after which a point counts as found, in scaled unknowns: at a kink of the
 law Newton may stall below it."""
@@ -176,7 +178,7 @@ def follow(
         )
 
     def improve(walk: _Walk) -> _Walk:
-        slope, value = jax.jacfwd(lambda here: (equations(here),) * 2, has_aux=True)(walk.here)
+        value, slope = value_and_jacobian(equations, walk.here)
         across = jnp.dot(walk.row, walk.here - walk.predicted)
         change = jnp.linalg.solve(
             jnp.concatenate([slope, walk.row[None]]), jnp.concatenate([value, across[None]])

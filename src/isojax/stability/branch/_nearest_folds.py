@@ -14,7 +14,16 @@ from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
 from ...models import Integrator, Isolator
-from ..orbit import is_odd, modulus, multipliers, period_map, recorded_sine, state_scale, trajectory
+from ..orbit import (
+    is_odd,
+    modulus,
+    multipliers,
+    period_map,
+    recorded_sine,
+    state_scale,
+    trajectory,
+    value_and_jacobian,
+)
 from ._arc_length import REACHED_BOUND, Departure, Followed, Stride, follow
 from ._continuation import tracing_steps
 
@@ -199,7 +208,7 @@ def _orbits(
 
         def newton(_: Array | int, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
             scaled = carry[0]
-            slope, moved = jax.jacfwd(lambda at: (image(at),) * 2, has_aux=True)(scaled)
+            moved, slope = value_and_jacobian(image, scaled)
             change = jnp.linalg.solve(jnp.eye(scaled.size) - slope, moved - scaled)
             size = jnp.max(jnp.abs(change))
             # Far off, a full step may leave the basin of the orbit that the start is near to.

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._results import RESULTS, is_successful
-from ..orbit import ShootingMethod, is_odd, multipliers, period_map
+from ..orbit import ShootingMethod, is_odd, multipliers, period_map, value_and_jacobian
 from ._branch import SpecialPoint
 from ._extended_system import MOST_PLACES, BifurcationKind, PointGuess, first_places, polish_jitted
 from ._parameter_family import ParameterFamily
@@ -62,13 +62,7 @@ def _slopes(
     family: ParameterFamily, method: ShootingMethod, scale: Array, here: Array
 ) -> tuple[Array, Array]:
     """Give the residual at a point and its derivative by state and share."""
-
-    def open_end(u: Array) -> tuple[Array, Array]:
-        value = family.open_end(method, scale, u)
-        return value, value
-
-    slope, value = jax.jacfwd(open_end, has_aux=True)(here)
-    return value, slope
+    return value_and_jacobian(lambda u: family.open_end(method, scale, u), here)
 
 
 @eqx.filter_jit

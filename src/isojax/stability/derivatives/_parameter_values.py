@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters, replace_parameters
 from ..._types import Lanes
 from ...models import Isolator
+from ..orbit import value_and_jacobian
 
 DRIVE = ("drive.amplitude", "drive.frequency")
 """Names of the drive's numbers beside those of the model."""
@@ -63,10 +63,5 @@ def differentiate(
     Returns:
         The quantities; their derivatives, parameter first.
     """
-
-    def twice(numbers: Array) -> tuple[dict[str, Array], dict[str, Array]]:
-        given = dict(quantities(numbers))
-        return given, given
-
-    slopes, values = jax.jacfwd(twice, has_aux=True)(at)
+    values, slopes = value_and_jacobian(lambda numbers: dict(quantities(numbers)), at)
     return values, {name: jnp.moveaxis(slope, -1, 0) for name, slope in slopes.items()}

@@ -9,6 +9,7 @@ import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
 from ...models import Isolator
+from ._jacobian import value_and_jacobian
 from ._kink_crossings import find_crossings
 from ._period_map import period_map, trajectory
 from ._shooting_method import ShootingMethod
@@ -73,11 +74,7 @@ class _Equations(NamedTuple):
         def body(unknown: Array, trial: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
             count, wanted = trial
 
-            def twice(unknown: Array) -> tuple[Array, Array]:
-                left = self.gap(unknown, (model, drive, count))
-                return left, left
-
-            jacobian, left = jax.jacfwd(twice, has_aux=True)(unknown)
+            left, jacobian = value_and_jacobian(lambda at: self.gap(at, (model, drive, count)), unknown)
             upper, lower = jacobian[:states], jacobian[states:]
             own = upper[:, :states] + jnp.eye(states)
             bent = upper[:, states:] @ jnp.linalg.solve(lower[:, states:], lower[:, :states])
