@@ -1,6 +1,6 @@
 """Coefficients, error bars and errors of a model, straight from time histories.
 
-In: a start model and a campaign. Out: a `Fit`; `uncertainty`, `residual` and `drift_budget` describe it.
+In: a start model and a campaign. Out: a `Fit`; `residual` and `drift_budget` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
 What follows the search is in `_evaluation`, `_errors`, `_covariance` and `_fit_result`.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from isojax.identification import uncertainty
+from isojax.identification.fitting import invert_information
 
 
 def _line(count=50):
@@ -13,7 +13,7 @@ def _line(count=50):
 
 def test_covariance_of_a_straight_line_is_the_closed_form():
     x, columns = _line()
-    found = uncertainty(columns.T @ columns)
+    found = invert_information(columns.T @ columns)
     spread = np.sum((x - x.mean()) ** 2)
     slope, height = 0.2**2 / spread, 0.2**2 * (1.0 / x.size + x.mean() ** 2 / spread)
     np.testing.assert_allclose(np.diag(found.covariance), [height, slope], rtol=1e-9)
@@ -26,7 +26,7 @@ def test_covariance_of_a_straight_line_is_the_closed_form():
 
 def test_misfit_inflates_the_covariance():
     _, columns = _line()
-    plain, inflated = (uncertainty(columns.T @ columns, factor) for factor in (1.0, 2.5))
+    plain, inflated = (invert_information(columns.T @ columns, factor) for factor in (1.0, 2.5))
     np.testing.assert_allclose(inflated.covariance, 2.5 * plain.covariance)
 
 
@@ -34,7 +34,7 @@ def test_a_degenerate_pair_is_flagged_with_its_partners_and_the_rest_is_kept():
     rng = np.random.default_rng(2)
     free = rng.standard_normal((200, 3))
     columns = np.stack([free[:, 0], free[:, 1], 1e9 * free[:, 1], free[:, 2]], axis=1)
-    found = uncertainty(columns.T @ columns)
+    found = invert_information(columns.T @ columns)
     assert found.determined.tolist() == [True, False, False, True]
     assert found.partners == ((1, 2),)
     assert np.isnan(found.standard_error[[1, 2]]).all()
@@ -45,13 +45,13 @@ def test_a_degenerate_pair_is_flagged_with_its_partners_and_the_rest_is_kept():
 def test_a_coefficient_without_a_trace_is_not_determined():
     rng = np.random.default_rng(2)
     columns = rng.standard_normal((50, 2)) * np.array([1.0, 0.0])
-    found = uncertainty(columns.T @ columns)
+    found = invert_information(columns.T @ columns)
     assert found.determined.tolist() == [True, False]
     assert np.isfinite(found.standard_error[0])
     assert np.isnan(found.standard_error[1])
 
 
 def test_nothing_is_known_where_the_information_is_not_finite():
-    found = uncertainty(np.array([[1.0, np.nan], [np.nan, 1.0]]))
+    found = invert_information(np.array([[1.0, np.nan], [np.nan, 1.0]]))
     assert not found.determined.any()
     assert np.isnan(found.covariance).all()
