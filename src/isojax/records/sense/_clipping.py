@@ -26,6 +26,13 @@ _COMMON = 0.03
 _FEWEST_AT_TOP = 6.0
 """Samples of a half cycle, at least, that show a shape."""
 
+_REPEATED = 3
+"""Equal samples, one after the other, that no smooth top has unless its steps are coarse ..."""
+
+_COARSE = 4.0
+"""... which it then leaves by at most so many steps: a parabola falls as the square of the distance, and the
+next sample is at most twice as far away as the last equal one."""
+
 
 def find_clipping(campaign: Campaign) -> list[Suspicion]:
     """Gives the channels that look clipped: many half cycles end flat at one level, whatever drives them.
@@ -40,20 +47,59 @@ def find_clipping(campaign: Campaign) -> list[Suspicion]:
     for section, column in (("input", campaign.input.column), ("output", campaign.output.column)):
         driven = [record for record in campaign.records if section == "output" or record.kind != "free_decay"]
         signals = [record.raw_input if section == "input" else record.raw_output for record in driven]
-        ends = [(sign, _flat_tops([sign * signal for signal in signals])) for sign in (1.0, -1.0)]
-        flat = [(sign * one[0], *one[1:]) for sign, one in ends if one is not None]
-        if not flat:
+        figure, expected = _repeated_figure(signals), "one largest sample"
+        if figure is None:
+            figure, expected = _flat_figure(signals), "43 %, as of a sine"
+        if figure is None:
             continue
-        levels = " and ".join(f"{level:.3g}" for level, _, _ in flat)
-        figure = (
-            f"{sum(count for _, count, _ in flat)} half cycles end flat at {levels} in SI about the mean: "
-            f"of the time above half of it they spend {100.0 * max(share for *_, share in flat):.0f} % in "
-            "the last tenth"
-        )
         line = '[model] elements = ["clipping"]' if section == "output" else "measure again, with more range"
         cause = Cause("flat tops", f"the {section} left the range of its channel", line)
-        found.append(Suspicion("flat tops", f'"{column}"', figure, "43 %, as of a sine", (cause,), False))
+        found.append(Suspicion("flat tops", f'"{column}"', figure, expected, (cause,), False))
     return found
+
+
+def _repeated_figure(signals: list[Float[np.ndarray, " _"]]) -> str | None:
+    """Gives what is seen of a converter at the end of its range: it repeats one number, digit for digit."""
+    ends = [(sign, _repeated_tops([sign * signal for signal in signals])) for sign in (1.0, -1.0)]
+    cut = [(sign * level, count) for sign, (level, count) in ends if count >= _FEWEST_TOPS]
+    if not cut:
+        return None
+    levels = " and ".join(f"{level:.3g}" for level, _ in cut)
+    return (
+        f"{sum(count for _, count in cut)} half cycles end in {_REPEATED} or more equal samples, at {levels} "
+        "in SI about the mean"
+    )
+
+
+def _repeated_tops(signals: list[Float[np.ndarray, " _"]]) -> tuple[float, int]:
+    """Gives the highest level at which tops are equal samples, and how many tops are."""
+    highest, count = -np.inf, 0
+    for signal in signals:
+        level = float(np.max(signal))
+        at = np.flatnonzero(signal == level)
+        runs = [run for run in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if run.size >= _REPEATED]
+        inner = [run for run in runs if run[0] > 0 and run[-1] + 1 < signal.size]
+        if not inner:
+            continue
+        step = float(np.min(np.diff(np.unique(signal)), initial=np.inf))
+        falls = [level - max(signal[run[0] - 1], signal[run[-1] + 1]) for run in inner]
+        if np.median(falls) > _COARSE * step:
+            highest, count = max(highest, level - float(np.mean(signal))), count + len(inner)
+    return highest, count
+
+
+def _flat_figure(signals: list[Float[np.ndarray, " _"]]) -> str | None:
+    """Gives what is seen of an amplifier or a filter at the end of its range: tops are flat."""
+    ends = [(sign, _flat_tops([sign * signal for signal in signals])) for sign in (1.0, -1.0)]
+    flat = [(sign * one[0], *one[1:]) for sign, one in ends if one is not None]
+    if not flat:
+        return None
+    levels = " and ".join(f"{level:.3g}" for level, _, _ in flat)
+    return (
+        f"{sum(count for _, count, _ in flat)} half cycles end flat at {levels} in SI about the mean: "
+        f"of the time above half of it they spend {100.0 * max(share for *_, share in flat):.0f} % in "
+        "the last tenth"
+    )
 
 
 def _flat_tops(signals: list[Float[np.ndarray, " _"]]) -> tuple[float, int, float] | None:
