@@ -69,12 +69,15 @@ def test_elsewhere_a_long_stage_shows_a_sign_of_life_and_still_leaves_one_line(s
 
 
 def test_a_long_stage_that_raises_ends_its_line():
-    file = io.StringIO()
-    with pytest.raises(ValueError, match="bad"), stage_lines(Console(file=file), silence=0.02) as progress:
+    def fail(progress):
         progress(Stage("fit"))
         while not file.getvalue():
             time.sleep(0.01)
         raise ValueError("bad")
+
+    file = io.StringIO()
+    with pytest.raises(ValueError, match="bad"), stage_lines(Console(file=file), silence=0.02) as progress:
+        fail(progress)
     assert re.fullmatch(r"\[1/1\] fit \.+\n", file.getvalue())
 
 

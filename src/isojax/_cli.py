@@ -204,7 +204,7 @@ def _read(campaign: str | Path, progress: Callable[[str], None]) -> "Campaign":
     from ._read_campaign import read_campaign
 
     measured = read_campaign(campaign)
-    progress(KeyFigure(f"{len(measured.records)} records read"))
+    progress(KeyFigure(f"{len(measured.records)} records read, {measured.timing}"))
     return measured
 
 

@@ -12,7 +12,6 @@ from rich.text import Text
 
 from ._progress import Counted, KeyFigure, Notice, Resumed, Stage
 
-
 _SILENCE = 4.0
 """Seconds without a word after which there is a sign of life: less than the five that a user waits."""
 
@@ -110,7 +109,7 @@ class _Left(ProgressColumn):
 
 
 class Beat:
-    """Lines where nothing can be redrawn: after a silence one begins, and grows by a dot as long as it lasts."""
+    """Lines where nothing can be redrawn: after a silence one begins, and grows by a dot while it lasts."""
 
     def __init__(self, console: Console, silence: float):
         """Begin to wait.

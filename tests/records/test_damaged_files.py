@@ -164,13 +164,15 @@ def test_other_bytes_give_an_error_that_names_the_file(ending: str, content: byt
     check_error(file)
 
 
-def test_samples_count_as_the_float64_that_they_become(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_samples_count_as_the_float64_that_they_become(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "run.mat"
     small = {f"a{i}": np.arange(20000, dtype=np.uint8) for i in range(4)}  # 80 kB, 640 kB as float64
     scipy.io.savemat(file, {"run": small}, do_compression=True)
     assert len(read(file)) == 4
     monkeypatch.setattr("isojax.records.formats._bounds.MOST_BYTES", 500_000)
-    with pytest.raises(ValueError, match=r"run\.mat holds 0\.00064 GB of samples, unpacked; expected at most"):
+    with pytest.raises(ValueError, match=r"run\.mat holds 0\.00064 GB of samples, unpacked; expected"):
         read(file)
 
 
@@ -203,5 +205,5 @@ def test_cells_without_places_are_counted(tmp_path: Path, monkeypatch: pytest.Mo
         for name, content in parts.items():
             archive.writestr(name, re.sub(rb"<(c|row) r=\"\w+\"", rb"<\1", content))
     monkeypatch.setattr("isojax.records.formats._sheet_bounds.MOST_CELLS", 150)
-    with pytest.raises(ValueError, match=r"run\.xlsx: its sheet .*sheet1\.xml has 183 cells; expected at most 150"):
+    with pytest.raises(ValueError, match=r"run\.xlsx: its sheet .*sheet1\.xml has 183 cells; expected"):
         read(file)

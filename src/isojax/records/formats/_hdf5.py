@@ -44,7 +44,9 @@ def read_hdf5_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
             raise unreadable(file, "HDF5", error) from error
 
 
-def _leaves(file: Path, path: str, node: Any, above: tuple[Any, ...], visited: Iterator[int]) -> Iterator[Leaf]:
+def _leaves(
+    file: Path, path: str, node: Any, above: tuple[Any, ...], visited: Iterator[int]
+) -> Iterator[Leaf]:
     """Gives the leaves under a node.
 
     Args:

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._campaign import Campaign
+from ..noise import clipped_share
 from ._suspicion import Cause, Suspicion
 
 _TOP = 0.9
@@ -26,13 +27,6 @@ _COMMON = 0.03
 _FEWEST_AT_TOP = 6.0
 """Samples of a half cycle, at least, that show a shape."""
 
-_REPEATED = 3
-"""Equal samples, one after the other, that no smooth top has unless its steps are coarse ..."""
-
-_COARSE = 4.0
-"""... which it then leaves by at most so many steps: a parabola falls as the square of the distance, and the
-next sample is at most twice as far away as the last equal one."""
-
 
 def find_clipping(campaign: Campaign) -> list[Suspicion]:
     """Gives the channels that look clipped: many half cycles end flat at one level, whatever drives them.
@@ -47,7 +41,7 @@ def find_clipping(campaign: Campaign) -> list[Suspicion]:
     for section, column in (("input", campaign.input.column), ("output", campaign.output.column)):
         driven = [record for record in campaign.records if section == "output" or record.kind != "free_decay"]
         signals = [record.raw_input if section == "input" else record.raw_output for record in driven]
-        figure, expected = _repeated_figure(signals), "one largest sample"
+        figure, expected = _end_figure(signals), "a few, as of a sine"
         if figure is None:
             figure, expected = _flat_figure(signals), "43 %, as of a sine"
         if figure is None:
@@ -58,34 +52,17 @@ def find_clipping(campaign: Campaign) -> list[Suspicion]:
     return found
 
 
-def _repeated_figure(signals: list[Float[np.ndarray, " _"]]) -> str | None:
+def _end_figure(signals: list[Float[np.ndarray, " _"]]) -> str | None:
     """Gives what is seen of a converter at the end of its range: it repeats one number, digit for digit."""
-    ends = [(sign, _repeated_tops([sign * signal for signal in signals])) for sign in (1.0, -1.0)]
-    cut = [(sign * level, count) for sign, (level, count) in ends if count >= _FEWEST_TOPS]
-    if not cut:
+    counts = [round(clipped_share(signal) * signal.size) for signal in signals]
+    clipped = [signal for signal, count in zip(signals, counts, strict=True) if count]
+    if not clipped:
         return None
-    levels = " and ".join(f"{level:.3g}" for level, _ in cut)
+    reach = max(float(np.max(np.abs(signal - np.mean(signal)))) for signal in clipped)
     return (
-        f"{sum(count for _, count in cut)} half cycles end in {_REPEATED} or more equal samples, at {levels} "
-        "in SI about the mean"
+        f"{sum(counts)} samples stand exactly at an end of the range, {reach:.3g} in SI from the mean, in "
+        f"{len(clipped)} of {len(counts)} records"
     )
-
-
-def _repeated_tops(signals: list[Float[np.ndarray, " _"]]) -> tuple[float, int]:
-    """Gives the highest level at which tops are equal samples, and how many tops are."""
-    highest, count = -np.inf, 0
-    for signal in signals:
-        level = float(np.max(signal))
-        at = np.flatnonzero(signal == level)
-        runs = [run for run in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1) if run.size >= _REPEATED]
-        inner = [run for run in runs if run[0] > 0 and run[-1] + 1 < signal.size]
-        if not inner:
-            continue
-        step = float(np.min(np.diff(np.unique(signal)), initial=np.inf))
-        falls = [level - max(signal[run[0] - 1], signal[run[-1] + 1]) for run in inner]
-        if np.median(falls) > _COARSE * step:
-            highest, count = max(highest, level - float(np.mean(signal))), count + len(inner)
-    return highest, count
 
 
 def _flat_figure(signals: list[Float[np.ndarray, " _"]]) -> str | None:
