@@ -116,7 +116,7 @@ def _inspect(asked: argparse.Namespace) -> int:
         for file in found:
             progress(Counted(str(file), len(files) / len(found)))
             files.append(inspect_file(file, asked.rate))
-        progress(KeyFigure(f"{len(files)} files read"))
+        progress(KeyFigure("1 file read" if len(files) == 1 else f"{len(files)} files read"))
 
     from . import plot
     from ._read_campaign import read_campaign
