@@ -1,5 +1,6 @@
 """The command line, in this process; the demo from end to end."""
 
+import html
 import json
 import os
 import re
@@ -95,7 +96,7 @@ def test_inspect_lists_drafts_and_draws_and_the_draft_is_a_campaign(tmp_path, ca
 )
 def test_inspect_refuses_what_it_cannot_use_in_one_line(options, message, tmp_path, capsys):
     data = next(campaign_folder().glob("*.npz"))
-    assert main(["inspect", str(data), *(one.format(tmp_path) for one in options)]) == 2
+    assert main(["inspect", "--quiet", str(data), *(one.format(tmp_path) for one in options)]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert len(error.splitlines()) == 1
@@ -125,8 +126,9 @@ def test_fit_shows_a_line_a_stage_and_verbose_its_steps_as_well(tmp_path, capsys
     campaign = cut_demo(tmp_path / "campaign", dwells=2)
     for option, stages_only in ((), True), (("--verbose",), False):
         assert main(["fit", str(campaign), *option]) in (0, 1)
-        shown = capsys.readouterr().err.splitlines()
-        names = [line.split(" s  ")[1].split(":")[0] for line in shown]
+        # A slow stage has dots in its line, and a slow step a line of dots.
+        shown = [line for line in capsys.readouterr().err.splitlines() if set(line) != {"."}]
+        names = [re.split(r" \.|:| \(", line.split(" s  ")[-1])[0] for line in shown]
         stages = ("reading of the campaign", "classical guess", "fit of the declared model")
         assert {f"[{place}/3] {stage}" for place, stage in enumerate(stages, 1)} <= set(names)
         assert ("step 1" not in names) == stages_only
@@ -329,6 +331,38 @@ def test_an_interrupted_loop_keeps_what_it_did_and_resumes_with_the_same_result(
     assert float(loaded.model["mass"]) == 800.0
     names = sorted(entry.name for entry in out.iterdir())
     assert names == [".isojax", "fit.txt", "mine.txt", "model.json"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["fit", "close-loop"])
+def test_what_contradicts_is_fitted_anyway_and_the_doubt_stands_first(
+    command, calm_loop, tmp_path, capsys, monkeypatch
+):
+    kinds = ("lead", "error", "evidence", "remainder", "record", "force", "health")
+    without = {f"{kind}_pictures": () for kind in kinds}
+    monkeypatch.setattr("isojax.reporting.page._page.draw_pictures", lambda *_: without)
+    campaign, out = cut_demo(tmp_path / "campaign", dwells=4), tmp_path / "out"
+    file = campaign / "campaign.toml"
+    heavier = file.read_text(encoding="utf-8").replace("mass = 800.0", "mass = 1600.0")
+    file.write_text(heavier, encoding="utf-8")
+    words = [command, str(campaign), "--out", str(out), "--quiet"]
+    assert main(words) == 2
+    assert "--anyway" in capsys.readouterr().err
+    assert not out.exists()
+
+    assert main([*words, "--anyway"]) in (0, 1)
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    doubt = 'Check first: "force" and "acceleration": the apparent mass, force over acceleration'
+    assert " ".join(shown.out.split()).startswith(doubt)
+    if command == "fit":
+        assert (out / "fit.txt").read_text(encoding="utf-8").startswith(doubt)
+    else:
+        result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+        assert [(one["check"], one["contradicts"]) for one in result["check_first"]] == [("inertia", True)]
+        assert result["before"]["parameters"]["mass"]["value"] == 1600.0
+        page = html.unescape((out / "report.html").read_text(encoding="utf-8"))
+        assert page.index(doubt) < page.index("Verdict: unexplained")
 
 
 def test_inspect_prints_json_alone(capsys):

@@ -165,4 +165,4 @@ def test_ctrl_c_ends_a_run_whose_threads_cannot_be_stopped():
         run.kill()
     assert time.perf_counter() - begin < 20.0
     assert run.returncode == _interrupt.INTERRUPTED
-    assert said == "isojax: interrupted; nothing is written\n"
+    assert said == "\nisojax: interrupted; nothing is written\n"

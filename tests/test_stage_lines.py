@@ -2,6 +2,7 @@
 
 import io
 import re
+import time
 
 import pytest
 from rich.console import Console
@@ -26,12 +27,58 @@ def shown(terminal=False, steps=False, lines=LINES):
     with stage_lines(console, steps=steps) as progress:
         for line in lines:
             progress(line)
-    return re.sub(r" +\d+\.\d s", "0.0 s", file.getvalue())
+    return re.sub(r" *\d+\.\d s", "0.0 s", file.getvalue())
 
 
 def test_each_stage_leaves_one_line_with_its_key_figure():
-    expected = ["0.0 s  [1/3] classical guess", "0.0 s  [2/3] fit: chi2/dof 1.02", "0.0 s  [3/3] report"]
+    expected = ["[1/3] classical guess (0.0 s)", "[2/3] fit: chi2/dof 1.02 (0.0 s)", "[3/3] report (0.0 s)"]
     assert shown().splitlines() == expected
+
+
+class Watched(io.StringIO):
+    """A file that notes when something is written to it."""
+
+    def __init__(self):
+        super().__init__()
+        self.times = [time.perf_counter()]
+
+    def write(self, text):
+        self.times.append(time.perf_counter())
+        return super().write(text)
+
+
+@pytest.mark.parametrize("steps", [False, True])
+def test_elsewhere_a_long_stage_shows_a_sign_of_life_and_still_leaves_one_line(steps):
+    file = Watched()
+    with stage_lines(Console(file=file, width=40), steps=steps, silence=0.1) as progress:
+        for line in (Stage("guess"), KeyFigure("done"), Stage("fit"), KeyFigure("chi2/dof 1.02")):
+            progress(line)
+            if line == "fit":
+                time.sleep(0.75)
+                assert "fit" in file.getvalue()
+    silences = [later - earlier for earlier, later in zip(file.times, file.times[1:], strict=False)]
+    assert max(silences) < 0.7
+    said = re.sub(r" *\d+\.\d s", "0.0 s", file.getvalue()).splitlines()
+    if steps:
+        assert [line for line in said if set(line) != {"."}] == [
+            f"0.0 s  {line}" for line in ("[1/1] guess", "done", "[2/2] fit", "chi2/dof 1.02")
+        ]
+    else:
+        assert re.sub(r"\.{3,}", "...", said[1]) == "[2/2] fit ...: chi2/dof 1.02 (0.0 s)"
+        assert said == ["[1/1] guess: done (0.0 s)", said[1]]
+
+
+def test_a_long_stage_that_raises_ends_its_line():
+    def fail(progress):
+        progress(Stage("fit"))
+        while not file.getvalue():
+            time.sleep(0.01)
+        raise ValueError("bad")
+
+    file = io.StringIO()
+    with pytest.raises(ValueError, match="bad"), stage_lines(Console(file=file), silence=0.02) as progress:
+        fail(progress)
+    assert re.fullmatch(r"\[1/1\] fit \.+\n", file.getvalue())
 
 
 def test_verbose_shows_every_line():
@@ -111,7 +158,7 @@ def test_a_resumed_run_says_so_once():
     lines = (Stage("fit", 1.0), "step 1", Resumed("3 finished computations were kept"), "step 2")
     assert shown(lines=lines).splitlines() == [
         "0.0 s  3 finished computations were kept",
-        "0.0 s  [1/1] fit",
+        "[1/1] fit (0.0 s)",
     ]
 
 

@@ -56,6 +56,7 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         "--draft", metavar="PATH", help="write a campaign.toml there, each guess of it marked `# guessed`"
     )
     _json(seen, "what is in the files")
+    _shown(seen)
     seen.set_defaults(run=commands["inspect"])
 
     loop = known.add_parser("close-loop", help="fit, name what is missing, add it, report")

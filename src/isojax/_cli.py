@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from ._arguments import MAP_STEPS, command_line
 from ._interrupt import INTERRUPTED, prompt_interrupt
 from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
-from ._progress import LOOP_SHARES, KeyFigure, Notice, Stage, before, silent, watched
+from ._progress import LOOP_SHARES, Counted, KeyFigure, Notice, Stage, before, silent, watched
 
 if TYPE_CHECKING:
     import numpy as np
@@ -110,7 +110,13 @@ def _inspect(asked: argparse.Namespace) -> int:
     if asked.draft is not None and Path(asked.draft).exists():
         raise ValueError(f"--draft {asked.draft} exists already; it is not overwritten.")
     found, schedules = find_data_files(asked.files)
-    files = [inspect_file(file, asked.rate) for file in found]
+    files = []
+    with _progress(asked) as progress:
+        progress(Stage("inspection"))
+        for file in found:
+            progress(Counted(str(file), len(files) / len(found)))
+            files.append(inspect_file(file, asked.rate))
+        progress(KeyFigure("1 file read" if len(files) == 1 else f"{len(files)} files read"))
 
     from . import plot
     from ._read_campaign import read_campaign
@@ -198,7 +204,7 @@ def _read(campaign: str | Path, progress: Callable[[str], None]) -> "Campaign":
     from ._read_campaign import read_campaign
 
     measured = read_campaign(campaign)
-    progress(KeyFigure(f"{len(measured.records)} records read"))
+    progress(KeyFigure(f"{len(measured.records)} records read, {measured.timing}"))
     return measured
 
 

@@ -17,6 +17,9 @@ _PATIENCE = 2.0
 _CURSOR = "\r\x1b[2K\x1b[?25h"
 """Clears the live line of a terminal and shows its cursor again."""
 
+_NEW_LINE = "\n"
+"""Ends the line of the stage, which elsewhere is begun but not over."""
+
 
 @contextmanager
 def prompt_interrupt(words: Callable[[], str]) -> Iterator[None]:
@@ -39,7 +42,7 @@ def prompt_interrupt(words: Callable[[], str]) -> Iterator[None]:
         while (told := heard.recv(1)) and told[0] != signal.SIGINT:
             pass
         if told and not over.wait(_PATIENCE):
-            start = _CURSOR if sys.stderr.isatty() else ""
+            start = _CURSOR if sys.stderr.isatty() else _NEW_LINE
             os.write(2, f"{start}isojax: {words()}\n".encode())
             os._exit(INTERRUPTED)
 

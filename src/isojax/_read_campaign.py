@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .records import Campaign, read_declaration, read_measurements
+from .records import Campaign, Declaration, read_declaration, read_measurements
 
 
 def read_campaign(
@@ -54,18 +54,47 @@ def read_campaign(
         ('kN', 200.0)
     """
     declared = read_declaration(source, data)
+    # The catalogue starts JAX, which a bad data file need not wait for: names of its files pass until then.
+    model = declared.sections["model"]
+    names = _declared_names(model["stiffness"], model["damping"], model["elements"])
+    if not all(_has_file(found, suffix) for _, found, suffix in names):
+        _check_names(declared)
+    measured = read_measurements(declared)
+    _check_names(declared)
+    return measured
 
-    from .elements import CATALOGUE  # starts JAX, which a declaration that is wrong need not wait for
+
+def _declared_names(
+    stiffness: Sequence[str], damping: Sequence[str], elements: Sequence[str]
+) -> list[tuple[str, str, str]]:
+    """Give the field of each declared name, the name, and the ending that it may lack."""
+    return [
+        (field, found, suffix)
+        for field, names, suffix in (
+            ("model.stiffness", stiffness, "_stiffness"),
+            ("model.damping", damping, "_damping"),
+            ("model.elements", elements, ""),
+        )
+        for found in names
+    ]
+
+
+def _has_file(found: str, suffix: str) -> bool:
+    """Whether a file of the catalogue is named after an effect."""
+    folder = Path(__file__).with_name("elements")
+    return any((folder / f"_{name}.py").exists() for name in (found + suffix, found))
+
+
+def _check_names(declared: Declaration) -> None:
+    from .elements import CATALOGUE
 
     model = declared.sections["model"]
-    names = catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"])
-    for name in names:
+    for name in catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"]):
         if "floor" in CATALOGUE[name].channels and declared.sections["floor"] is None:
             raise ValueError(
                 f"{declared.file}: [model] names `{name}`, which follows the measured motion of the "
                 "floor, but section [floor], which says where that was measured, is missing"
             )
-    return read_measurements(declared)
 
 
 def _catalogue_name(file: Path, field: str, found: str, suffix: str) -> str:
@@ -101,10 +130,5 @@ def catalogue_names(
     """
     return tuple(
         _catalogue_name(file, field, found, suffix)
-        for field, names, suffix in (
-            ("model.stiffness", stiffness, "_stiffness"),
-            ("model.damping", damping, "_damping"),
-            ("model.elements", elements, ""),
-        )
-        for found in names
+        for field, found, suffix in _declared_names(stiffness, damping, elements)
     )

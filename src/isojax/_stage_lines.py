@@ -1,5 +1,6 @@
 """Stages of a long task on the terminal: one line each, live while the stage runs."""
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,9 @@ from rich.table import Column
 from rich.text import Text
 
 from ._progress import Counted, KeyFigure, Notice, Resumed, Stage
+
+_SILENCE = 4.0
+"""Seconds without a word after which there is a sign of life: less than the five that a user waits."""
 
 
 def _seconds(elapsed: float) -> str:
@@ -104,17 +108,83 @@ class _Left(ProgressColumn):
         return Text(self._pace.words, style="dim")
 
 
+class Beat:
+    """Lines where nothing can be redrawn: after a silence one begins, and grows by a dot while it lasts."""
+
+    def __init__(self, console: Console, silence: float):
+        """Begin to wait.
+
+        Args:
+            console: where to show them.
+            silence: seconds after which there is a sign of life.
+        """
+        self._console, self._silence = console, silence
+        self._lock, self._heard = threading.Lock(), threading.Event()
+        self._over = self._begun = False
+        self._words = ""
+        self._thread = threading.Thread(target=self._wait, daemon=True)
+        self._thread.start()
+
+    def begin_with(self, words: str) -> None:
+        """Give the words with which a line begins after a silence."""
+        with self._lock:
+            self._words = words
+        self._heard.set()
+
+    def say(self, line: str) -> None:
+        """Write a line of its own."""
+        with self._lock:
+            self._end()
+            self._write(line, "\n")
+        self._heard.set()
+
+    def finish(self, words: str, rest: str) -> None:
+        """Write the words and the rest, only the rest where the line of these words is begun."""
+        with self._lock:
+            self._write(rest if self._begun else words + rest, "\n")
+            self._begun = False
+        self._heard.set()
+
+    def close(self) -> None:
+        """Stop, and end the line that is begun."""
+        self._over = True
+        self._heard.set()
+        self._thread.join()
+        self._end()
+
+    def _wait(self) -> None:
+        while not self._over:
+            if self._heard.wait(self._silence):
+                self._heard.clear()
+                continue
+            with self._lock:
+                self._write("." if self._begun else f"{self._words} .".lstrip(), "")
+                self._begun = True
+
+    def _end(self) -> None:
+        if self._begun:
+            self._write("", "\n")
+        self._begun = False
+
+    def _write(self, words: str, end: str) -> None:
+        self._console.print(Text(words, style="dim"), soft_wrap=True, end=end)
+
+
 @contextmanager
-def stage_lines(console: Console, steps: bool = False) -> Iterator[Callable[[str], None]]:
+def stage_lines(
+    console: Console, steps: bool = False, silence: float = _SILENCE
+) -> Iterator[Callable[[str], None]]:
     """Give what shows one line for each stage, with its seconds and its key figure once it is over.
 
     On a terminal the current stage has a live line, with the time that is left and its latest step. Elsewhere
-    a stage shows nothing before it is over. A stage that raises leaves no line.
+    its line begins after a silence, and grows by a dot after each further one. A stage that raises before
+    leaves no line.
 
     Args:
         console: where to show them.
         steps: whether every line of progress is left as it comes, with the seconds since the start, and not
             only one for each stage.
+        silence: seconds without a line after which there is a sign of life.
 
     Yields:
         A callable that takes a line of progress.
@@ -130,36 +200,50 @@ def stage_lines(console: Console, steps: bool = False) -> Iterator[Callable[[str
     )
     begin = opened = time.perf_counter()
     stage, figure = "", ""
+    beat = None if console.is_terminal else Beat(console, silence)
 
-    def leave(words: str, since: float) -> None:
-        line = f"{_seconds(time.perf_counter() - since)}  {words}"
-        console.print(Text(line, style="dim"), soft_wrap=True)
+    def leave(line: str) -> None:
+        if beat is None:
+            console.print(Text(line, style="dim"), soft_wrap=True)
+        else:
+            beat.say(line)
 
     def close() -> None:
-        if stage and not steps:
-            leave(f"{stage}: {figure}" if figure else stage, opened)
+        elapsed, rest = time.perf_counter() - opened, f": {figure}" if figure else ""
+        if not stage or steps:
+            return
+        if beat is None:
+            leave(f"{_seconds(elapsed)}  {stage}{rest}")
+        else:
+            beat.finish(stage, f"{rest} ({elapsed:.1f} s)")
 
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as live:
-        task = live.add_task("", step="")
+    try:
+        with Progress(*columns, console=console, transient=True, disable=beat is not None) as live:
+            task = live.add_task("", step="")
 
-        def show(line: str) -> None:
-            nonlocal stage, figure, opened
-            if isinstance(line, Stage):
-                close()
-                pace.open(line)
-                line = stage = f"{pace.place} {line}"
-                figure, opened = "", time.perf_counter()
-                live.reset(task, description=stage, step="")
-            elif isinstance(line, KeyFigure):
-                figure = line
-            else:
-                if isinstance(line, Resumed):
-                    pace.forget()
-                if isinstance(line, Counted):
-                    pace.count(line.done)
-                live.update(task, step=line, refresh=True)
-            if steps or isinstance(line, Notice):
-                leave(line, begin)
+            def show(line: str) -> None:
+                nonlocal stage, figure, opened
+                if isinstance(line, Stage):
+                    close()
+                    pace.open(line)
+                    line = stage = f"{pace.place} {line}"
+                    figure, opened = "", time.perf_counter()
+                    live.reset(task, description=stage, step="")
+                    if beat is not None and not steps:
+                        beat.begin_with(stage)
+                elif isinstance(line, KeyFigure):
+                    figure = line
+                else:
+                    if isinstance(line, Resumed):
+                        pace.forget()
+                    if isinstance(line, Counted):
+                        pace.count(line.done)
+                    live.update(task, step=line, refresh=True)
+                if steps or isinstance(line, Notice):
+                    leave(f"{_seconds(time.perf_counter() - begin)}  {line}")
 
-        yield show
-        close()
+            yield show
+            close()
+    finally:
+        if beat is not None:
+            beat.close()

@@ -162,3 +162,48 @@ def test_other_bytes_give_an_error_that_names_the_file(ending: str, content: byt
     file = tmp_path / f"run{ending}"
     file.write_bytes(content)
     check_error(file)
+
+
+def test_samples_count_as_the_float64_that_they_become(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "run.mat"
+    small = {f"a{i}": np.arange(20000, dtype=np.uint8) for i in range(4)}  # 80 kB, 640 kB as float64
+    scipy.io.savemat(file, {"run": small}, do_compression=True)
+    assert len(read(file)) == 4
+    monkeypatch.setattr("isojax.records.formats._bounds.MOST_BYTES", 500_000)
+    with pytest.raises(ValueError, match=r"run\.mat holds 0\.00064 GB of samples, unpacked; expected"):
+        read(file)
+
+
+@pytest.mark.parametrize("announced", [100, 2_200_000])
+def test_a_spreadsheet_is_unpacked_whatever_its_directory_announces(
+    announced: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "run.xlsx"
+    write_sheet(file)
+    with zipfile.ZipFile(file) as archive:
+        parts = {part.filename: archive.read(part) for part in archive.infolist()}
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in parts.items():
+            archive.writestr(name, content + b"\n" * (2_000_000 if "sheet1" in name else 0))
+    raw = bytearray(file.read_bytes())
+    entry = raw.rindex(b"xl/worksheets/sheet1.xml") - 46
+    raw[entry + 24 : entry + 28] = announced.to_bytes(4, "little")
+    file.write_bytes(raw)
+    monkeypatch.setattr("isojax.records.formats._sheet_bounds.MOST_TEXT", 1_000_000)
+    with pytest.raises(ValueError, match=r"run\.xlsx: its sheet .*sheet1\.xml has 0\.00\d+ GB, unpacked"):
+        read(file)
+
+
+def test_cells_without_places_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "run.xlsx"
+    write_sheet(file)
+    with zipfile.ZipFile(file) as archive:
+        parts = {part.filename: archive.read(part) for part in archive.infolist()}
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in parts.items():
+            archive.writestr(name, re.sub(rb"<(c|row) r=\"\w+\"", rb"<\1", content))
+    monkeypatch.setattr("isojax.records.formats._sheet_bounds.MOST_CELLS", 150)
+    with pytest.raises(ValueError, match=r"run\.xlsx: its sheet .*sheet1\.xml has 183 cells; expected"):
+        read(file)

@@ -11,9 +11,9 @@ from isojax import read_campaign
 from isojax.demo import campaign_folder
 from isojax.records import draft_campaign, find_data_files, find_period, inspect_file
 from isojax.records.inspection._arrangement import arrange
-from isojax.records.inspection._channel import clipped_share
 from isojax.records.inspection._guess import guess_quantity
 from isojax.records.inspection._inertia import guess_mass
+from isojax.records.noise import clipped_share
 from isojax.rig import Bench, LinearDamping, LinearStiffness, Multisine, Plant, SteppedSine, write_campaign
 
 RATE = 500.0
@@ -217,3 +217,19 @@ def test_the_steps_and_sweeps_of_simulated_campaigns_are_seen(tmp_path: Path) ->
         found = inspect_file(record.file, 400.0)
         assert (found.kind, found.direction) == ("stepped_sine", record.direction)
         assert len(found.dwells) == len(record.dwells) == 3
+
+
+@pytest.mark.parametrize("shape", ["tall", "wide"])
+def test_the_time_of_a_nameless_array_is_the_column_that_increases_evenly(tmp_path: Path, shape: str) -> None:
+    force = np.sin(2 * np.pi * 5.0 * TIME)
+    table = np.stack([force, 0.1 * force, np.round(TIME, 3)], axis=1)
+    np.savez(tmp_path / "run.npz", data=table if shape == "tall" else table.T)
+    found = inspect_file(tmp_path / "run.npz")
+    names = [f"data[:, {i}]" if shape == "tall" else f"data[{i}, :]" for i in range(3)]
+    assert (found.drive, found.response, found.time, found.rate) == (*names, RATE)
+    draft = draft_campaign([found], tmp_path)
+    assert f'time = "{names[2]}"      # guessed: it increases evenly' in draft
+    (tmp_path / "campaign.toml").write_text(draft, encoding="utf-8")
+    assert read_campaign(tmp_path).rate == RATE
+    np.savez(tmp_path / "run.npz", data=table[:, :2])
+    assert inspect_file(tmp_path / "run.npz").time is None

@@ -295,6 +295,27 @@ def test_clipped_tops_are_a_doubt(right, spoiled):
     assert "0.2" in doubt.figure
 
 
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_a_converter_at_the_end_of_its_range_is_a_doubt_and_coarse_steps_are_not(right, spoiled, bits):
+    """Tops that are cut by a quarter, and the same steps with range enough, at 20 samples a half cycle."""
+    folder = right("dwells", "acceleration")
+    most = max(float(np.max(np.abs(np.load(file)["acceleration"]))) for file in folder.glob("*.npz"))
+
+    def converted(reach: float) -> Spoil:
+        step = reach / 2 ** (bits - 1)
+
+        def convert(channels: Channels) -> Channels:
+            cut = np.clip(np.round(channels["acceleration"] / step) * step, -reach, reach - step)
+            return {**channels, "acceleration": cut}
+
+        return convert
+
+    assert find_suspicions(read_campaign(spoiled(folder, data=converted(1.01 * most)))) == ()
+    found = find_suspicions(read_campaign(spoiled(folder, data=converted(0.75 * most))))
+    assert [(one.check, one.contradicts) for one in found] == [("flat tops", False)]
+    assert re.search(r"exactly at an end of the range, .* in SI .*, in [12] of 2 records", found[0].figure)
+
+
 def test_scattered_sample_times_are_a_doubt_and_rounded_ones_are_not(right, spoiled):
     draw = np.random.default_rng(5)
 

@@ -230,7 +230,8 @@ def _loop(
         alternatives = find_alternatives(after.estimate, names, search)
     # Asked for here, so that the time of the loop counts it.
     progress(Stage("free runs of every record", _RUNS))
-    progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
+    if is_successful(before.result) and is_successful(after.result):
+        progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
     return Loop(
         campaign,
         guess,

@@ -151,6 +151,13 @@ class Campaign:
         """Records that only evaluate a fit."""
         return tuple(record for record in self.records if record.role == "holdout")
 
+    @property
+    def timing(self) -> str:
+        """The rate, and the frequencies of the dwells, which a wrong rate makes others than those driven."""
+        driven = [dwell.frequency for record in self.records for dwell in record.dwells]
+        dwells = f", dwells of {number(min(driven))} to {number(max(driven))} Hz" if driven else ""
+        return f"{number(self.rate)} samples/s{dwells}"
+
     def _headline(self) -> str:
         fitted, held_out = len(self.fit_records), len(self.holdout_records)
         return f"{self.title}: {len(self.records)} records, {fitted} to fit and {held_out} held out"
@@ -173,7 +180,7 @@ class Campaign:
                 else [Row("floor", f"{self.floor.quantity}, column {self.floor.column}")]
             ),
             Row("filter", filtered),
-            Row("rate", f"{number(self.rate)} Hz"),
+            Row("rate", self.timing),
             Row("model", listed(declared, 20)),
             Row("file", str(self.file)),
         ]

@@ -37,3 +37,12 @@ def check_levels(file: Path, levels: int) -> None:
             f"{file} nests groups or structures more than {DEEPEST} levels deep; expected arrays in a "
             "few. Likely cause: a link or a field that leads back to what holds it"
         )
+
+
+def check_count(file: Path, count: int) -> None:
+    """Refuses more than `MOST_ARRAYS` groups, structures and arrays."""
+    if count > MOST_ARRAYS:
+        raise ValueError(
+            f"{file} holds more than {MOST_ARRAYS} groups and arrays; expected the channels of a record. "
+            "Export them alone"
+        )

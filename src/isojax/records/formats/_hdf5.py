@@ -1,12 +1,13 @@
 """HDF5 files, and MATLAB v7.3 files, which are HDF5 with MATLAB's class written on each dataset."""
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ._bounds import MOST_ARRAYS, check_levels
+from ._bounds import check_count, check_levels
 from ._leaves import Leaf, leaf_columns
 from ._matlab_object import matlab_object
 from ._samples import Column
@@ -37,13 +38,15 @@ def read_hdf5_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
         raise unreadable(file, "HDF5", error) from error
     with handle:
         try:
-            leaves = list(_leaves(file, "", handle, (), iter(range(MOST_ARRAYS))))
+            leaves = list(_leaves(file, "", handle, (), itertools.count(1)))
             return leaf_columns(file, names, leaves)
         except (OSError, RuntimeError, KeyError, TypeError, MemoryError) as error:  # h5py, on a broken file
             raise unreadable(file, "HDF5", error) from error
 
 
-def _leaves(file: Path, path: str, node: Any, above: tuple[Any, ...], left: Iterator[int]) -> Iterator[Leaf]:
+def _leaves(
+    file: Path, path: str, node: Any, above: tuple[Any, ...], visited: Iterator[int]
+) -> Iterator[Leaf]:
     """Gives the leaves under a node.
 
     Args:
@@ -51,25 +54,21 @@ def _leaves(file: Path, path: str, node: Any, above: tuple[Any, ...], left: Iter
         path: Name of the node.
         node: The node.
         above: Nodes that it lies in; a link back to one of them is passed over.
-        left: Yields once for every node that may still be visited.
+        visited: Counts the nodes.
     """
     import h5py
 
     if node in above:
         return
     check_levels(file, len(above))
-    if next(left, None) is None:
-        raise ValueError(
-            f"{file} holds more than {MOST_ARRAYS} groups and arrays; expected the channels of a record. "
-            "Export them alone"
-        )
+    check_count(file, next(visited))
     above = (*above, node)
     if isinstance(node, h5py.Group):
         point = "." if "MATLAB_class" in node.attrs else "/"
         for name in map(str, node):
             if not name.startswith("#"):  # where MATLAB keeps what its cells and structs refer to
                 inside = f"{path}{point}{name}" if path else name
-                yield from _leaves(file, inside, node.get(name), above, left)
+                yield from _leaves(file, inside, node.get(name), above, visited)
     elif isinstance(node, h5py.Dataset):
         if node.dtype == h5py.ref_dtype:
             # The field of an array of structs, and a cell array: a list of references.
@@ -78,7 +77,7 @@ def _leaves(file: Path, path: str, node: Any, above: tuple[Any, ...], left: Iter
             for i, reference in enumerate(np.asarray(node[()]).reshape(-1)):
                 if reference:
                     place = f"{path}[{i}]" if cell else f"{parent}[{i}].{field}"
-                    yield from _leaves(file, place, node.file[reference], above, left)
+                    yield from _leaves(file, place, node.file[reference], above, visited)
         elif node.dtype.names:
             for field in node.dtype.names:
                 yield Leaf(f"{path}.{field}", _field(node, field), size=_float64_bytes(node))

@@ -63,7 +63,7 @@ def _leaves(file: Path, path: str, value: Any) -> Iterator[Leaf]:
             else:
                 yield from _leaves(file, place, one)
     else:
-        yield Leaf(path, lambda: value)
+        yield Leaf(path, lambda: value, size=8 * int(np.size(value)))
 
 
 def _refusal(file: Path, path: str) -> Callable[[], Any]:

@@ -4,7 +4,7 @@ import struct
 import zlib
 from pathlib import Path
 
-from ._bounds import check_levels, check_size
+from ._bounds import check_count, check_levels, check_size
 
 _MATRIX, _COMPRESSED = 14, 15
 _HEADER = 128
@@ -16,7 +16,7 @@ _CLASS_AT = 16
 
 
 def check_mat_elements(file: Path) -> None:
-    """Refuses a MAT file that unpacks to too much, or whose structures are nested too deep.
+    """Refuses a MAT file that unpacks to too much, or whose structures are too many or nested too deep.
 
     SciPy allocates what an element announces, and follows nested structures down the stack of the process,
     which it overruns. A file of another version is left to SciPy.
@@ -33,7 +33,7 @@ def check_mat_elements(file: Path) -> None:
     order = {b"IM": "<", b"MI": ">"}.get(bytes(raw[126:_HEADER]))
     if order is None:
         return
-    total, place = 0, _HEADER
+    total, arrays, place = 0, 0, _HEADER
     while place + 8 <= len(raw):
         kind, size = struct.unpack_from(f"{order}II", raw, place)
         element, place = raw[place : place + 8 + size], place + 8 + size
@@ -49,7 +49,10 @@ def check_mat_elements(file: Path) -> None:
             and struct.unpack_from(f"{order}I", head, _CLASS_AT)[0] & 0xFF in _NESTING
         ):
             whole = _unpacked(element[8:], size + 8) if kind == _COMPRESSED else element
-            check_levels(file, _levels(memoryview(whole), order))
+            levels, count = _levels(memoryview(whole), order)
+            check_levels(file, levels)
+            arrays += count
+            check_count(file, arrays)
 
 
 def _unpacked(packed: memoryview, most: int) -> bytes:
@@ -59,9 +62,9 @@ def _unpacked(packed: memoryview, most: int) -> bytes:
         return b""  # SciPy says what is wrong
 
 
-def _levels(element: memoryview, order: str) -> int:
-    """Gives how deep arrays are nested in each other."""
-    place, ends, deepest = 0, [len(element)], 0
+def _levels(element: memoryview, order: str) -> tuple[int, int]:
+    """Gives how deep arrays are nested in each other, and how many there are."""
+    place, ends, deepest, count = 0, [len(element)], 0, 0
     while place + 8 <= len(element):
         while ends and place >= ends[-1]:
             ends.pop()
@@ -69,7 +72,7 @@ def _levels(element: memoryview, order: str) -> int:
         place += 8
         if kind == _MATRIX:
             ends.append(place + size)
-            deepest = max(deepest, len(ends) - 1)
+            deepest, count = max(deepest, len(ends) - 1), count + 1
         elif kind <= 0xFFFF:  # else a small element, whose data stand in its tag
             place += size + -size % 8
-    return deepest
+    return deepest, count

@@ -6,17 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._show import shown
-from ..noise import find_spikes
+from ..noise import clipped_share, find_spikes
 from ..spectrum import NoiseBand, spectral_floor
-
-_EXTREME = 0.02
-"""Share of the range, or so many steps of the converter, in which samples near an end are counted ..."""
-
-_LEVELS = 8
-_CLIPPED = 0.5
-"""... of which more than this share stands at the end itself where a channel clips; a sine has less."""
-
-_FEWEST_CLIPPED = 6
 
 _ENDS = 4
 """The drift is that between the first and the last of so many parts."""
@@ -101,26 +92,6 @@ def inspect_channel(
         _noise_floor(finite) if rms > 0.0 else 0.0,
         int(find_spikes(finite)[0].size),
     )
-
-
-def clipped_share(samples: Float[np.ndarray, " time"]) -> float:
-    """Gives the share of samples that stand at an end of the range because the channel clips.
-
-    Of the samples near an end, most are then exactly there. Of a sine only a few are, however coarse the
-    steps of the converter. An end at which a channel rests most of the time is no
-    clipping.
-    """
-    levels = np.unique(samples)
-    if levels.size < 2 * _LEVELS:
-        return 0.0
-    near = max(_EXTREME * float(levels[-1] - levels[0]), _LEVELS * float(np.min(np.diff(levels))))
-    share = 0.0
-    for end in (levels[0], levels[-1]):
-        at = int(np.count_nonzero(samples == end))
-        around = int(np.count_nonzero(np.abs(samples - end) <= near))
-        if at >= _FEWEST_CLIPPED and at > _CLIPPED * around and end != np.median(samples):
-            share += at / samples.size
-    return share
 
 
 def _noise_floor(samples: Float[np.ndarray, " time"]) -> float:

@@ -9,7 +9,7 @@ from .._campaign import OutputQuantity
 from ..formats import channel_unit, split_heading
 from ._arrangement import Place, arrange
 from ._channel import ChannelInspection
-from ._guess import is_base, is_exciter
+from ._guess import is_base, is_exciter, is_nameless
 from ._inertia import guess_mass
 from ._inspect_file import FileInspection
 
@@ -170,9 +170,10 @@ def _unit_line(channel: ChannelInspection, quantity: str) -> str:
 def _sampling_lines(file: FileInspection) -> list[str]:
     lines = [f"rate = {file.rate!r}      # from: {file.rate_from}"]
     if file.time is not None and not file.time_fault:
-        lines.append(f"time = {json.dumps(split_heading(file.time)[0])}")
-        if file.time_unit is not None:
-            lines.append(_field("unit", file.time_unit, ""))
+        guessed = "# guessed: it increases evenly" if is_nameless(file.time) else ""
+        lines.append(_field("time", split_heading(file.time)[0], guessed))
+        if file.time_unit is not None or guessed:
+            lines.append(_field("unit", file.time_unit or "s", guessed and "# guessed"))
     elif file.time is not None:
         lines.append(f"# the time column is not used: {file.time_fault}")
     return lines

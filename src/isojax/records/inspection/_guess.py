@@ -19,6 +19,10 @@ _WORDS: Mapping[str, str] = {
 """Names of channels by what they measure, sought in this order among the words of a name."""
 
 _TIME = re.compile(r"t|time|times|zeit|x_value|index|timestamp|sec|seconds|time_?s", re.IGNORECASE)
+_NAMELESS = re.compile(r".*\[(:, *\d+|\d+, *:)\]")
+_UNEVEN = 0.5
+"""Share of the usual step by which steps of a nameless time may differ: it may be rounded."""
+
 _BASE = re.compile(r"base|floor|ground|table|shaker|fuss|boden|foot", re.IGNORECASE)
 _MOVING = re.compile(r"react\w*|exciter|moving|armature", re.IGNORECASE)
 _DRIVES = ("force", "command")
@@ -42,11 +46,22 @@ def guess_quantity(name: str, unit: str | None) -> str | None:
 
 
 def is_time(name: str, unit: str | None, samples: Float[np.ndarray, " time"]) -> bool:
-    """Whether a column is the time: by its unit or its name, and mostly increasing."""
+    """Whether a column is the time: by its unit or its name, and mostly increasing; nameless, evenly."""
+    if samples.size < 2:
+        return False
+    steps = np.diff(samples)
+    if is_nameless(name):
+        usual = float(np.median(steps))
+        return bool(usual > 0.0 and np.max(np.abs(steps - usual)) < _UNEVEN * usual)
     measured = None if unit is None else channel_unit(unit)
     last = re.split(r"[./]", name.strip())[-1]
     called = _TIME.fullmatch(last) is not None if measured is None else measured.quantity == "time"
-    return bool(called and samples.size > 1 and np.mean(np.diff(samples) > 0.0) > 0.9)
+    return bool(called and np.mean(steps > 0.0) > 0.9)
+
+
+def is_nameless(name: str) -> bool:
+    """Whether a channel has no name of its own, but a place in an array, such as "data[:, 0]"."""
+    return _NAMELESS.fullmatch(name.strip()) is not None
 
 
 def drive_and_response(

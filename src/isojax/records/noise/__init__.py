@@ -3,9 +3,11 @@
 In: a `Campaign`. Out: the rms and colour of its output noise, and what the reader must know of the
 data: dwells that never settled, brief blows, differences between repeats, a resonance peak in the scatter,
 spikes. Read `_noise.py` first, then `_colour.py` and `_repeats.py`; `_noise_peak.py`, `_spikes.py` and
-`_health.py` after them.
+`_health.py` after them,
+`_clipped_share.py` by itself.
 """
 
+from ._clipped_share import clipped_share as clipped_share
 from ._colour import Colour as Colour
 from ._health import DataHealth as DataHealth
 from ._health import brief_blows as brief_blows

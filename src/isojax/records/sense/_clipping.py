@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._campaign import Campaign
+from ..noise import clipped_share
 from ._suspicion import Cause, Suspicion
 
 _TOP = 0.9
@@ -40,20 +41,42 @@ def find_clipping(campaign: Campaign) -> list[Suspicion]:
     for section, column in (("input", campaign.input.column), ("output", campaign.output.column)):
         driven = [record for record in campaign.records if section == "output" or record.kind != "free_decay"]
         signals = [record.raw_input if section == "input" else record.raw_output for record in driven]
-        ends = [(sign, _flat_tops([sign * signal for signal in signals])) for sign in (1.0, -1.0)]
-        flat = [(sign * one[0], *one[1:]) for sign, one in ends if one is not None]
-        if not flat:
+        figure, expected = _end_figure(signals), "a few, as of a sine"
+        if figure is None:
+            figure, expected = _flat_figure(signals), "43 %, as of a sine"
+        if figure is None:
             continue
-        levels = " and ".join(f"{level:.3g}" for level, _, _ in flat)
-        figure = (
-            f"{sum(count for _, count, _ in flat)} half cycles end flat at {levels} in SI about the mean: "
-            f"of the time above half of it they spend {100.0 * max(share for *_, share in flat):.0f} % in "
-            "the last tenth"
-        )
         line = '[model] elements = ["clipping"]' if section == "output" else "measure again, with more range"
         cause = Cause("flat tops", f"the {section} left the range of its channel", line)
-        found.append(Suspicion("flat tops", f'"{column}"', figure, "43 %, as of a sine", (cause,), False))
+        found.append(Suspicion("flat tops", f'"{column}"', figure, expected, (cause,), False))
     return found
+
+
+def _end_figure(signals: list[Float[np.ndarray, " _"]]) -> str | None:
+    """Gives what is seen of a converter at the end of its range: it repeats one number, digit for digit."""
+    counts = [round(clipped_share(signal) * signal.size) for signal in signals]
+    clipped = [signal for signal, count in zip(signals, counts, strict=True) if count]
+    if not clipped:
+        return None
+    reach = max(float(np.max(np.abs(signal - np.mean(signal)))) for signal in clipped)
+    return (
+        f"{sum(counts)} samples stand exactly at an end of the range, {reach:.3g} in SI from the mean, in "
+        f"{len(clipped)} of {len(counts)} records"
+    )
+
+
+def _flat_figure(signals: list[Float[np.ndarray, " _"]]) -> str | None:
+    """Gives what is seen of an amplifier or a filter at the end of its range: tops are flat."""
+    ends = [(sign, _flat_tops([sign * signal for signal in signals])) for sign in (1.0, -1.0)]
+    flat = [(sign * one[0], *one[1:]) for sign, one in ends if one is not None]
+    if not flat:
+        return None
+    levels = " and ".join(f"{level:.3g}" for level, _, _ in flat)
+    return (
+        f"{sum(count for _, count, _ in flat)} half cycles end flat at {levels} in SI about the mean: "
+        f"of the time above half of it they spend {100.0 * max(share for *_, share in flat):.0f} % in "
+        "the last tenth"
+    )
 
 
 def _flat_tops(signals: list[Float[np.ndarray, " _"]]) -> tuple[float, int, float] | None:

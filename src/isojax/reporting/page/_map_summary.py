@@ -48,8 +48,9 @@ def map_summary(
         row, column = np.unravel_index(int(np.nanargmax(worst)), worst.shape)
         place = f"{quantity(amplitudes[row], unit)}, {quantity(frequencies[column], 'Hz')}"
         lines.append(("largest |µ|", f"{worst[row, column]:.4f} at {place}"))
-        steps = smap.integrator.steps_per_period
-        lines.append(("error", f"{smap.error:.1e} in |µ| by integration, {steps} steps a period"))
+        steps, aim = smap.integrator.steps_per_period, smap.integrator.map_error
+        missed = f"; more than the {aim:.0e} that a map aims at" if smap.error > aim else ""
+        lines.append(("error", f"{smap.error:.1e} in |µ| by integration, {steps} steps a period{missed}"))
     if folds is not None:
         lines.append(("folds", _fold_curve_words(folds, unit)))
     elif several.any():

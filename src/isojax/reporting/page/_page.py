@@ -205,7 +205,7 @@ def _facts(loop: Loop) -> list[tuple[str, str]]:
         ("input", campaign.input.quantity.replace("_", " ")),
         ("output", campaign.output.quantity),
         ("records", f"{len(campaign.fit_records)} fitted, {len(campaign.holdout_records)} held out"),
-        ("length", f"{length:.0f} s at {campaign.rate:g} Hz"),
+        ("length", f"{length:.0f} s, {campaign.timing}"),
         ("excitation", ", ".join(kinds)),
     ]
     if levels:
