@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._show import shown
-from ..noise import find_spikes
+from .._spikes import find_spikes
 from ..spectrum import NoiseBand, spectral_floor
 
 _EXTREME = 0.02
