@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from isojax import read_campaign
-from isojax.records import Campaign, data_health
+from isojax.records import Campaign, data_health, find_suspicions
 from isojax.records._spikes import find_spikes
 
 COUNT = 20_000
@@ -112,3 +112,10 @@ def test_spikes_are_replaced_where_the_declaration_asks_for_it(tiny, channels):
     np.testing.assert_allclose(record.output[others], noisy[others], rtol=1e-8)
     # The cubic through noisy neighbours: their weights are -1/6, 4/6, 4/6 and -1/6.
     np.testing.assert_allclose(record.output[places], smooth[places], atol=4.0 * 1e-3 * np.sqrt(34.0) / 6.0)
+
+
+def test_they_are_a_doubt_with_the_line_that_removes_them(spiked, tiny):
+    (doubt,) = [one for one in find_suspicions(spiked) if one.check == "single samples"]
+    assert not doubt.contradicts
+    assert "3 single samples in 1 records" in doubt.figure
+    assert doubt.causes[0].line == "[output] remove_spikes = true"

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._parameters import element_names, list_parameters, replace_parameters
 from ..._progress import silent
-from ..._results import RESULTS, is_successful
+from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator, check_integrator
 from ...records import Campaign, NoiseEstimate, estimate_noise, refuse_contradictions
@@ -20,7 +20,6 @@ from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
 from ._fit_result import Fit
 from ._integration_steps import find_integrator
-from ._residual_noise import residual_noise, shows_other_noise
 from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, search_of
 from ._simulator import Simulator
@@ -111,13 +110,6 @@ def fit(
         progress("the simulation from the start values diverges: again from their linear part")
         again = fit_from(_linear_part(model, places))
         found = found if again.result == RESULTS.not_finite else again
-    if is_successful(found.result):
-        seen = residual_noise(found, campaign)
-        if shows_other_noise(seen, noise):
-            progress(f"the residual shows noise of {seen.sigma:.4g} rms, not of {noise.sigma:.4g}: again")
-            noise, steps = seen, found.steps
-            found = fit_from(found.model)
-            found = found._replace(steps=found.steps + steps)
     return complete(found, model, campaign, noise)
 
 

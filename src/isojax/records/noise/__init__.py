@@ -15,3 +15,4 @@ from ._noise import estimate_noise as estimate_noise
 from ._noise_peak import NoisePeak as NoisePeak
 from ._noise_peak import noise_peak as noise_peak
 from ._spike_counts import Spikes as Spikes
+from ._spike_counts import spikes as spikes
