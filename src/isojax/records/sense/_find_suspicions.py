@@ -92,7 +92,8 @@ def _find(campaign: Campaign) -> tuple[Suspicion, ...]:
     if rows is not None:
         found = found or _balance_suspicions(campaign, rows)
         found += [*_size_suspicions(campaign, rows), *_jitter_suspicions(campaign, rows)]
-    found += [*find_clipping(campaign), *find_stray_samples(campaign, _STRAY)]
+    # A clipped top that noise leaves for one sample stands alone as well.
+    found += find_clipping(campaign) or find_stray_samples(campaign, _STRAY)
     return tuple(sorted(found, key=lambda one: not one.contradicts))
 
 
