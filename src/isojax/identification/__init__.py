@@ -40,6 +40,7 @@ from .fitting import fit as fit
 from .fitting import fit_report as fit_report
 from .fitting import load_fit as load_fit
 from .fitting import plain_unit as plain_unit
+from .fitting import prediction_errors as prediction_errors
 from .fitting import residual as residual
 from .guess import CircleFit as CircleFit
 from .guess import ClassicalGuess as ClassicalGuess

@@ -36,6 +36,8 @@ from ._lack_of_fit import lack_of_fit as lack_of_fit
 from ._multiple_shooting import fit_by_multiple_shooting as fit_by_multiple_shooting
 from ._output_units import OUTPUT_UNITS as OUTPUT_UNITS
 from ._output_units import plain_unit as plain_unit
+from ._prediction_errors import PredictionErrors as PredictionErrors
+from ._prediction_errors import prediction_errors as prediction_errors
 from ._problem import Point as Point
 from ._problem import Problem as Problem
 from ._problem import one_hot as one_hot
