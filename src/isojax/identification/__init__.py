@@ -28,6 +28,7 @@ from .fitting import DriftBudget as DriftBudget
 from .fitting import Errors as Errors
 from .fitting import Fit as Fit
 from .fitting import Fitted as Fitted
+from .fitting import PredictionErrors as PredictionErrors
 from .fitting import Residual as Residual
 from .fitting import Run as Run
 from .fitting import SavedFit as SavedFit

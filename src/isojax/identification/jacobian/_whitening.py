@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-BLOCK = 16
+SHORTEST_BLOCK = 16
 """Samples of which one product filters a multiple. Laws are filled up with zeros to as many coefficients, so
 that a few compiled functions serve all orders."""
 
@@ -37,7 +37,7 @@ def find_whitening(coefficients: tuple[float, ...]) -> Whitening | None:
     """
     if not coefficients:
         return None
-    order = BLOCK * -(-len(coefficients) // BLOCK)
+    order = SHORTEST_BLOCK * -(-len(coefficients) // SHORTEST_BLOCK)
     padded = np.pad(coefficients, (0, order - len(coefficients)))
     start, law, scale = np.zeros((order, order)), padded, 1.0
     for row in range(order - 1, -1, -1):
