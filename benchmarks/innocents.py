@@ -45,6 +45,7 @@ from _trial_run import crowded
 from blind_trial import commit, read
 from isojax import compile_quickly, rig
 from isojax.identification import close_loop, read_campaign
+from isojax.identification.fitting import drive_noise
 from isojax.records import data_health
 
 Row = dict[str, Any]
@@ -163,7 +164,13 @@ def run_one(seed: int, flaw: str) -> Row:
             "chi2_per_dof": held.stats.chi2 / held.stats.dof,
             "method": held.noise.method,
             "order": len(held.noise.whitening),
-            "reported": bool(health.noise_peak or health.unsettled or health.brief_blows),
+            "reported": bool(
+                loop.check_first
+                or health.noise_peak
+                or health.unsettled
+                or health.brief_blows
+                or drive_noise(loop.after)
+            ),
             "off": {
                 name: (float(held.model[name]) - float(truth[name])) / error for name, error in errors.items()
             },

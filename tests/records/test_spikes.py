@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from isojax import read_campaign
-from isojax.records import Campaign, data_health
-from isojax.records.noise._spikes import find_spikes
+from isojax.records import Campaign, data_health, find_suspicions
+from isojax.records._spikes import find_spikes
 
 COUNT = 20_000
 NUMBER = np.arange(COUNT)
@@ -95,3 +95,27 @@ def test_a_campaign_without_spikes_has_none(tiny):
 def test_a_blow_is_not_a_spike(spiked):
     hit = tuple(dataclasses.replace(record, kind="impulse") for record in spiked.records)
     assert not data_health(dataclasses.replace(spiked, records=hit)).spikes
+
+
+def test_spikes_are_replaced_where_the_declaration_asks_for_it(tiny, channels):
+    places = np.array([500, 900, 1500])
+    step = channels["time"][1] - channels["time"][0]
+    smooth = np.sin(2.0 * np.pi * 0.02 * channels["time"] / step)
+    noisy = smooth + 1e-3 * np.random.default_rng(2).normal(size=smooth.size)
+    channels["acceleration"] = noisy.copy()
+    channels["acceleration"][places] += 3.0
+    (record,) = read_campaign(
+        tiny((r"^\[output\]", "[output]\nremove_spikes = true"), channels=channels)
+    ).records
+    assert record.removed_spikes == 3
+    others = np.delete(np.arange(smooth.size), places)
+    np.testing.assert_allclose(record.output[others], noisy[others], rtol=1e-8)
+    # The cubic through noisy neighbours: their weights are -1/6, 4/6, 4/6 and -1/6.
+    np.testing.assert_allclose(record.output[places], smooth[places], atol=4.0 * 1e-3 * np.sqrt(34.0) / 6.0)
+
+
+def test_they_are_a_doubt_with_the_line_that_removes_them(spiked, tiny):
+    (doubt,) = [one for one in find_suspicions(spiked) if one.check == "single samples"]
+    assert not doubt.contradicts
+    assert "3 single samples in 1 records" in doubt.figure
+    assert doubt.causes[0].line == "[output] remove_spikes = true"

@@ -130,6 +130,12 @@ def test_spikes_are_counted_with_their_share(found):
     assert "on the output of 2 records: 9 samples. In up they are 300 ppm of the samples" in text
     assert "hold 1.20 % of the rms" in text
     assert "on the input" not in text
+    assert "`[output] remove_spikes = true`" in text
+    records = (dataclasses.replace(found.campaign.records[0], removed_spikes=4), *found.campaign.records[1:])
+    cleaned = found.after._replace(campaign=dataclasses.replace(found.campaign, records=records))
+    assert "4 spikes were replaced by the cubic through their neighbours" in " ".join(
+        health_words(clean, cleaned)
+    )
 
 
 def test_scatter_within_records_is_told_where_repeats_show_it(found):

@@ -28,6 +28,7 @@ from .fitting import DriftBudget as DriftBudget
 from .fitting import Errors as Errors
 from .fitting import Fit as Fit
 from .fitting import Fitted as Fitted
+from .fitting import PredictionErrors as PredictionErrors
 from .fitting import Residual as Residual
 from .fitting import Run as Run
 from .fitting import SavedFit as SavedFit
@@ -40,6 +41,7 @@ from .fitting import fit as fit
 from .fitting import fit_report as fit_report
 from .fitting import load_fit as load_fit
 from .fitting import plain_unit as plain_unit
+from .fitting import prediction_errors as prediction_errors
 from .fitting import residual as residual
 from .guess import CircleFit as CircleFit
 from .guess import ClassicalGuess as ClassicalGuess

@@ -14,6 +14,8 @@ from ._campaign import InputChannel as InputChannel
 from ._campaign import OutputChannel as OutputChannel
 from ._record import Dwell as Dwell
 from ._record import Record as Record
+from ._windows import cut_into_windows as cut_into_windows
+from ._windows import windows_of as windows_of
 from .inspection import ChannelInspection as ChannelInspection
 from .inspection import FileInspection as FileInspection
 from .inspection import draft_campaign as draft_campaign

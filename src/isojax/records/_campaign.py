@@ -34,6 +34,7 @@ class InputChannel:
         offset_free: Whether a constant offset of the input is to be identified.
         hold: How the input runs between two samples.
         moving_mass: Mass [kg] of a reaction-mass exciter, else None.
+        remove_spikes: Whether the reader replaces single samples that their neighbours do not explain.
     """
 
     quantity: InputQuantity
@@ -44,6 +45,7 @@ class InputChannel:
     offset_free: bool = False
     hold: Hold = "band_limited"
     moving_mass: float | None = None
+    remove_spikes: bool = False
 
 
 @shown
@@ -58,6 +60,7 @@ class OutputChannel:
         offset_free: Whether a constant offset of the output is to be identified.
         noise: Declared rms noise in SI, or None to estimate it.
         relative_error: Error that the reading may have, over the response.
+        remove_spikes: Whether the reader replaces single samples that their neighbours do not explain.
     """
 
     quantity: OutputQuantity
@@ -66,6 +69,7 @@ class OutputChannel:
     offset_free: bool = False
     noise: float | None = None
     relative_error: float = 1e-3
+    remove_spikes: bool = False
 
 
 @shown

@@ -69,6 +69,7 @@ class Record:
         floor: Measured acceleration of the floor about its mean [m/s^2], or None.
         time_jitter: rms by which its time column departs from the even grid, beyond its rounding [s]; 0 where
             it has none.
+        removed_spikes: Samples of both channels that the reader replaced, as campaign.toml asks for.
     """
 
     name: str
@@ -91,6 +92,7 @@ class Record:
     start: int = 0
     floor: Float[np.ndarray, " time"] | None = None
     time_jitter: float = 0.0
+    removed_spikes: int = 0
     _kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def once(self, question: Hashable, work: Callable[[], _Answer]) -> _Answer:

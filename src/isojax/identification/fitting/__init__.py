@@ -1,6 +1,7 @@
 """Coefficients, error bars and errors of a model, straight from time histories.
 
-In: a start model and a campaign. Out: a `Fit`; `residual` and `drift_budget` describe it.
+In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget` and
+`drive_noise` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
 What follows the search is in `_evaluation`, `_errors`, `_covariance` and `_fit_result`.
@@ -15,6 +16,8 @@ from ._covariance import invert_information as invert_information
 from ._drift_budget import DriftBudget as DriftBudget
 from ._drift_budget import Share as Share
 from ._drift_budget import drift_budget as drift_budget
+from ._drive_noise import DriveNoise as DriveNoise
+from ._drive_noise import drive_noise as drive_noise
 from ._elimination import Nuisances as Nuisances
 from ._elimination import Spread as Spread
 from ._elimination import step_nuisances as step_nuisances
@@ -33,6 +36,8 @@ from ._lack_of_fit import lack_of_fit as lack_of_fit
 from ._multiple_shooting import fit_by_multiple_shooting as fit_by_multiple_shooting
 from ._output_units import OUTPUT_UNITS as OUTPUT_UNITS
 from ._output_units import plain_unit as plain_unit
+from ._prediction_errors import PredictionErrors as PredictionErrors
+from ._prediction_errors import prediction_errors as prediction_errors
 from ._problem import Point as Point
 from ._problem import Problem as Problem
 from ._problem import one_hot as one_hot

@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 SHORTEST_BLOCK = 16
-"""Samples that one product filters at least."""
+"""Samples of which one product filters a multiple. Laws are filled up with zeros to as many coefficients, so
+that a few compiled functions serve all orders."""
 
 
 class Whitening(NamedTuple):
@@ -36,14 +37,15 @@ def find_whitening(coefficients: tuple[float, ...]) -> Whitening | None:
     """
     if not coefficients:
         return None
-    order = len(coefficients)
-    start, law, scale = np.zeros((order, order)), np.array(coefficients), 1.0
+    order = SHORTEST_BLOCK * -(-len(coefficients) // SHORTEST_BLOCK)
+    padded = np.pad(coefficients, (0, order - len(coefficients)))
+    start, law, scale = np.zeros((order, order)), padded, 1.0
     for row in range(order - 1, -1, -1):
         reflection = law[-1]
         law = (law[:-1] - reflection * law[-2::-1]) / (1.0 - reflection**2)
         scale *= np.sqrt(1.0 - reflection**2)
         start[row, : row + 1] = scale * np.append(law[::-1], 1.0)
-    return Whitening(jnp.asarray(start), jnp.asarray(np.array([1.0, *coefficients])))
+    return Whitening(jnp.asarray(start), jnp.asarray(np.array([1.0, *padded])))
 
 
 def whiten(
@@ -60,9 +62,8 @@ def whiten(
         The rows, their noise white and of the variance of the innovation.
     """
     time, columns, lanes = rows.shape
-    order = whitening.start.shape[0]
     # Blocks of samples: the filter is one small matrix, applied to each block and to the one before it.
-    size = max(order, SHORTEST_BLOCK)
+    order = size = whitening.start.shape[0]
     blocks = -(-time // size)
     cut = jnp.pad(rows, ((0, blocks * size - time), (0, 0), (0, 0))).reshape(blocks, size, columns * lanes)
     lag = np.arange(size)[:, None] + size - np.arange(2 * size)

@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._show import shown
-from ..noise import clipped_share, find_spikes
+from .._spikes import find_spikes
+from ..noise import clipped_share
 from ..spectrum import NoiseBand, spectral_floor
 
 _ENDS = 4

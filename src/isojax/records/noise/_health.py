@@ -12,7 +12,7 @@ from .._record import Dwell, Record
 from ..spectrum import dwell_harmonics, harmonic_basis, without
 from ._noise_peak import NoisePeak, noise_peak
 from ._repeats import repeat_groups
-from ._spikes import Spikes, spikes
+from ._spike_counts import Spikes, spikes
 
 _LAST_CYCLES = 6
 """Cycles at the end of a dwell that are compared with each other."""

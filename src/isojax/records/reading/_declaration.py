@@ -104,6 +104,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "offset_free": _flag(),
         "hold": _choice(*get_args(Hold), default="band_limited"),
         "moving_mass": _positive(),
+        "remove_spikes": _flag(),
     },
     "output": {
         "quantity": _choice(*get_args(OutputQuantity), required=True),
@@ -112,6 +113,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "offset_free": _flag(),
         "noise": _positive(),
         "relative_error": _positive(default=1e-3),
+        "remove_spikes": _flag(),
     },
     "floor": {
         "quantity": _choice(*get_args(OutputQuantity), required=True),

@@ -135,6 +135,7 @@ def _read_record(
         start=channels.start,
         floor=channels.floor_acceleration(declared),
         time_jitter=channels.time_jitter,
+        removed_spikes=channels.removed_spikes,
     )
     return record, channels.units
 

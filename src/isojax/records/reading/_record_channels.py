@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from .._spikes import without_spikes
 from .._wording import row
 from ._channel_factor import channel_factor
 from ._data_file import read_columns
@@ -36,6 +37,7 @@ class RecordChannels:
         floor: Measured motion of the floor after it, in SI, or None.
         units: Units of the columns of input, output and floor in the file, as far as they are channels.
         time_jitter: rms by which the time column departs from the even grid, beyond its rounding [s].
+        removed_spikes: Samples that were replaced, of both channels.
     """
 
     start: int
@@ -50,6 +52,7 @@ class RecordChannels:
     floor: Float[np.ndarray, " time"] | None
     units: Mapping[str, str]
     time_jitter: float = 0.0
+    removed_spikes: int = 0
 
     def floor_acceleration(self, declared: Declaration) -> Float[np.ndarray, " time"] | None:
         """Gives the acceleration of the floor [m/s^2], or None."""
@@ -86,11 +89,14 @@ def read_channels(
     columns = read_columns(file, list(dict.fromkeys(wanted)), declared.given(entry))
     total = columns[named["input"]].samples.size
     start, stop = _checked_span(where, file, entry, total)
-    measured, units = {}, {}
+    measured, units, removed = {}, {}, 0
     for name, column in named.items():
         unit, factor = channel_factor(declared, name, columns[column], file)
         units[name] = unit
         measured[name] = _finite(file, column, columns[column].samples[start:stop], start) * factor
+        if sections[name].get("remove_spikes"):
+            measured[name], count = without_spikes(measured[name])
+            removed += count
     raw_input, raw_output, floor = measured["input"], measured["output"], measured.get("floor")
     if floor is not None:
         _check_not_constant(file, named["floor"], floor)
@@ -105,7 +111,7 @@ def read_channels(
         _check_not_constant(file, named["input"], raw_input)
     channels = raw_input, raw_output, raw_input, raw_output, floor
     jitter = 0.0 if time is None else time_jitter(time)
-    return RecordChannels(start, stop, total, entry["settle"], rate, *channels, units, jitter)
+    return RecordChannels(start, stop, total, entry["settle"], rate, *channels, units, jitter, removed)
 
 
 def _checked_span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:

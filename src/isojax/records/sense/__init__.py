@@ -2,7 +2,8 @@
 
 In: a `Campaign`. Out: what speaks against its declaration, with the likely mistake and the line to change.
 Read `_suspicion.py` and `_find_suspicions.py` first, then `_lines.py` and `_balance.py` (the balance of
-forces, without a model), `_readings.py` and `_sizes.py` (mistakes undone), `_clipping.py`.
+forces, without a model), `_readings.py` and `_sizes.py` (mistakes undone), `_clipping.py`,
+`_stray_samples.py`.
 """
 
 from ._find_suspicions import find_suspicions as find_suspicions

@@ -11,6 +11,7 @@ from ._balance import Balance, Rows, find_balance
 from ._clipping import find_clipping
 from ._readings import declared_reading, late_readings, other_readings, rows_read, sign_cause
 from ._sizes import rate_cause, scale_causes, sizes_of
+from ._stray_samples import find_stray_samples
 from ._suspicion import Cause, Suspicion
 
 _CERTAIN = 4.0
@@ -51,6 +52,9 @@ _SLOWEST = 0.05
 _JITTERED = 1e-3
 """Error of a sample, over the response, that uneven times may make."""
 
+_STRAY = 1e-3
+"""rms of spikes, over that of their channel, from which they are named."""
+
 _LAGGED = {"delay": '[model] elements = ["input_delay"]', "clock skew": '[model] elements = ["clock_skew"]'}
 """Mistakes of time, and the line of campaign.toml that declares each as part of the model."""
 
@@ -88,7 +92,8 @@ def _find(campaign: Campaign) -> tuple[Suspicion, ...]:
     if rows is not None:
         found = found or _balance_suspicions(campaign, rows)
         found += [*_size_suspicions(campaign, rows), *_jitter_suspicions(campaign, rows)]
-    found += find_clipping(campaign)
+    # A clipped top that noise leaves for one sample stands alone as well.
+    found += find_clipping(campaign) or find_stray_samples(campaign, _STRAY)
     return tuple(sorted(found, key=lambda one: not one.contradicts))
 
 

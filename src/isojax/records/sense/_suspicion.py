@@ -5,7 +5,7 @@ from typing import Literal
 
 from ..._show import shown
 
-CheckName = Literal["power", "inertia", "balance", "sizes", "flat tops", "sample times"]
+CheckName = Literal["power", "inertia", "balance", "sizes", "flat tops", "sample times", "single samples"]
 
 
 @shown

@@ -255,9 +255,13 @@ def health_words(health: DataHealth, fit: Fit) -> tuple[str, ...]:
                 f"Spikes, single samples that their neighbours do not explain, on the {channel} of "
                 f"{len(own)} records: {sum(one.count for one in own)} samples. In {worst.record} they are "
                 f"{typeset_number(1e6 * worst.share, 2)} ppm of the samples and hold "
-                f"{typeset_share(worst.rms_share)} of the rms. They all count in the fit. A bad contact "
-                "makes such samples, and so does a rattle."
+                f"{typeset_share(worst.rms_share)} of the rms. They all count in the fit. If a bad "
+                f"contact or a lost bit made them, and no rattle, `[{channel}] remove_spikes = true` "
+                "replaces each by the cubic through its neighbours."
             )
+    removed = sum(record.removed_spikes for record in fit.campaign.records)
+    if removed:
+        lines.append(f"{removed} spikes were replaced by the cubic through their neighbours, as declared.")
     if health.repeats:
         lines.append(
             f"Repeats agree to {typeset_share(health.repeatability)} (median of {len(health.repeats)})."

@@ -1,14 +1,7 @@
 """Spikes: single samples far from what their neighbours say, as a lost bit or a bad contact makes them."""
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 from jaxtyping import Float, Int
-
-from ..._show import shown
-from .._campaign import Campaign
-from .._record import Record
 
 _PATTERN = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
 """Fourth difference: a sample less the cubic through two neighbours on either side. Its answer to a spike is
@@ -25,26 +18,6 @@ _LIKENESS = 0.985
 
 _MOST = 5e-3
 """Share of the samples above which they are no outliers but how the signal is."""
-
-
-@shown
-@dataclass(frozen=True)
-class Spikes:
-    """Spikes of one channel of a record.
-
-    Attributes:
-        record: Name of the record.
-        channel: "input" or "output".
-        count: Number of spikes.
-        share: Of all samples [1].
-        rms_share: rms of the spikes alone over the rms of the channel about its mean [1].
-    """
-
-    record: str
-    channel: Literal["input", "output"]
-    count: int
-    share: float
-    rms_share: float
 
 
 def find_spikes(
@@ -85,32 +58,16 @@ def find_spikes(
     return nothing if places.size > _MOST * signal.size else (places, bend[places])
 
 
-def spikes(campaign: Campaign) -> tuple[Spikes, ...]:
-    """Gives the channels of records in which single samples stand alone, in the files as they were read.
-
-    A blow is brief by its nature, and a drive that is held may jump for one sample: such inputs, and records
-    of blows, are passed over.
+def without_spikes(signal: Float[np.ndarray, " time"]) -> tuple[Float[np.ndarray, " time"], int]:
+    """Gives a signal whose spikes are replaced by the cubic through two neighbours on either side.
 
     Args:
-        campaign: The campaign.
+        signal: Of one channel.
 
     Returns:
-        One entry a channel with spikes, in the campaign's order.
+        The signal, and how many samples were replaced.
     """
-    held = campaign.input.hold == "zero_order"
-    found = (
-        entry
-        for record in campaign.records
-        if record.kind != "impulse"
-        for entry in (None if held else _of_channel(record, "input"), _of_channel(record, "output"))
-    )
-    return tuple(entry for entry in found if entry is not None)
-
-
-def _of_channel(record: Record, channel: Literal["input", "output"]) -> Spikes | None:
-    signal = record.raw_input if channel == "input" else record.raw_output
     places, sizes = find_spikes(signal)
-    if not places.size:
-        return None
-    rms_share = float(np.sqrt(np.sum(sizes**2) / np.sum((signal - np.mean(signal)) ** 2)))
-    return Spikes(record.name, channel, places.size, places.size / signal.size, rms_share)
+    clean = signal.copy()
+    clean[places] -= sizes
+    return clean, places.size
