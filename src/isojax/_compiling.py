@@ -49,7 +49,8 @@ def keep_compiled_code() -> Path | None:
     """
     import jax
 
-    chosen = os.environ.get("ISOJAX_CACHE", jax.config.jax_compilation_cache_dir or str(_user_cache()))
+    usual = jax.config.values["jax_compilation_cache_dir"] or str(_user_cache())
+    chosen = os.environ.get("ISOJAX_CACHE", usual)
     if not chosen:
         return None
     folder = Path(chosen)

@@ -33,8 +33,9 @@ from ._whitening import whitened_products
 _ENTRIES = 2e7
 """Numbers that one table of columns along the motion may hold."""
 
-_LEAST_COLUMNS = 120
-"""Columns for which a table has room at least: few columns then share the compiled code of many."""
+_LEAST_COLUMNS = 160
+"""Columns for which a table has room at least: absent effects and free force laws, however many, then share
+compiled code."""
 
 _TOGETHER = 24
 """Columns that one linear solve carries: the last one is filled up, so that all have one shape."""
