@@ -4,10 +4,12 @@ import os
 import subprocess
 import sys
 
+import jax
 import jaxlib.version
 import pytest
 
 import isojax as ij
+from isojax._compiling import keep_compiled_code
 
 FLAG = "--xla_cpu_use_fusion_emitters"
 
@@ -51,3 +53,44 @@ def test_xla_knows_the_flag():
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "42.0"
+
+
+def kept_in():
+    return jax.config.values["jax_compilation_cache_dir"]
+
+
+@pytest.fixture
+def settings():
+    """JAX's settings of its cache, put back afterwards."""
+    names = ("jax_compilation_cache_dir", "jax_persistent_cache_min_compile_time_secs")
+    before = {name: jax.config.values[name] for name in names}
+    yield
+    for name, value in before.items():
+        jax.config.update(name, value)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks for the folder that Linux has")
+def test_compiled_code_is_kept_in_the_users_cache_folder(settings, monkeypatch, tmp_path):
+    monkeypatch.delenv("ISOJAX_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    jax.config.update("jax_compilation_cache_dir", None)
+    assert keep_compiled_code() == tmp_path / "cache" / "isojax"
+    assert kept_in() == str(tmp_path / "cache" / "isojax")
+
+
+def test_a_folder_that_the_user_chose_is_taken_or_none(settings, monkeypatch, tmp_path):
+    monkeypatch.setenv("ISOJAX_CACHE", str(tmp_path / "own"))
+    assert keep_compiled_code() == tmp_path / "own"
+    monkeypatch.setenv("ISOJAX_CACHE", "")
+    assert keep_compiled_code() is None
+    monkeypatch.delenv("ISOJAX_CACHE")
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path / "of JAX"))
+    assert keep_compiled_code() == tmp_path / "of JAX"
+
+
+def test_where_nothing_can_be_written_nothing_is_kept(settings, monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("ISOJAX_CACHE", str(tmp_path / "file" / "below"))
+    before = kept_in()
+    assert keep_compiled_code() is None
+    assert kept_in() == before

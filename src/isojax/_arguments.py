@@ -33,7 +33,8 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         prog="isojax",
         description="Identify a nonlinear vibration isolator from time histories; name what its model lacks; "
         "map the stability of its periodic response.",
-        epilog=f"{_EXIT_CODES} ISOJAX_CACHE names a folder in which compiled code is kept between runs.",
+        epilog=f"{_EXIT_CODES} Compiled code is kept between runs, in isojax of the user's cache folder or "
+        "in the folder that ISOJAX_CACHE names; an empty ISOJAX_CACHE keeps none.",
     )
     parser.add_argument("--version", action="version", version=f"isojax {version('isojax')}")
     known = parser.add_subparsers(required=True, metavar="COMMAND")

@@ -4,7 +4,6 @@ import argparse
 import contextlib
 import json
 import math
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -65,13 +64,11 @@ def _start_jax() -> None:
     """Set how JAX computes and compiles, before it is first asked to."""
     import jax
 
-    from ._compiling import compile_quickly
+    from ._compiling import compile_quickly, keep_compiled_code
 
     jax.config.update("jax_enable_x64", True)
     compile_quickly()
-    cache = os.environ.get("ISOJAX_CACHE")
-    if cache:
-        jax.config.update("jax_compilation_cache_dir", cache)
+    keep_compiled_code()
 
 
 def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Callable[[str], None]]:

@@ -1,6 +1,8 @@
-"""How XLA compiles: less of it where that costs nothing."""
+"""How XLA compiles: less of it where that costs nothing, and once a machine."""
 
 import os
+import sys
+from pathlib import Path
 
 import jaxlib.version
 
@@ -8,6 +10,9 @@ _UNTRIED = (0, 11)
 """First jaxlib that was not tried: a flag that XLA does not know ends the process."""
 
 _FLAG = "--xla_cpu_use_fusion_emitters"
+
+_WORTH_KEEPING = 0.1
+"""Seconds of compiling from which the result is kept: reading it back takes a hundredth [s]."""
 
 
 def compile_quickly() -> bool:
@@ -30,3 +35,43 @@ def compile_quickly() -> bool:
         return f"{_FLAG}=false" in flags
     os.environ["XLA_FLAGS"] = f"{flags} {_FLAG}=false".strip()
     return True
+
+
+def keep_compiled_code() -> Path | None:
+    """Have JAX keep what it compiles on disk, so that a later run on this machine need not compile it again.
+
+    JAX keeps code apart by its own version, that of XLA, the flags and the processor. The folder is the
+    one that ISOJAX_CACHE names, else JAX's own where the user has set one, else `isojax` in the user's cache
+    folder. An empty ISOJAX_CACHE keeps nothing.
+
+    Returns:
+        The folder; None where nothing is kept, or where it cannot be written.
+    """
+    import jax
+
+    usual = jax.config.values["jax_compilation_cache_dir"] or str(_user_cache())
+    chosen = os.environ.get("ISOJAX_CACHE", usual)
+    if not chosen:
+        return None
+    folder = Path(chosen)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    if not os.access(folder, os.W_OK):
+        return None
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", _WORTH_KEEPING)
+    return folder
+
+
+def _user_cache() -> Path:
+    """Give the folder in which this system keeps what a program can make again."""
+    home = Path(os.path.expanduser("~"))
+    if sys.platform == "win32":
+        root = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        root = home / "Library" / "Caches"
+    else:
+        root = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return root / "isojax"

@@ -31,7 +31,8 @@ def find_families(probes: tuple[AbstractElement, ...]) -> tuple[ElementFamily, .
     families = []
     for places in groups.values():
         members = [probes[place] for place in places]
-        stacked = jax.tree_util.tree_map(lambda *leaves: jnp.stack(leaves), *members)
+        # By NumPy: JAX would compile a program for each number of members.
+        stacked = jax.tree_util.tree_map(lambda *leaves: jnp.asarray(np.stack(leaves)), *members)
         families.append(ElementFamily(stacked, tuple(places)))
     return tuple(families)
 
@@ -59,7 +60,7 @@ def stack_states(
     """
     ends = np.cumsum([0, *(probe.internal_states for probe in probes)])
     return tuple(
-        jnp.stack([rows[ends[place] + state] for place in family.places])
+        jnp.asarray(np.stack([rows[ends[place] + state] for place in family.places]))
         for family in families
         for state in range(family.elements.internal_states)
     )

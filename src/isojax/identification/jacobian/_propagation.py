@@ -7,7 +7,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...models import Ringing, add_ringing
 from ._slopes import Change, cubic_middle
 
 Matrix = list[list[Array]]
@@ -115,7 +114,7 @@ def respond(
         propagation: what each sample does to them.
         readings: what a unit of each state does to the reading.
         forcing: rates of the states but the first that push them; between samples they follow cubics.
-        kicks: what else each sample adds to the states and to the readings at its ends.
+        kicks: what else each sample adds to the states and to the readings at its ends, if anything.
         direct: what the columns do to the reading at once.
         starts: where they begin.
         weight: of each reading.
@@ -123,36 +122,28 @@ def respond(
     Returns:
         What the weighted reading does.
     """
-    size = starts.shape[0]
-    beside = [around(row) for row in forcing]
-    stages = (
-        (propagation.by_start, [four[1] for four in beside]),
-        (propagation.by_middle, [cubic_middle(*four) for four in beside]),
-        (propagation.by_end, [four[2] for four in beside]),
-    )
-    pushed = [
-        sum(
-            (by[row][place + 1][:, None] * rate for by, rates in stages for place, rate in enumerate(rates)),
-            start=jnp.zeros(()) if kicks is None else kicks[row],
-        )
-        for row in range(len(propagation.forward))
-    ]
+    size, last = starts.shape[0], forcing.shape[1] - 1
+    splits = len(propagation.forward) > size
 
-    def body(d: tuple[Array, ...], table: tuple[Matrix, list[Array]]) -> tuple[tuple, tuple[Array, ...]]:
-        f, g = table
-        moved = tuple(
-            sum((f[row][column][None] * d[column] for column in range(size)), start=g[row])
-            for row in range(size)
-        )
-        return moved, d
+    def body(carry: tuple, table: tuple) -> tuple[tuple, Float[Array, "column lanes"]]:
+        d, (before, now, ahead), pending = carry
+        place, by, seen, at_once, weigh = table
+        # All in one pass: tables of what pushes each sample would cost more than the pushing.
+        after = jax.lax.dynamic_index_in_dim(forcing, jnp.minimum(place + 2, last), 1, keepdims=False)
+        kick = None if kicks is None else jax.lax.dynamic_index_in_dim(kicks, place, 1, keepdims=False)
+        pushes = ((by[1], now), (by[2], cubic_middle(before, now, ahead, after)), (by[3], ahead))
+        moved = []
+        for row, onward in enumerate(by[0]):
+            pushed = jnp.zeros(()) if kick is None else kick[row]
+            for matrix, rates in pushes:
+                for column, rate in enumerate(rates):
+                    pushed = pushed + matrix[row][column + 1][None] * rate
+            moved.append(sum((f[None] * one for f, one in zip(onward, d, strict=True)), start=pushed))
+        reading = sum((one * slope[None] for one, slope in zip(d, seen, strict=True)), start=at_once)
+        if splits:
+            reading, pending = reading + moved[size] + pending, moved[size + 1]
+        return (tuple(moved[:size]), (now, ahead, after), pending), reading * weigh[None]
 
-    start = tuple(starts[index] for index in range(size))
-    path = jax.lax.scan(body, start, (propagation.forward[:size], pushed[:size]))[1]
-    rows = sum(d * reading[:, None] for d, reading in zip(path, readings, strict=True)) + direct
-    if kicks is not None:
-        read = zip(propagation.forward[size:], pushed[size:], strict=True)
-        rows = add_ringing(
-            rows,
-            Ringing(*(sum((f[:, None] * d for f, d in zip(by, path, strict=True)), g) for by, g in read)),
-        )
-    return rows * weight[:, None]
+    window = forcing[:, 0], forcing[:, 0], forcing[:, 1]
+    tables = jnp.arange(last + 1), propagation, readings, direct, weight
+    return jax.lax.scan(body, (tuple(starts), window, jnp.zeros_like(starts[0])), tables)[1]

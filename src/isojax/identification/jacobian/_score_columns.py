@@ -33,8 +33,9 @@ from ._whitening import whitened_products
 _ENTRIES = 2e7
 """Numbers that one table of columns along the motion may hold."""
 
-_LEAST_COLUMNS = 120
-"""Columns for which a table has room at least: few columns then share the compiled code of many."""
+_LEAST_COLUMNS = 160
+"""Columns for which a table has room at least: absent effects and free force laws, however many, then share
+compiled code."""
 
 _TOGETHER = 24
 """Columns that one linear solve carries: the last one is filled up, so that all have one shape."""
@@ -241,7 +242,8 @@ class _Group:
         self.readings = tuple(entry.reading for entry in by_state)
         size, (time, lanes) = len(by_state), weight.shape
         self.forcing = np.zeros((size - 1, time, _TOGETHER, lanes))
-        self.kicks = None if exact is None else np.zeros((size + 2, time, _TOGETHER, lanes))
+        self.kicks: np.ndarray | None = None
+        self.kick_shape = (size + 2, time, _TOGETHER, lanes)
         self.direct = np.zeros((time, _TOGETHER, lanes))
         self.starts = np.zeros((size, _TOGETHER, lanes))
         self.columns: list[int] = []
@@ -261,7 +263,9 @@ class _Group:
         """Put a column that is pushed along the motion."""
         place = len(self.columns)
         self.forcing[:, :, place], self.direct[:, place], self.starts[:, place] = forcing, direct, 0.0
-        if self.kicks is not None:
+        if np.ndim(kick):
+            # Coefficients of a law that jumps: of one group at most, so that the others carry no such table.
+            self.kicks = np.zeros(self.kick_shape) if self.kicks is None else self.kicks
             self.kicks[:, :, place] = kick
         self.columns.append(column)
 
@@ -278,4 +282,4 @@ class _Group:
             rows = respond(self.propagation, self.readings, forcing, kicks, direct, starts, self.weight)
             # Turned here, and not in compiled code, which takes four times as long.
             table[:, self.columns] = np.asarray(rows).transpose(2, 1, 0)[:, : len(self.columns)]
-        self.columns = []
+        self.columns, self.kicks = [], None

@@ -18,6 +18,9 @@ from ._propagation import Matrix, Propagation, product
 from ._slopes import steps_of
 from ._unknowns import scaled_model
 
+_AT_ONCE = 32
+"""Steps that are differentiated side by side: their derivatives stay in the processor's cache."""
+
 
 class Transitions(NamedTuple):
     """What each sample adds to the state at its end, then to the readings at its start and its end.
@@ -58,33 +61,15 @@ def transitions_along(
         The derivatives.
     """
     values = tuple(entry.value for entry in list_parameters(model))
-    size, like = len(path), path[0]
-    scale = jnp.broadcast_to(scale, like.shape)
-    time = acting.drive.shape[0]
-    steps = like.shape[0] // time
-    step_of_sample = jnp.tile(jnp.arange(steps), time)[:, None]
+    size, (nodes, lanes), time = len(path), path[0].shape, acting.drive.shape[0]
+    steps = nodes // time
     step_time = sample_time / steps
-    acting = jax.tree_util.tree_map(steps_of, acting)
-    stages = tuple(acting.pick(np.s_[:, stage]) for stage in range(3))
-
-    def step(moved: tuple[Array, ...], scale: Array, state: State, push: Array) -> Array:
-        numbers = list(values)
-        for place, number in zip(moving, moved, strict=True):
-            numbers[place] = number
-        current = scaled_model(model, numbers, scale)
-        pushes = tuple(
-            (jnp.zeros_like(like), *(push[stage, row] + 0.0 * like for row in range(size - 1)))
-            for stage in range(3)
-        )
-        pushed = Step(step_time, tuple(current.with_delay_slope(at) for at in stages), pushes)
-        ahead, jump = split_step(current, quantity, state, pushed)
-        return jnp.stack([*ahead, *find_ringing(jump, step_of_sample, steps)])
-
     known = tuple(values[place] for place in moving)
+    still = jnp.zeros((_AT_ONCE, lanes))
     nothing = (
         tuple(jnp.zeros(()) for _ in moving),
-        jnp.zeros_like(scale),
-        tuple(jnp.zeros_like(state) for state in path),
+        still,
+        tuple(still for _ in path),
         jnp.zeros((3, size - 1)),
     )
     seeds = []
@@ -94,14 +79,36 @@ def transitions_along(
         seeds += [(*nothing[:3], nothing[3].at[stage, row].set(1.0)) for row in range(size - 1)]
     for place in range(len(moving)):
         seeds.append((tuple(s + (i == place) for i, s in enumerate(nothing[0])), *nothing[1:]))
-    seeds.append((nothing[0], jnp.ones_like(scale), *nothing[2:]))
+    seeds.append((nothing[0], still + 1.0, *nothing[2:]))
+    stacked = jax.tree_util.tree_map(lambda *each: jnp.stack(each), *seeds)
 
-    def along(seed: tuple) -> Array:
-        return jax.jvp(step, (known, scale, path, nothing[3]), seed)[1]
+    def differentiate(piece: tuple[State, Instant, Array]) -> Array:
+        path, acting, step_of_sample = piece
+        stages = tuple(acting.pick(np.s_[:, stage]) for stage in range(3))
 
-    # One derivative after the other: side by side they would hold as many copies of the path.
-    found = jnp.moveaxis(jax.lax.map(along, jax.tree_util.tree_map(lambda *s: jnp.stack(s), *seeds)), 0, 1)
-    found = found.reshape(size + 2, len(seeds), -1, steps, like.shape[1])
+        def step(moved: tuple[Array, ...], scale: Array, state: State, push: Array) -> Array:
+            numbers = list(values)
+            for place, number in zip(moving, moved, strict=True):
+                numbers[place] = number
+            current = scaled_model(model, numbers, scale)
+            pushes = tuple(
+                (still, *(push[stage, row] + still for row in range(size - 1))) for stage in range(3)
+            )
+            pushed = Step(step_time, tuple(current.with_delay_slope(at) for at in stages), pushes)
+            ahead, jump = split_step(current, quantity, state, pushed)
+            return jnp.stack([*ahead, *find_ringing(jump, step_of_sample, steps)])
+
+        here = known, jnp.broadcast_to(scale, still.shape), path, nothing[3]
+        return jax.vmap(lambda seed: jax.jvp(step, here, seed)[1])(stacked)
+
+    def in_pieces(table: Array) -> Array:
+        padded = jnp.concatenate([table, table[-1:].repeat(-nodes % _AT_ONCE, axis=0)])
+        return padded.reshape(-1, _AT_ONCE, *table.shape[1:])
+
+    tables = path, jax.tree_util.tree_map(steps_of, acting), jnp.tile(jnp.arange(steps), time)[:, None]
+    found = jax.lax.map(differentiate, jax.tree_util.tree_map(in_pieces, tables))
+    found = found.transpose(2, 1, 0, 3, 4).reshape(size + 2, len(seeds), -1, lanes)[:, :, :nodes]
+    found = found.reshape(size + 2, len(seeds), -1, steps, lanes)
     return _over_samples([found[:, :, :, step] for step in range(steps)], size)
 
 
