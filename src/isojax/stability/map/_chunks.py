@@ -60,7 +60,7 @@ def run_chunks(
     lanes = min(chunk, max(1 << max(total - 1, 0).bit_length(), FEWEST))
     begins = list(range(0, total, lanes))
     states = 2 + solver.model.internal_states
-    kinks = solver.surface.tables.shape[0] - states - 1
+    kinks = solver.surface.polynomials.shape[2] - states - 3
     processes, own = jax.process_count(), jax.process_index()
     paths = [None if folder is None else folder / f"{name}-{place:05d}.npz" for place in range(len(begins))]
     kept = [path is not None and path.exists() for path in paths]

@@ -22,12 +22,11 @@ from ._batched_newton import (
     NOT_CONVERGED,
     NOT_FINITE,
     Found,
-    Lane,
-    MapMethod,
     cell_solvers,
     states_at_zero,
 )
 from ._chunks import claim_folder, fingerprint, run_chunks
+from ._map_method import Lane, MapMethod
 from ._map_error import sampled_error, steps_needed
 from ._starts import Candidates, find_candidates
 from ._surface import MapWindow, Surface, find_surface

@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..orbit import Sine
-from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, Lane, padded
+from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
+from ._map_method import Lane
 from ._starts import Candidates
 from ._surface import MapWindow
 
