@@ -120,6 +120,11 @@ class CellSolver(eqx.Module):
     surface: PlacedSurface
     sharding: NamedSharding = eqx.field(static=True)
 
+    @property
+    def states(self) -> int:
+        """Count of states of the model."""
+        return 2 + self.model.internal_states
+
     def __call__(self, candidates: Candidates, size: int, limit: float | None = None) -> Found:
         """Find the orbits of candidates.
 

@@ -11,13 +11,10 @@ from ..orbit import Sine
 from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
 from ._map_method import Lane
 from ._starts import Candidates
-from ._surface import MapWindow
+from ._surface import LEAST_SLOPE, MapWindow
 
 _STEPS_MARGIN = 1.03
 """On the steps of a map that a sample of its orbits needs: the worst cell is seldom in the sample."""
-
-_LEAST_SLOPE = 0.1
-"""Smallest slope of the characteristic polynomial that an error of a multiplier is divided by."""
 
 _DOUBLINGS = 3
 """Trials with twice the steps where some orbits were not found."""
@@ -53,7 +50,7 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]
-    ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), _LEAST_SLOPE)
+    ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), LEAST_SLOPE)
     return float(np.nanmax(nearest * ratio))
 
 
@@ -76,7 +73,21 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
     error = sampled_error(solver, some, found, window)
     if not error > 0.0:
         return integrator.steps_per_period
-    times = _STEPS_MARGIN * (error / integrator.map_error) ** 0.25
+    return steps_for(taken, error, integrator.map_error)
+
+
+def steps_for(taken: int, error: float, goal: float) -> int:
+    """Give the steps a period with which an error becomes another, which falls with the fourth power.
+
+    Args:
+        taken: steps a period of the error.
+        error: of a sample of multipliers.
+        goal: the error wanted.
+
+    Returns:
+        Steps, an even number.
+    """
+    times = _STEPS_MARGIN * (error / goal) ** 0.25
     return 2 * math.ceil(0.5 * taken * min(max(times, 0.5), 128.0))
 
 

@@ -26,6 +26,11 @@ class SurfaceReader(eqx.Module):
     surface: PlacedSurface
     sharding: NamedSharding = eqx.field(static=True)
 
+    @property
+    def states(self) -> int:
+        """Count of states of the model."""
+        return 2
+
     def __call__(self, candidates: Candidates, size: int) -> Found:
         """Read the orbits of candidates.
 

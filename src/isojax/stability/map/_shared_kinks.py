@@ -11,7 +11,7 @@ from ..orbit import Crossings
 _EDGE = 1e-4
 """Share of the motion at either end within which a kink counts as lying at the end."""
 
-AROUND = (2, 4)
+AROUND = (1, 2)
 """Nodes in frequency and displacement around an odd one, to which interpolation carries its difference."""
 
 

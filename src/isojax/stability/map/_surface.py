@@ -25,15 +25,21 @@ from ._spline import spline_matrix, spline_pieces
 _FIRST_NODES = (49, 17)
 """Displacement amplitudes and frequencies of the first grid; each further one halves the distances."""
 
-LEVELS = 3
+LEVELS = 2
 """Times at most that the distances of the nodes are halved."""
+
+_FEW = 0.01
+"""Share of the nodes whose orbits may be left to Newton's method."""
+
+_ROOM = 2
+"""Nodes of the first grid beyond the largest displacement that is held."""
 
 PARTS = 8
 """Parts of a spline's piece between whose ends roots are sought."""
 
-_GAIN = 16.0
-"""How many times smaller the error of a spline is at least than of one with nodes twice as far apart: where
-the function is smooth, 64 times."""
+_GAIN = 64.0
+"""How many times smaller the error of a spline of degree five is than with nodes twice as far apart, where the
+function is smooth; a sample of cells then says whether it is."""
 
 LEAST_SLOPE = 0.1
 """Smallest slope of the characteristic polynomial that an error of a multiplier is divided by: where two
@@ -163,12 +169,13 @@ def find_surface(
     unknown, response = _filled(np.concatenate(known)), starts.response.reshape(1, *shape)
     tables = np.concatenate([unknown, np.zeros((2, *shape)), _filled(response)])
     grid = _closed_grid(model, method, rest, _Grid(logarithms, band, tables, np.zeros(shape)), kinks.shared)
+    ends = _ends_needed(grid, window)
     for level in range(1, 1 + LEVELS):
         finer = _axes(ends, window.frequencies, level)
         between = _Grid(*finer, grid.at(*finer), np.zeros((len(finer[1]), len(finer[0]))))
         own = kinks.shared[np.ix_(*(_place(*axes) for axes in ((band, finer[1]), (logarithms, finer[0]))))]
         grid = _closed_grid(model, method, rest, between, own)
-        if not _worth_doubling(grid, window, goal):
+        if not _needs_doubling(grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
     tables = grid.tables.copy()
@@ -197,6 +204,14 @@ def _axes(ends: tuple[float, float], frequencies: np.ndarray, level: int) -> tup
     # Denser at the ends, where a spline has fewest neighbours.
     middle, reach = 0.5 * (frequencies[0] + frequencies[-1]), 0.5 * (frequencies[-1] - frequencies[0])
     return np.linspace(*ends, displacements), middle - reach * np.cos(np.pi * np.arange(columns) / (columns - 1))
+
+
+def _ends_needed(grid: _Grid, window: MapWindow) -> tuple[float, float]:
+    """Give the least and largest logarithm of the displacements that the forces hold, with some room."""
+    force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
+    held = np.flatnonzero((force <= window.amplitudes[-1]).any(axis=0))
+    last = min(int(held.max(initial=0)) + _ROOM, len(grid.logarithms) - 1)
+    return float(grid.logarithms[0]), float(grid.logarithms[last])
 
 
 def _place(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -243,13 +258,11 @@ def _reading_error(read: _Grid, tables: np.ndarray, half: bool) -> Float[np.ndar
     return np.where(np.isfinite(worst), worst, np.inf)
 
 
-def _worth_doubling(grid: _Grid, window: MapWindow, goal: float) -> bool:
-    """Say whether half the distance of nodes costs less than the orbits that cannot be read off."""
+def _needs_doubling(grid: _Grid, window: MapWindow, goal: float) -> bool:
+    """Say whether more of the orbits that are asked for than a few cannot be read off."""
     force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
     asked = (force >= window.amplitudes[0]) & (force <= window.amplitudes[-1])
-    cells = len(window.amplitudes) * len(window.frequencies)
-    late = cells * np.mean(grid.error[asked] > goal) if asked.any() else 0.0
-    return bool(late > 4 * grid.error.size)
+    return bool(asked.any() and np.mean(grid.error[asked] > goal) > _FEW)
 
 
 def _filled(tables: Float[np.ndarray, "table frequency displacement"]) -> np.ndarray:
