@@ -14,7 +14,15 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._cores import usable_cores
 from ..._types import Lanes
 from ...models import Integrator, Isolator
-from ..orbit import Crossings, Sine, find_crossings, imposed_balance, period_map, trajectory
+from ..orbit import (
+    Crossings,
+    Sine,
+    find_crossings,
+    imposed_balance,
+    period_map,
+    trajectory,
+    value_and_jacobian,
+)
 from ._map_method import Lane, MapMethod
 
 _START_STEPS = 6
@@ -23,8 +31,11 @@ _START_STEPS = 6
 _CLOSING_STEPS = 6
 """Steps of Newton's method at most from orbits that were read off a coarser grid."""
 
-_CLOSED_TO = 1e-8
-"""Last relative step at which the orbit of a node, and with it its multipliers, counts as exact."""
+_NEARLY_CLOSED = 1e-4
+"""Relative step of Newton's method after which one more, whose size is its square, is the last."""
+
+_CLOSED_TO = 1e-7
+"""Last relative step before which the multipliers of a node count as exact."""
 
 _START_CLOSED_TO = 1e-6
 """What a start may leave open, over its size; where it leaves more, the one-harmonic balance is kept."""
@@ -32,7 +43,7 @@ _START_CLOSED_TO = 1e-6
 _CROSSINGS = 16
 """Kinks an orbit to make room for."""
 
-_BLOCK = 1024
+_BLOCK = 544
 """Nodes solved at once: one compiled batch serves grids of any size, and each core runs its own."""
 
 
@@ -132,7 +143,8 @@ def _starts(
         start = jnp.concatenate([jnp.stack([guess.sine, guess.cosine]) / push, internal / inner])
 
         def improve(_: Array | int, unknown: Array) -> Array:
-            step = jnp.linalg.solve(jax.jacfwd(gap)(unknown), gap(unknown))
+            left, slope = value_and_jacobian(gap, unknown)
+            step = jnp.linalg.solve(slope, left)
             # Far from the balance of one harmonic a full step may leave the basin.
             return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
 
@@ -194,32 +206,39 @@ def _closed(
 ) -> tuple[Array, Array, Array]:
     states = 2 + model.internal_states
 
-    def newton(a: Array, f: Array, scale: Array, unknown: Array) -> tuple[Array, Array, Array]:
-        """Give the step of Newton's method, its size, and the invariants of the map before it."""
-        sizes = jnp.concatenate([jnp.stack([a, a * 2.0 * math.pi * f]), a * scale[2:states]])
+    def sizes(a: Array, f: Array, scale: Array) -> Array:
+        return jnp.concatenate([jnp.stack([a, a * 2.0 * math.pi * f]), a * scale[2:states]])
 
-        def image(own: Array, shift: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-            real = own * scale
-            state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), a * real[2:states]]) + shift * sizes
-            drive = Sine(a * real[0], a * real[1], f)
-            lane = Lane(tuple(state), drive, tuple(real[states:]), a)
-            moved, reached = method.moved_past(model, lane, kinks)
-            open_end = (jnp.stack(moved) - state) / sizes
-            return (open_end, reached), (open_end, reached)
+    def left(a: Array, f: Array, scale: Array, unknown: Array, shift: Array) -> Array:
+        real = unknown * scale
+        state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), a * real[2:states]])
+        state = state + shift * sizes(a, f, scale)
+        drive = Sine(a * real[0], a * real[1], f)
+        moved, reached = method.moved_past(model, Lane(tuple(state), drive, tuple(real[states:]), a), kinks)
+        return jnp.concatenate([(jnp.stack(moved) - state) / sizes(a, f, scale), reached])
 
-        still = jnp.zeros(states)
-        slopes, (open_end, reached) = jax.jacfwd(image, argnums=(0, 1), has_aux=True)(unknown, still)
-        (upper, by_state), (lower, kinks_by_state) = slopes
-        left = jnp.concatenate([open_end, reached])
-        step = jnp.linalg.solve(jnp.concatenate([upper, lower]), left)
-        matrix = by_state + jnp.eye(states)
-        if reached.size:
-            # The instants of the kinks follow the disturbance.
-            follow = jnp.linalg.solve(lower[:, states:], kinks_by_state)
-            matrix = matrix - upper[:, states:] @ follow
+    def newton(a: Array, f: Array, scale: Array, unknown: Array) -> tuple[Array, Array]:
+        """Give the step of Newton's method and its size."""
+        gap, slope = value_and_jacobian(lambda own: left(a, f, scale, own, jnp.zeros(states)), unknown)
+        step = jnp.linalg.solve(slope, gap)
         size = jnp.max(jnp.abs(step))
-        half_trace = 0.5 * jnp.trace(matrix)
-        return step * jnp.minimum(1.0, 0.3 / size), size, jnp.stack([half_trace, jnp.linalg.det(matrix)])
+        return step * jnp.minimum(1.0, 0.3 / size), size
+
+    def last(a: Array, f: Array, scale: Array, unknown: Array) -> tuple[Array, Array, Array]:
+        """Give the last step, its size, and half the trace and the determinant of the map's derivative."""
+        count = unknown.size
+
+        def whole(own: Array) -> Array:
+            return left(a, f, scale, own[:count], own[count:])
+
+        gap, slope = value_and_jacobian(whole, jnp.concatenate([unknown, jnp.zeros(states)]))
+        step = jnp.linalg.solve(slope[:, :count], gap)
+        matrix = slope[:states, count:] + jnp.eye(states)
+        if count > states:
+            # The instants of the kinks follow the disturbance.
+            follow = jnp.linalg.solve(slope[states:, states:count], slope[states:, count:])
+            matrix = matrix - slope[:states, states:count] @ follow
+        return step, jnp.max(jnp.abs(step)), jnp.stack([0.5 * jnp.trace(matrix), jnp.linalg.det(matrix)])
 
     def scaled(begin: Array) -> Array:
         push = jnp.full(2, jnp.hypot(begin[0], begin[1]))
@@ -228,15 +247,16 @@ def _closed(
 
     scale = jax.vmap(scaled)(start)
 
-    def body(carry: tuple[Array, ...]) -> tuple[Array, ...]:
-        unknown, _, _, count = carry
-        step, size, invariants = jax.vmap(newton)(amplitude, frequency, scale, unknown)
-        return unknown - step, size, invariants, count + 1
+    def body(carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        unknown, _, count = carry
+        step, size = jax.vmap(newton)(amplitude, frequency, scale, unknown)
+        return unknown - step, size, count + 1
 
-    def unfinished(carry: tuple[Array, ...]) -> Array:
-        _, size, _, count = carry
-        return jnp.any((size > _CLOSED_TO) & jnp.isfinite(size)) & (count < _CLOSING_STEPS)
+    def unfinished(carry: tuple[Array, Array, Array]) -> Array:
+        _, size, count = carry
+        return jnp.any((size > _NEARLY_CLOSED) & jnp.isfinite(size)) & (count < _CLOSING_STEPS)
 
-    begin = (start / scale, jnp.full(amplitude.shape, 1.0), jnp.zeros((amplitude.size, 2)), jnp.asarray(0))
-    unknown, size, invariants, _ = jax.lax.while_loop(unfinished, body, begin)
-    return unknown * scale, invariants, size <= _CLOSED_TO
+    begin = (start / scale, jnp.full(amplitude.shape, 1.0), jnp.asarray(0))
+    unknown, _, _ = jax.lax.while_loop(unfinished, body, begin)
+    step, size, invariants = jax.vmap(last)(amplitude, frequency, scale, unknown)
+    return (unknown - step) * scale, invariants, size <= _CLOSED_TO

@@ -14,6 +14,10 @@ from ._starts import Candidates, find_candidates
 from ._surface import MapWindow, Surface, find_surface
 
 
+_POOL = 1 << 15
+"""Orbits among which those of a sample are chosen."""
+
+
 class Group(NamedTuple):
     """Orbits that are found in the same way.
 
@@ -87,7 +91,7 @@ def seek(
         error = sampled_error(split, some, by_reading, window)
         if error > integrator.map_error:
             own = sampled_error(split, some, split(some, SAMPLED), window)
-            if not error <= own:
+            if not error <= 2.0 * own:
                 read, error = np.zeros_like(read), math.nan
     shared = surface.shared[candidates.frequency, candidates.part]
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
@@ -97,6 +101,9 @@ def seek(
 
 def _sample(surface: Surface, candidates: Candidates, known: np.ndarray) -> np.ndarray:
     """Give places of a sample: by the largest expected error, next to folds, and evenly."""
+    # Of a long list, one in so many; but all where orbits coexist.
+    thinned = np.arange(0, known.size, max(1, known.size // _POOL))
+    known = np.union1d(known[thinned], known[candidates.order[known] > 0])
     column, part = candidates.frequency[known], candidates.part[known]
     count = min(SAMPLED // 3, known.size)
     ends = surface.force[column, part], surface.force[column, part + 1]

@@ -26,8 +26,8 @@ class Pieces(NamedTuple):
     to_powers: Float[np.ndarray, "piece power basis"]
 
     def polynomials(
-        self, basis: Float[np.ndarray, "... node"]
-    ) -> Float[np.ndarray, "... piece power"]:
+        self, basis: Float[np.ndarray, "frequency table node"]
+    ) -> Float[np.ndarray, "frequency piece table power"]:
         """Give the polynomials of splines.
 
         Args:
@@ -36,10 +36,11 @@ class Pieces(NamedTuple):
         Returns:
             Coefficients of the powers on each piece.
         """
-        shape = basis.shape[:-1]
-        local = np.lib.stride_tricks.sliding_window_view(basis.reshape(-1, basis.shape[-1]), DEGREE + 1, axis=1)
-        powers = np.matmul(np.ascontiguousarray(local.transpose(1, 0, 2)), self.to_powers.transpose(0, 2, 1))
-        return powers.transpose(1, 0, 2).reshape(*shape, *self.to_powers.shape[:2])
+        frequencies, tables, _ = basis.shape
+        local = np.lib.stride_tricks.sliding_window_view(basis, DEGREE + 1, axis=2)
+        by_piece = np.ascontiguousarray(local.transpose(2, 0, 1, 3)).reshape(-1, frequencies * tables, DEGREE + 1)
+        powers = by_piece @ np.ascontiguousarray(self.to_powers.transpose(0, 2, 1))
+        return np.ascontiguousarray(powers.reshape(-1, frequencies, tables, DEGREE + 1).swapaxes(0, 1))
 
 
 def spline_pieces(nodes: Float[np.ndarray, " node"]) -> Pieces:

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -79,21 +80,31 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexi
     first = np.maximum.accumulate(np.where(np.r_[True, column[1:] != column[:-1]][: column.size], np.arange(up.size), 0))
     runs = np.cumsum(new)
     run = runs - runs[first] if up.size else runs
+    part = part.astype(np.int32)
     low = np.minimum(rank[column, part], rank[column, part + 1])
-    cells = np.full((int(run.max(initial=0)) + 1, len(forces), len(surface.frequencies)), -1, np.int32)
-    counts = np.zeros(cells.shape[1:], np.int8)
-    for place in range(cells.shape[0]):
+    shape = len(forces), len(surface.frequencies)
+    counts = np.zeros(shape[0] * shape[1], np.int8)
+    cells: list[np.ndarray] = []
+    for place in range(int(run.max(initial=0)) + 1):
         own = run == place
         passed = np.abs(risen[own])
         begins = np.cumsum(passed) - passed
-        force = np.repeat(low[own] - begins, passed) + np.arange(passed.sum())
-        cell = np.ravel_multi_index((force, np.repeat(column[own], passed)), counts.shape)
-        order = counts.ravel()[cell]
-        cells.reshape(cells.shape[0], -1)[order, cell] = np.repeat(part[own], passed)
-        counts.ravel()[cell] += 1
-    cells = cells[: int(counts.max(initial=0)) if coexisting else 1]
-    order, force, frequency = (places.astype(np.int32) for places in np.nonzero(cells >= 0))
-    return Candidates(force, frequency, cells[order, force, frequency], order)
+        cell = np.repeat((low[own] - begins) * shape[1] + column[own], passed)
+        cell += np.arange(0, cell.size * shape[1], shape[1])
+        order = counts[cell]
+        for count in range(int(order.max(initial=-1)) + 1):
+            if count == len(cells):
+                cells.append(np.full(counts.size, -1, np.int32))
+            which = order == count
+            cells[count][cell[which]] = np.repeat(part[own], passed)[which]
+        counts[cell] += 1
+    held = cells if coexisting else cells[:1]
+    lists = []
+    for order, parts in enumerate(held):
+        cell = np.flatnonzero(parts >= 0)
+        force, column = (places.astype(np.int32) for places in np.divmod(cell, shape[1]))
+        lists.append(Candidates(force, column, parts[cell], np.full(cell.size, order, np.int32)))
+    return Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
 
 
 def read_surface(
@@ -116,13 +127,22 @@ def read_surface(
         What the surface says of them.
     """
     _, pieces, tables, powers = surface.polynomials.shape
+    # Unsigned, and promised to exist: the wrapping of negative places costs more than the reading.
+    force, column, part = (jnp.asarray(places, jnp.uint32) for places in (force, column, part))
     piece, share = part // PARTS, (part % PARTS) / PARTS
-    base = (column * pieces + piece) * tables * powers
+    base = (column * pieces + piece) * (tables * powers)
     flat = surface.polynomials.ravel()
-    push = surface.amplitudes[force]
+
+    def at_place(values: Array, place: Array) -> Array:
+        return values.at[place].get(mode="promise_in_bounds")
 
     def polynomial(table: int) -> list[Array]:
-        return [flat[base + (table * powers + power)] for power in range(powers)]
+        return [at_place(flat, base + (table * powers + power)) for power in range(powers)]
+
+    push, begin, end = at_place(surface.amplitudes, force), *(at_place(surface.breaks, piece + k) for k in (0, 1))
+    own = [polynomial(table) for table in range(tables)]
+    # Gathered apart from what follows, which then runs in vector registers.
+    own, push, begin, end, share = jax.lax.optimization_barrier((own, push, begin, end, share))
 
     def value(own: list[Array], at: Array) -> Array:
         total = own[-1]
@@ -136,7 +156,7 @@ def read_surface(
             total = total * at + power * own[power]
         return total
 
-    drive = polynomial(0), polynomial(1)
+    drive = own[:2]
 
     def square(at: Array) -> Array:
         return value(drive[0], at) ** 2 + value(drive[1], at) ** 2
@@ -150,15 +170,15 @@ def read_surface(
     passed = jnp.where(same, -2.0 * left, root - rise) / jnp.where(over == 0.0, 1.0, over)
     at = share + jnp.clip(passed, 0.0, 1.0) / PARTS
     for _ in range(_POLISHING):
-        parts = [(value(own, at), slope(own, at)) for own in drive]
+        parts = [(value(one, at), slope(one, at)) for one in drive]
         steep = 2.0 * (parts[0][0] * parts[0][1] + parts[1][0] * parts[1][1])
         gap = parts[0][0] ** 2 + parts[1][0] ** 2 - push * push
         at = jnp.clip(at - gap / jnp.where(steep == 0.0, 1.0, steep), share, share + 1.0 / PARTS)
-    size = jnp.exp(surface.breaks[piece] + at * (surface.breaks[piece + 1] - surface.breaks[piece]))
-    sine, cosine = (value(own, at) for own in drive)
-    internal = tuple(value(polynomial(table), at) * size for table in range(2, states))
-    phases = tuple(value(polynomial(table), at) for table in range(states, tables - 3))
-    half_trace, determinant, response = (value(polynomial(tables - k), at) for k in (3, 2, 1))
+    size = jnp.exp(begin + at * (end - begin))
+    sine, cosine = (value(one, at) for one in drive)
+    internal = tuple(value(own[table], at) * size for table in range(2, states))
+    phases = tuple(value(own[table], at) for table in range(states, tables - 3))
+    half_trace, determinant, response = (value(own[tables - k], at) for k in (3, 2, 1))
     # There the velocity is zero, and the displacement is what the surface counts by.
     here = (surface.rest + size, 0.0 * size, *internal)
     return Reading(here, (sine / push, cosine / push), phases, (half_trace, determinant), response * size)

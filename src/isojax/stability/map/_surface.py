@@ -19,7 +19,7 @@ from ...models import Integrator, Isolator
 from ..orbit import response_amplitudes, rest_displacement
 from ._map_method import MapMethod
 from ._nodes import closed_nodes, node_starts
-from ._shared_kinks import AROUND, shared_kinks
+from ._shared_kinks import AROUND, SharedKinks, shared_kinks
 from ._spline import spline_matrix, spline_pieces
 
 _FIRST_NODES = (49, 17)
@@ -158,42 +158,55 @@ def find_surface(
     """
     rest, low, high = _displacements(model, window)
     ends = math.log(low), math.log(high)
-    logarithms, band = _axes(ends, window.frequencies, 0)
-    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
-    starts = node_starts(model, integrator, half, rest, amplitude, frequency)
-    shape = len(band), len(logarithms)
-    kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
+    start, kinks = _start_grid(model, integrator, half, rest, ends, window.frequencies)
     steps = jnp.asarray(integrator.steps_a_period(model))
     method = MapMethod(integrator, half, jnp.asarray(kinks.sides), steps)
-    known = [starts.unknown.T.reshape(-1, *shape), np.moveaxis(kinks.phases, -1, 0)]
-    unknown, response = _filled(np.concatenate(known)), starts.response.reshape(1, *shape)
-    tables = np.concatenate([unknown, np.zeros((2, *shape)), _filled(response)])
-    grid = _closed_grid(model, method, rest, _Grid(logarithms, band, tables, np.zeros(shape)), kinks.shared)
-    ends = _ends_needed(grid, window)
+    ends, grid = _ends_needed(start, window), start
     for level in range(1, 1 + LEVELS):
-        finer = _axes(ends, window.frequencies, level)
-        between = _Grid(*finer, grid.at(*finer), np.zeros((len(finer[1]), len(finer[0]))))
-        own = kinks.shared[np.ix_(*(_place(*axes) for axes in ((band, finer[1]), (logarithms, finer[0]))))]
-        grid = _closed_grid(model, method, rest, between, own)
+        nodes = _axes(ends, window.frequencies, level)
+        own = kinks.shared[np.ix_(_place(start.frequencies, nodes[1]), _place(start.logarithms, nodes[0]))]
+        grid = _closed_grid(model, method, rest, grid, nodes, own)
         if not _needs_doubling(grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
     tables = grid.tables.copy()
     tables[:2] *= np.exp(grid.logarithms)
-    basis = np.tensordot(spline_matrix(grid.frequencies, window.frequencies), tables @ pieces.to_basis.T, (1, 1))
-    polynomials = np.moveaxis(pieces.polynomials(basis), 1, 2)
-    shares = np.arange(PARTS)[:, None] / PARTS
-    drive = polynomials[:, :, :2] @ (shares ** np.arange(polynomials.shape[-1])).T
-    inner = np.hypot(drive[:, :, 0], drive[:, :, 1]).reshape(len(window.frequencies), -1)
+    count, columns = tables.shape[0], len(window.frequencies)
+    basis = (tables @ pieces.to_basis.T).transpose(1, 0, 2).reshape(len(grid.frequencies), -1)
+    basis = spline_matrix(grid.frequencies, window.frequencies) @ basis
+    polynomials = pieces.polynomials(basis.reshape(columns, count, -1))
+    shares = (np.arange(PARTS)[:, None] / PARTS) ** np.arange(polynomials.shape[-1])
+    drive = np.moveaxis(polynomials[:, :, :2], 2, 0) @ shares.T
     last = polynomials[:, -1, :2].sum(axis=-1)
-    force = np.concatenate([inner, np.hypot(last[:, :1], last[:, 1:])], axis=1)
+    square = np.concatenate([(drive**2).sum(axis=0).reshape(columns, -1), (last**2).sum(axis=1)[:, None]], axis=1)
+    force = np.sqrt(square)
     parts = np.linspace(pieces.breaks[:-1], pieces.breaks[1:], 2 * PARTS + 1, axis=1)[:, 1::2].ravel()
-    rows = _place(band, window.frequencies)
-    shared = kinks.shared[np.ix_(rows, _place(logarithms, parts))]
+    shared = kinks.shared[np.ix_(_place(start.frequencies, window.frequencies), _place(start.logarithms, parts))]
     around = maximum_filter(grid.error, [2 * reach + 1 for reach in AROUND])
     error = around[np.ix_(_place(grid.frequencies, window.frequencies), _place(grid.logarithms, parts))]
     error = np.where(shared, error, np.inf)
     return Surface(rest, pieces.breaks, window.frequencies, polynomials, force, kinks.sides, shared, error)
+
+
+def _start_grid(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: float,
+    ends: tuple[float, float],
+    frequencies: Float[np.ndarray, " frequency"],
+) -> tuple[_Grid, SharedKinks]:
+    """Find orbits that are not split, without their invariants, and the kinks that most of them pass."""
+    logarithms, band = _axes(ends, frequencies, 0)
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
+    coarse = integrator.with_steps(2 * (integrator.steps_per_period // 4 + 2))
+    starts = node_starts(model, coarse, half, rest, amplitude, frequency)
+    shape = len(band), len(logarithms)
+    kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
+    unknown = _filled(starts.unknown.T.reshape(-1, *shape)), np.moveaxis(kinks.phases, -1, 0)
+    response = _filled(starts.response.reshape(1, *shape))
+    tables = np.concatenate([*unknown, np.zeros((2, *shape)), response])
+    return _Grid(logarithms, band, tables, np.full(shape, np.inf)), kinks
 
 
 def _axes(ends: tuple[float, float], frequencies: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray]:
@@ -220,35 +233,41 @@ def _place(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _closed_grid(
-    model: Isolator, method: MapMethod, rest: float, start: _Grid, shared: Bool[np.ndarray, "frequency node"]
+    model: Isolator,
+    method: MapMethod,
+    rest: float,
+    coarse: _Grid,
+    nodes: tuple[np.ndarray, np.ndarray],
+    shared: Bool[np.ndarray, "frequency node"],
 ) -> _Grid:
-    """Close the orbits of a grid that share the order of kinks; the others stay as they are."""
-    tables, error = start.tables.copy(), np.full(shared.shape, np.inf)
-    frequency, amplitude = np.meshgrid(start.frequencies, np.exp(start.logarithms), indexing="ij")
-    begin = start.tables[:-3, shared].T
+    """Close the orbits at other nodes that share the order of kinks; the others stay as the grid has them."""
+    tables, error = coarse.at(*nodes), np.full(shared.shape, np.inf)
     if not shared.any():
-        return start._replace(error=error)
-    found = closed_nodes(model, method, rest, amplitude[shared], frequency[shared], begin)
+        return _Grid(*nodes, tables, error)
+    frequency, amplitude = np.meshgrid(nodes[1], np.exp(nodes[0]), indexing="ij")
+    found = closed_nodes(model, method, rest, amplitude[shared], frequency[shared], tables[:-3, shared].T)
     closed = shared.copy()
     closed[shared] = found.closed
     tables[:-1, closed] = np.concatenate([found.unknown, found.invariants], axis=1)[found.closed].T
-    if not closed.any():
-        return start._replace(error=error)
-    tables[-3:-1] = np.where(closed, tables[-3:-1], np.nan)
-    tables[-3:-1] = _filled(tables[-3:-1])
-    error[closed] = _reading_error(start, tables, method.half)[closed] / _GAIN
-    return _Grid(start.logarithms, start.frequencies, tables, error)
+    tables[-3:-1] = _filled(np.where(closed, tables[-3:-1], np.nan))
+    # The frequencies of the map themselves need no spline.
+    rows = slice(None, None, 1 if len(nodes[1]) < 2 or nodes[1] is coarse.frequencies else 2)
+    half_as_many = _Grid(nodes[0][::2], nodes[1][rows], tables[:, rows, ::2], error)
+    error[closed] = _reading_error(half_as_many.at(*nodes), tables, nodes[0], method.half)[closed] / _GAIN
+    return _Grid(*nodes, tables, error)
 
 
-def _reading_error(read: _Grid, tables: np.ndarray, half: bool) -> Float[np.ndarray, "frequency displacement"]:
-    """Give the error of multipliers that are read off at the same force, to first order."""
-    force, read_force = (np.log(np.hypot(own[0], own[1])) + read.logarithms for own in (tables, read.tables))
+def _reading_error(
+    read: np.ndarray, tables: np.ndarray, logarithms: np.ndarray, half: bool
+) -> Float[np.ndarray, "frequency displacement"]:
+    """Give the error of multipliers that are read off tables at the same force, to first order."""
+    force, read_force = (np.log(np.hypot(own[0], own[1])) + logarithms for own in (tables, read))
     half_trace, determinant = tables[-3:-1]
-    slopes = [np.gradient(values, read.logarithms, axis=1) for values in (force, half_trace, determinant)]
+    slopes = [np.gradient(values, logarithms, axis=1) for values in (force, half_trace, determinant)]
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = (read_force - force) / slopes[0]
-        trace_error = read.tables[-3] - half_trace - slopes[1] * moved
-        determinant_error = read.tables[-2] - determinant - slopes[2] * moved
+        trace_error = read[-3] - half_trace - slopes[1] * moved
+        determinant_error = read[-2] - determinant - slopes[2] * moved
         spread = np.sqrt((half_trace**2 - determinant).astype(complex))
         worst = np.zeros(force.shape)
         for sign in (1.0, -1.0):
