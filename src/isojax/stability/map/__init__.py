@@ -6,8 +6,8 @@ orbit of the surface a force holds), _batched_newton (all cells at once), _chunk
 _map_error (how many steps it takes), and _map, which calls them in this order.
 """
 
-from ._map_method import Lane as Lane
-from ._map_method import MapMethod as MapMethod
 from ._batched_newton import states_at_zero as states_at_zero
 from ._map import StabilityMap as StabilityMap
 from ._map import stability_map as stability_map
+from ._map_method import Lane as Lane
+from ._map_method import MapMethod as MapMethod

@@ -25,7 +25,6 @@ from ._sought import seek
 from ._starts import Candidates
 from ._surface import MapWindow
 
-
 _READING_SHARE = 0.1
 """Of the error that a map may have, where its orbits are read off: there steps cost little."""
 
@@ -215,10 +214,12 @@ def stability_map(
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     found = parts[0] if len(parts) == 1 else Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))
     lists = [group.candidates for group in sought.groups]
-    candidates = lists[0] if len(lists) == 1 else Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
-    split = np.repeat(
-        [group.name != "whole" for group in sought.groups], [own.force.size for own in lists]
+    candidates = (
+        lists[0]
+        if len(lists) == 1
+        else Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
     )
+    split = np.repeat([group.name != "whole" for group in sought.groups], [own.force.size for own in lists])
     arrays = _gridded(candidates, found, split, len(forces), len(band), coexisting)
     code = arrays.pop("code")
     ending = _ending

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._types import Lanes
@@ -68,7 +67,7 @@ class MapMethod(eqx.Module):
         return self.moved_past(model, lane, None)[0]
 
     def moved_past(
-        self, model: Isolator, lane: Lane, kinks: Int[np.ndarray, " crossing"] | None
+        self, model: Isolator, lane: Lane, kinks: Int[Array, " crossing"] | None
     ) -> tuple[State, Float[Array, " crossing"]]:
         """Give the state as `moved` does, and the kink functions where the orbit is said to pass them.
 
@@ -86,7 +85,7 @@ class MapMethod(eqx.Module):
         steps = (self.steps + parts - 1) // parts
         crossings = Crossings(
             jnp.stack(phases) if phases else jnp.zeros(0),
-            jnp.full(pieces - 1, -1) if kinks is None else jnp.asarray(kinks),
+            jnp.full(pieces - 1, -1) if kinks is None else kinks,
             self.sides,
             jnp.array(True),
         )

@@ -113,7 +113,9 @@ def node_starts(
         The orbits; where none was found the balance.
     """
     return NodeStarts(
-        *_in_blocks(lambda a, f: _starts(model, integrator, half, jnp.asarray(rest), a, f), amplitude, frequency)
+        *_in_blocks(
+            lambda a, f: _starts(model, integrator, half, jnp.asarray(rest), a, f), amplitude, frequency
+        )
     )
 
 
@@ -243,7 +245,9 @@ def _closed(
     def scaled(begin: Array) -> Array:
         push = jnp.full(2, jnp.hypot(begin[0], begin[1]))
         inner = begin[2:states]
-        return jnp.concatenate([push, jnp.where(inner == 0.0, 1.0, jnp.abs(inner)), jnp.ones(begin.size - states)])
+        return jnp.concatenate(
+            [push, jnp.where(inner == 0.0, 1.0, jnp.abs(inner)), jnp.ones(begin.size - states)]
+        )
 
     scale = jax.vmap(scaled)(start)
 

@@ -13,7 +13,6 @@ from ._reader import SurfaceReader
 from ._starts import Candidates, find_candidates
 from ._surface import MapWindow, Surface, find_surface
 
-
 _POOL = 1 << 15
 """Orbits among which those of a sample are chosen."""
 

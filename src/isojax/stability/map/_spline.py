@@ -38,7 +38,9 @@ class Pieces(NamedTuple):
         """
         frequencies, tables, _ = basis.shape
         local = np.lib.stride_tricks.sliding_window_view(basis, DEGREE + 1, axis=2)
-        by_piece = np.ascontiguousarray(local.transpose(2, 0, 1, 3)).reshape(-1, frequencies * tables, DEGREE + 1)
+        by_piece = np.ascontiguousarray(local.transpose(2, 0, 1, 3)).reshape(
+            -1, frequencies * tables, DEGREE + 1
+        )
         powers = by_piece @ np.ascontiguousarray(self.to_powers.transpose(0, 2, 1))
         return np.ascontiguousarray(powers.reshape(-1, frequencies, tables, DEGREE + 1).swapaxes(0, 1))
 

@@ -77,7 +77,9 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexi
     up = risen > 0
     new = np.ones(up.size, bool)
     new[1:] = (up[1:] != up[:-1]) | (column[1:] != column[:-1])
-    first = np.maximum.accumulate(np.where(np.r_[True, column[1:] != column[:-1]][: column.size], np.arange(up.size), 0))
+    first = np.maximum.accumulate(
+        np.where(np.r_[True, column[1:] != column[:-1]][: column.size], np.arange(up.size), 0)
+    )
     runs = np.cumsum(new)
     run = runs - runs[first] if up.size else runs
     part = part.astype(np.int32)
@@ -91,6 +93,11 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexi
         begins = np.cumsum(passed) - passed
         cell = np.repeat((low[own] - begins) * shape[1] + column[own], passed)
         cell += np.arange(0, cell.size * shape[1], shape[1])
+        if not cells:
+            cells.append(np.full(counts.size, -1, np.int32))
+            cells[0][cell] = np.repeat(part[own], passed)
+            counts += cells[0] >= 0
+            continue
         order = counts[cell]
         for count in range(int(order.max(initial=-1)) + 1):
             if count == len(cells):
@@ -139,7 +146,10 @@ def read_surface(
     def polynomial(table: int) -> list[Array]:
         return [at_place(flat, base + (table * powers + power)) for power in range(powers)]
 
-    push, begin, end = at_place(surface.amplitudes, force), *(at_place(surface.breaks, piece + k) for k in (0, 1))
+    push, begin, end = (
+        at_place(surface.amplitudes, force),
+        *(at_place(surface.breaks, piece + k) for k in (0, 1)),
+    )
     own = [polynomial(table) for table in range(tables)]
     # Gathered apart from what follows, which then runs in vector registers.
     own, push, begin, end, share = jax.lax.optimization_barrier((own, push, begin, end, share))

@@ -9,7 +9,6 @@ import math
 from typing import NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -38,7 +37,7 @@ PARTS = 8
 """Parts of a spline's piece between whose ends roots are sought."""
 
 _GAIN = 64.0
-"""How many times smaller the error of a spline of degree five is than with nodes twice as far apart, where the
+"""How many times smaller a spline of degree five makes its error with nodes half as far apart, where the
 function is smooth; a sample of cells then says whether it is."""
 
 LEAST_SLOPE = 0.1
@@ -105,9 +104,14 @@ class _Grid(NamedTuple):
     tables: Float[np.ndarray, "table frequency displacement"]
     error: Float[np.ndarray, "frequency displacement"]
 
-    def at(self, logarithms: np.ndarray, frequencies: np.ndarray) -> Float[np.ndarray, "table frequency node"]:
+    def at(
+        self, logarithms: np.ndarray, frequencies: np.ndarray
+    ) -> Float[np.ndarray, "table frequency node"]:
         """Give the tables elsewhere."""
-        rows, columns = spline_matrix(self.frequencies, frequencies), spline_matrix(self.logarithms, logarithms)
+        rows, columns = (
+            spline_matrix(self.frequencies, frequencies),
+            spline_matrix(self.logarithms, logarithms),
+        )
         return rows @ (self.tables @ columns.T)
 
 
@@ -178,10 +182,14 @@ def find_surface(
     shares = (np.arange(PARTS)[:, None] / PARTS) ** np.arange(polynomials.shape[-1])
     drive = np.moveaxis(polynomials[:, :, :2], 2, 0) @ shares.T
     last = polynomials[:, -1, :2].sum(axis=-1)
-    square = np.concatenate([(drive**2).sum(axis=0).reshape(columns, -1), (last**2).sum(axis=1)[:, None]], axis=1)
+    square = np.concatenate(
+        [(drive**2).sum(axis=0).reshape(columns, -1), (last**2).sum(axis=1)[:, None]], axis=1
+    )
     force = np.sqrt(square)
     parts = np.linspace(pieces.breaks[:-1], pieces.breaks[1:], 2 * PARTS + 1, axis=1)[:, 1::2].ravel()
-    shared = kinks.shared[np.ix_(_place(start.frequencies, window.frequencies), _place(start.logarithms, parts))]
+    shared = kinks.shared[
+        np.ix_(_place(start.frequencies, window.frequencies), _place(start.logarithms, parts))
+    ]
     around = maximum_filter(grid.error, [2 * reach + 1 for reach in AROUND])
     error = around[np.ix_(_place(grid.frequencies, window.frequencies), _place(grid.logarithms, parts))]
     error = np.where(shared, error, np.inf)
@@ -216,7 +224,9 @@ def _axes(ends: tuple[float, float], frequencies: np.ndarray, level: int) -> tup
         return np.linspace(*ends, displacements), frequencies
     # Denser at the ends, where a spline has fewest neighbours.
     middle, reach = 0.5 * (frequencies[0] + frequencies[-1]), 0.5 * (frequencies[-1] - frequencies[0])
-    return np.linspace(*ends, displacements), middle - reach * np.cos(np.pi * np.arange(columns) / (columns - 1))
+    return np.linspace(*ends, displacements), middle - reach * np.cos(
+        np.pi * np.arange(columns) / (columns - 1)
+    )
 
 
 def _ends_needed(grid: _Grid, window: MapWindow) -> tuple[float, float]:
@@ -272,7 +282,9 @@ def _reading_error(
         worst = np.zeros(force.shape)
         for sign in (1.0, -1.0):
             root = half_trace + sign * spread
-            error = np.abs(determinant_error - 2.0 * root * trace_error) / np.maximum(2.0 * np.abs(spread), LEAST_SLOPE)
+            error = np.abs(determinant_error - 2.0 * root * trace_error) / np.maximum(
+                2.0 * np.abs(spread), LEAST_SLOPE
+            )
             worst = np.maximum(worst, error * (2.0 * np.abs(root) if half else 1.0))
     return np.where(np.isfinite(worst), worst, np.inf)
 
