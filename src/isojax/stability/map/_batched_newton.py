@@ -30,6 +30,9 @@ FULLY_CLOSED = 1e-9
 _WIDE = {"xla_cpu_prefer_vector_width": 512}
 """A tenth faster where processors have such vectors; the compiler's own preference is half of it."""
 
+WHOLE_STEPS = 4
+"""Times the steps of orbits that are not split at kinks."""
+
 FOUND, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
 """Codes of how the search in a cell ended."""
 
@@ -125,6 +128,19 @@ class CellSolver(eqx.Module):
         """Count of states of the model."""
         return 2 + self.model.internal_states
 
+    def with_steps(self, steps: int) -> "CellSolver":
+        """Give the same with other steps a period.
+
+        Args:
+            steps: of orbits that are split.
+
+        Returns:
+            The solver.
+        """
+        taken = jnp.asarray(steps * (1 if self.method.sides is not None else WHOLE_STEPS))
+        method = MapMethod(self.method.integrator, self.method.half, self.method.sides, taken)
+        return CellSolver(self.model, method, self.surface, self.sharding)
+
     def __call__(self, candidates: Candidates, size: int, limit: float | None = None) -> Found:
         """Find the orbits of candidates.
 
@@ -218,7 +234,7 @@ def cell_solvers(
     cells = NamedSharding(mesh, PartitionSpec("cell"))
     steps = jnp.asarray(integrator.steps_a_period(model))
     split = MapMethod(integrator, half, jnp.asarray(surface.sides), steps)
-    whole = MapMethod(integrator, half, None, 4 * steps)
+    whole = MapMethod(integrator, half, None, WHOLE_STEPS * steps)
     return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
 
 

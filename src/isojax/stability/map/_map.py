@@ -193,14 +193,14 @@ def stability_map(
     window = MapWindow(forces, band, reach)
     sought = seek(model, integrator, half, window, integrator.map_error, coexisting, devices)
     goal = _READING_SHARE * integrator.map_error
-    if asked is None and not sought.reading_error <= goal:
-        if math.isnan(sought.reading_error):
-            first = sought.groups[0]
-            steps = steps_needed(first.solver, first.candidates, window)
-        else:
-            steps = steps_for(integrator.steps_per_period, sought.reading_error, goal)
-        integrator = integrator.with_steps(steps)
+    if asked is None and sought.reading_error > goal:
+        integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
         sought = seek(model, integrator, half, window, goal, coexisting, devices)
+    if asked is None and math.isnan(sought.reading_error):
+        # Nothing is read off: each orbit is integrated for itself, and steps cost.
+        first = sought.groups[0]
+        integrator = integrator.with_steps(steps_needed(first.solver, first.candidates, window))
+        sought = sought.with_steps(integrator.steps_a_period(model))
     if progress is not None:
         progress("orbits over displacement and frequency found")
     folder = None if checkpoint is None else Path(checkpoint)

@@ -53,12 +53,10 @@ class NodeStarts(NamedTuple):
     Attributes:
         unknown: drive in phase (sine) and in quadrature (cosine) over the displacement amplitude [N/m], then
             the internal states at the largest displacement over it.
-        response: half the peak-to-peak displacement over the displacement amplitude.
         crossings: the kinks that each passes.
     """
 
     unknown: Float[np.ndarray, "node unknown"]
-    response: Float[np.ndarray, " node"]
     crossings: Crossings
 
 
@@ -122,10 +120,10 @@ def node_starts(
 @eqx.filter_jit
 def _starts(
     model: Isolator, integrator: Integrator, half: bool, rest: Array, amplitude: Array, frequency: Array
-) -> tuple[Array, Array, Crossings]:
+) -> tuple[Array, Crossings]:
     turns = 0.5 if half else 1.0
 
-    def node(a: Array, f: Array) -> tuple[Array, Array, Crossings]:
+    def node(a: Array, f: Array) -> tuple[Array, Crossings]:
         guess, cycle = imposed_balance(model, a, f, rest)
         push = jnp.hypot(guess.sine, jnp.asarray(guess.cosine))
         internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
@@ -155,11 +153,9 @@ def _starts(
         unknown = jnp.where(good, found, start)
         drive, state = unpack(unknown)
         path = trajectory(model, integrator, drive, state, turns=turns)
-        low, high = jnp.min(path[0]), jnp.max(path[0])
-        response = (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / a
         crossings = find_crossings(model, path, 2.0 * math.pi * turns, _CROSSINGS)
         over = jnp.concatenate([jnp.full(2, push), inner]) / a
-        return unknown * over, response, crossings
+        return unknown * over, crossings
 
     return jax.vmap(node)(amplitude, frequency)
 
@@ -264,3 +260,61 @@ def _closed(
     unknown, _, _ = jax.lax.while_loop(unfinished, body, begin)
     step, size, invariants = jax.vmap(last)(amplitude, frequency, scale, unknown)
     return (unknown - step) * scale, invariants, size <= _CLOSED_TO
+
+
+def node_responses(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: float,
+    amplitude: Float[np.ndarray, " node"],
+    frequency: Float[np.ndarray, " node"],
+    unknown: Float[np.ndarray, "node unknown"],
+) -> Float[np.ndarray, " node"]:
+    """Give half the peak-to-peak displacement of orbits, over their largest displacement from rest.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period.
+        half: whether the second half of each motion is minus the first.
+        rest: displacement at rest [m].
+        amplitude: largest displacement over rest [m].
+        frequency: [Hz].
+        unknown: as of `NodeStarts`.
+
+    Returns:
+        The sizes.
+    """
+    return _in_blocks(
+        lambda *rows: _responses(model, integrator, half, jnp.asarray(rest), *rows),
+        amplitude,
+        frequency,
+        unknown,
+    )
+
+
+@eqx.filter_jit
+def _responses(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: Array,
+    amplitude: Array,
+    frequency: Array,
+    unknown: Array,
+) -> Array:
+    push, internal = unknown[:, :2].T * amplitude, unknown[:, 2:].T * amplitude
+    state = (rest + amplitude, 0.0 * amplitude, *internal)
+    drive = Sine(push[0], push[1], frequency)
+    path = trajectory(model, integrator, drive, state, turns=0.5 if half else 1.0)[0]
+
+    def peak(values: Array) -> Array:
+        """Give the largest value, by the parabola through it and its neighbours."""
+        place = jnp.clip(jnp.argmax(values, axis=0), 1, values.shape[0] - 2)[None]
+        before, here, after = (jnp.take_along_axis(values, place + shift, axis=0)[0] for shift in (-1, 0, 1))
+        bend = 2.0 * here - before - after
+        vertex = here + (after - before) ** 2 / (8.0 * jnp.where(bend == 0.0, 1.0, bend))
+        return jnp.where((here >= before) & (here >= after), vertex, jnp.max(values, axis=0))
+
+    high, low = peak(path), -peak(-path)
+    return (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / amplitude

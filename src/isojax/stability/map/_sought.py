@@ -37,14 +37,27 @@ class Sought(NamedTuple):
     Attributes:
         surface: orbits over displacement and frequency.
         groups: all orbits, by how they are found; none is empty.
-        newton: Newton's method with the splits that most orbits share.
         reading_error: largest error of multipliers read off in a sample of cells; NaN where none are.
     """
 
     surface: Surface
     groups: tuple[Group, ...]
-    newton: CellSolver
     reading_error: float
+
+    def with_steps(self, steps: int) -> "Sought":
+        """Give the same with other steps a period of Newton's method.
+
+        Args:
+            steps: of orbits that are split; the others take four times as many.
+
+        Returns:
+            What is to be found.
+        """
+        groups = tuple(
+            Group(name, solver.with_steps(steps) if isinstance(solver, CellSolver) else solver, candidates)
+            for name, solver, candidates in self.groups
+        )
+        return self._replace(groups=groups)
 
 
 def seek(
@@ -95,7 +108,7 @@ def seek(
     shared = surface.shared[candidates.frequency, candidates.part]
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
     groups = tuple(Group(name, way, _chosen(candidates, own)) for name, way, own in ways if own.any())
-    return Sought(surface, groups, split, error)
+    return Sought(surface, groups, error)
 
 
 def _sample(surface: Surface, candidates: Candidates, known: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from scipy.ndimage import distance_transform_edt, maximum_filter
 from ...models import Integrator, Isolator
 from ..orbit import response_amplitudes, rest_displacement
 from ._map_method import MapMethod
-from ._nodes import closed_nodes, node_starts
+from ._nodes import closed_nodes, node_responses, node_starts
 from ._shared_kinks import AROUND, SharedKinks, shared_kinks
 from ._spline import spline_matrix, spline_pieces
 
@@ -29,6 +29,10 @@ LEVELS = 2
 
 _FEW = 0.01
 """Share of the nodes whose orbits may be left to Newton's method."""
+
+_LARGEST_RESPONSE = 2.0
+"""Half the peak-to-peak displacement over the largest from rest, beyond which a motion did not close: it
+starts at its largest displacement."""
 
 _ROOM = 2
 """Nodes of the first grid beyond the largest displacement that is held."""
@@ -173,7 +177,7 @@ def find_surface(
         if not _needs_doubling(grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
-    tables = grid.tables.copy()
+    tables = _with_responses(model, integrator, half, rest, grid)
     tables[:2] *= np.exp(grid.logarithms)
     count, columns = tables.shape[0], len(window.frequencies)
     basis = (tables @ pieces.to_basis.T).transpose(1, 0, 2).reshape(len(grid.frequencies), -1)
@@ -212,8 +216,7 @@ def _start_grid(
     shape = len(band), len(logarithms)
     kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
     unknown = _filled(starts.unknown.T.reshape(-1, *shape)), np.moveaxis(kinks.phases, -1, 0)
-    response = _filled(starts.response.reshape(1, *shape))
-    tables = np.concatenate([*unknown, np.zeros((2, *shape)), response])
+    tables = np.concatenate([*unknown, np.zeros((2, *shape)), np.ones((1, *shape))])
     return _Grid(logarithms, band, tables, np.full(shape, np.inf)), kinks
 
 
@@ -265,6 +268,19 @@ def _closed_grid(
     half_as_many = _Grid(nodes[0][::2], nodes[1][rows], tables[:, rows, ::2], error)
     error[closed] = _reading_error(half_as_many.at(*nodes), tables, nodes[0], method.half)[closed] / _GAIN
     return _Grid(*nodes, tables, error)
+
+
+def _with_responses(
+    model: Isolator, integrator: Integrator, half: bool, rest: float, grid: _Grid
+) -> Float[np.ndarray, "table frequency displacement"]:
+    """Give the tables of a grid with half the peak-to-peak displacements."""
+    frequency, amplitude = np.meshgrid(grid.frequencies, np.exp(grid.logarithms), indexing="ij")
+    unknown = grid.tables[: 2 + model.internal_states].reshape(-1, amplitude.size).T
+    sizes = node_responses(model, integrator, half, rest, amplitude.ravel(), frequency.ravel(), unknown)
+    sizes = sizes.reshape(1, *amplitude.shape)
+    # Of a motion that ran away there is none.
+    sizes = _filled(np.where(sizes < _LARGEST_RESPONSE, sizes, np.nan))
+    return np.concatenate([grid.tables[:-1], sizes])
 
 
 def _reading_error(
