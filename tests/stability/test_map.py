@@ -72,7 +72,7 @@ def test_no_orbit_in_or_beside_the_lens_is_further_off_than_the_reported_error()
         for row, column in random.permutation(np.argwhere(count == orbits))[:6]:
             drive = Harmonic(float(smap.amplitudes[row]), float(smap.frequencies[column]))
             for own in range(orbits):
-                start = y0[own, row, column]
+                start = jnp.asarray(y0[own, row, column])
                 exact = find_periodic_orbit(smap.model, drive, start=start, symmetric=True)
                 np.testing.assert_allclose(smap.response[own, row, column], exact.amplitude, rtol=1e-4)
                 ours, theirs = multipliers[own, row, column], np.asarray(exact.floquet.multipliers)

@@ -17,7 +17,7 @@ from ..._show import number, shown
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import Sine, ascending, is_odd
-from ._batched_newton import FOUND, NOT_CONVERGED, NOT_FINITE, Found, states_at_zero
+from ._batched_newton import FOUND, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
@@ -25,7 +25,7 @@ from ._sought import seek
 from ._starts import Candidates
 from ._surface import MapWindow
 
-_READING_SHARE = 0.1
+_READING_SHARE = 0.2
 """Of the error that a map may have, where its orbits are read off: there steps cost little."""
 
 _ROWS, _COLUMNS = 12, 60
@@ -196,9 +196,9 @@ def stability_map(
     if asked is None and sought.reading_error > goal:
         integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
         sought = seek(model, integrator, half, window, goal, coexisting, devices)
-    if asked is None and math.isnan(sought.reading_error):
+    first = sought.groups[0]
+    if asked is None and isinstance(first.solver, CellSolver):
         # Nothing is read off: each orbit is integrated for itself, and steps cost.
-        first = sought.groups[0]
         integrator = integrator.with_steps(steps_needed(first.solver, first.candidates, window))
         sought = sought.with_steps(integrator.steps_a_period(model))
     if progress is not None:
@@ -209,7 +209,7 @@ def stability_map(
     parts, errors = [], [sought.reading_error]
     for name, solver, candidates in sought.groups:
         parts.append(run_chunks(solver, candidates, chunk, folder, name, progress))
-        if name != "read":
+        if isinstance(solver, CellSolver):
             errors.append(sampled_error(solver, candidates, parts[-1], window))
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     found = parts[0] if len(parts) == 1 else Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))

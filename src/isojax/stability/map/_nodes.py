@@ -187,7 +187,7 @@ def closed_nodes(
     kinks = np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
 
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
-        return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *rows)
+        return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *map(jnp.asarray, rows))
 
     return NodeOrbits(*_in_blocks(work, amplitude, frequency, start))
 
@@ -303,7 +303,7 @@ def _responses(
     frequency: Array,
     unknown: Array,
 ) -> Array:
-    push, internal = unknown[:, :2].T * amplitude, unknown[:, 2:].T * amplitude
+    push, internal = unknown[:, :2].T * amplitude[None], unknown[:, 2:].T * amplitude[None]
     state = (rest + amplitude, 0.0 * amplitude, *internal)
     drive = Sine(push[0], push[1], frequency)
     path = trajectory(model, integrator, drive, state, turns=0.5 if half else 1.0)[0]
