@@ -53,7 +53,7 @@ class StabilityMap(eqx.Module):
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
         result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
-        error: largest integration error of a multiplier in a sample of cells, against steps four times finer.
+        error: largest error of a multiplier in a sample of cells, against steps four times finer, and a quarter.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
     """
@@ -145,10 +145,11 @@ def stability_map(
 ) -> StabilityMap:
     """Find the periodic orbits over a grid of drive amplitude and frequency, and their Floquet multipliers.
 
-    The orbits are found first on a coarse grid of displacement amplitude and frequency, over which they do
-    not fold; from there each cell gets a start so good that one step of Newton's method on the period map,
-    with its derivative by `jax.jacfwd` under `vmap`, finishes nearly all. Odd models use the half-period map.
-    Orbits are split at kinks.
+    The orbits are found on a coarse grid of displacement amplitude and frequency, over which they do not
+    fold, and each cell is read off splines through them. Where a sample of cells or the nodes themselves say
+    that this is not exact enough, and for models with internal states, each cell takes steps of Newton's
+    method on the period map from there, with its derivative by `jax.jacfwd` under `vmap`. Odd models use the
+    half-period map. Orbits are split at kinks.
 
     Args:
         model: the isolator.
