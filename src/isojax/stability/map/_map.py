@@ -53,7 +53,7 @@ class StabilityMap(eqx.Module):
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
         result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
-        error: largest error of a multiplier in a sample of cells, against steps four times finer, and a quarter.
+        error: of a multiplier at most, from a sample of cells against steps four times finer.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
     """

@@ -151,8 +151,8 @@ def find_surface(
 ) -> Surface:
     """Find the orbits over displacement and frequency that a window of force and frequency can hold.
 
-    Each grid starts from the spline of the one before, and what it changes is the error of that spline. Nodes
-    are added as long as this costs less than to find each orbit by itself.
+    Each grid starts from the spline of the one before. Nodes are added until all but a few of the orbits that
+    are asked for can be read off.
 
     Args:
         model: the isolator.
@@ -173,7 +173,8 @@ def find_surface(
     for level in range(1, 1 + LEVELS):
         nodes = _axes(ends, window.frequencies, level)
         own = kinks.shared[np.ix_(_place(start.frequencies, nodes[1]), _place(start.logarithms, nodes[0]))]
-        grid = _closed_grid(model, method, rest, grid, nodes, own)
+        rows = 1 if nodes[1] is window.frequencies else 2
+        grid = _closed_grid(model, method, rest, grid, nodes, rows, own)
         if not _needs_doubling(grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
@@ -251,9 +252,13 @@ def _closed_grid(
     rest: float,
     coarse: _Grid,
     nodes: tuple[np.ndarray, np.ndarray],
+    every: int,
     shared: Bool[np.ndarray, "frequency node"],
 ) -> _Grid:
-    """Close the orbits at other nodes that share the order of kinks; the others stay as the grid has them."""
+    """Close the orbits at other nodes that share the order of kinks; the others stay as the grid has them.
+
+    The error is that of a spline through every second displacement, and every so many frequencies.
+    """
     tables, error = coarse.at(*nodes), np.full(shared.shape, np.inf)
     if not shared.any():
         return _Grid(*nodes, tables, error)
@@ -263,10 +268,9 @@ def _closed_grid(
     closed[shared] = found.closed
     tables[:-1, closed] = np.concatenate([found.unknown, found.invariants], axis=1)[found.closed].T
     tables[-3:-1] = _filled(np.where(closed, tables[-3:-1], np.nan))
-    # The frequencies of the map themselves need no spline.
-    rows = slice(None, None, 1 if len(nodes[1]) < 2 or nodes[1] is coarse.frequencies else 2)
-    half_as_many = _Grid(nodes[0][::2], nodes[1][rows], tables[:, rows, ::2], error)
-    error[closed] = _reading_error(half_as_many.at(*nodes), tables, nodes[0], method.half)[closed] / _GAIN
+    # At the frequencies of the map itself no spline is needed over them.
+    fewer = _Grid(nodes[0][::2], nodes[1][::every], tables[:, ::every, ::2], error)
+    error[closed] = _reading_error(fewer.at(*nodes), tables, nodes[0], method.half)[closed] / _GAIN
     return _Grid(*nodes, tables, error)
 
 
