@@ -54,6 +54,9 @@ SAMPLED = 50
 FINEST = 8192
 """Steps a period of the reference."""
 
+CLOSED_TO = 1e-10
+"""Relative step of Newton's method after which the reference stops."""
+
 LENS_CELLS = 40
 """Random cells of the map with a lens that are compared, inside the lens and outside."""
 
@@ -163,16 +166,17 @@ class Race:
             "SciPy": scipy_cells,
         }
         self.steps = dict.fromkeys(self.run, STEPS)
-        sample = task._replace(frequencies=frequencies[::SAMPLED].copy())
+        # Closed far better than the peers: the multipliers belong to the state before the last step.
+        compared = {"frequencies": frequencies[::SAMPLED].copy(), "tolerance": CLOSED_TO}
+        sample = task._replace(**compared)
         self.reference = (together or in_numba)(sample, False, FINEST)
-        self.reference_z = (together or in_numba)(
-            task_z._replace(frequencies=frequencies[::SAMPLED].copy()), False, FINEST
-        )
+        self.reference_z = (together or in_numba)(task_z._replace(**compared), False, FINEST)
         if in_c is None or together is None:
             return
         # The peers do not split at kinks: so many steps until they keep what the map promises.
         enough = STEPS
-        while self.worst(together(sample, True, enough)) > fixed.map_error:
+        own = task._replace(frequencies=compared["frequencies"])
+        while self.worst(together(own, True, enough)) > fixed.map_error:
             enough = 2 * math.ceil(0.55 * enough)
         for name, peer, half, steps in (
             ("C, z", in_c, True, STEPS),

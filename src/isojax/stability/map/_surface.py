@@ -27,7 +27,7 @@ _FIRST_NODES = (49, 17)
 LEVELS = 2
 """Times at most that the distances of the nodes are halved."""
 
-_FEW = 0.01
+_FEW = 0.002
 """Share of the nodes whose orbits may be left to Newton's method."""
 
 _LARGEST_RESPONSE = 2.0
