@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from isojax import Harmonic, find_periodic_orbit, paper, stability_map
+from isojax import Harmonic, Isolator, elements, find_periodic_orbit, paper, stability_map
 from isojax._results import RESULTS
 
 FORCES, BAND = np.linspace(20.0, 120.0, 9), np.linspace(4.0, 8.0, 7)
@@ -59,6 +59,46 @@ def test_inside_the_lens_of_folds_there_are_three_orbits_and_outside_one(lens_ma
     assert bool(jnp.all(jnp.diff(lens_map.response[:, 4, 1]) > 0.0))
     assert bool(jnp.all(jnp.isnan(lens_map.spectral_radius[1:, 0, 0])))
     assert not bool(lens_map.stable[1, 0, 0])
+
+
+def test_no_orbit_in_or_beside_the_lens_is_further_off_than_the_reported_error():
+    smap = stability_map(
+        paper.y_direction(), np.linspace(140.0, 200.0, 61), np.linspace(4.0, 4.5, 41), coexisting=True
+    )
+    count, random = np.asarray(smap.count), np.random.default_rng(5)
+    assert set(np.unique(count)) == {1, 3}
+    y0, multipliers = np.asarray(smap.y0), np.asarray(smap.multipliers)
+    for orbits, most in ((3, 2e-5), (1, 2e-6)):
+        for row, column in random.permutation(np.argwhere(count == orbits))[:6]:
+            drive = Harmonic(float(smap.amplitudes[row]), float(smap.frequencies[column]))
+            for own in range(orbits):
+                start = jnp.asarray(y0[own, row, column])
+                exact = find_periodic_orbit(smap.model, drive, start=start, symmetric=True)
+                np.testing.assert_allclose(smap.response[own, row, column], exact.amplitude, rtol=1e-4)
+                ours, theirs = multipliers[own, row, column], np.asarray(exact.floquet.multipliers)
+                # The characteristic polynomial over its slope, as the map's error is defined.
+                polynomial = np.abs((ours[:, None] - theirs[None]).prod(axis=1))
+                error = np.max(polynomial / np.maximum(np.abs(theirs[0] - theirs[1]), 0.1))
+                assert error <= min(smap.error, most)
+
+
+def test_cells_that_cannot_be_read_off_are_solved_for_themselves():
+    # An internal state gives a third multiplier, which no trace and determinant hold.
+    law = (elements.LinearStiffness(1.0), elements.LinearDamping(0.1), elements.MaxwellBranch(0.2, 1.0))
+    smap = stability_map(Isolator(1.0, law), [0.5, 1.0], [0.1, 0.17])
+    for row, column in np.ndindex(2, 2):
+        drive = Harmonic(float(smap.amplitudes[row]), float(smap.frequencies[column]))
+        exact = np.asarray(find_periodic_orbit(smap.model, drive).floquet.multipliers)
+        np.testing.assert_allclose(smap.multipliers[row, column], exact, atol=smap.error + 1e-9)
+
+
+def test_the_size_of_an_offset_motion_is_half_its_whole_range():
+    law = (elements.LinearStiffness(1.0), elements.LinearDamping(0.05), elements.QuadraticStiffness(0.2))
+    smap = stability_map(Isolator(1.0, law), [0.05, 0.1, 0.2], [0.06, 0.1, 0.2])
+    for row, column in np.ndindex(3, 3):
+        drive = Harmonic(float(smap.amplitudes[row]), float(smap.frequencies[column]))
+        exact = find_periodic_orbit(smap.model, drive)
+        np.testing.assert_allclose(smap.response[row, column], exact.amplitude, rtol=1e-5)
 
 
 def test_without_coexisting_the_smallest_motion_is_given(lens_map):

@@ -3,6 +3,7 @@
 import math
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -168,6 +169,27 @@ def test_derivative_of_transmissibility_is_the_textbooks():
     by_damping = 1j * omega / below * (1.0 - ratio)
     exact = np.real(np.conj(ratio) * by_damping) / np.abs(ratio)
     np.testing.assert_allclose(slope.elements[1].coefficient, exact, rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_derivatives_of_transmissibility_at_resonance_are_those_of_differences():
+    band, model = np.array([4.9, 5.0, 5.1]), ij.paper.y_direction()
+
+    def numbers(coefficient):
+        changed = model.replace(linear_stiffness__coefficient=coefficient)
+        found = ij.transmissibility(changed, 60.0, band)
+        return jnp.stack([found.magnitude, found.phase, found.peak])
+
+    at = model["linear_stiffness.coefficient"]
+    slope = np.asarray(jax.jacfwd(numbers)(at))
+    step = 5e-5 * at
+    near, far = (numbers(at + k * step) - numbers(at - k * step) for k in (1.0, 2.0))
+    differences = np.asarray((8.0 * near - far) / (12.0 * step))
+    largest = np.abs(differences).max(axis=1, keepdims=True)
+    apart = np.abs(slope - differences) / largest
+    np.testing.assert_array_less(apart[:2], 1e-6)
+    # At 4.9 Hz the sample nearest to the peak changes between the differences, and with it the parabola.
+    np.testing.assert_array_less(apart[2, 1:], 1e-6)
 
 
 def steady_y(force: float, frequency: float, base: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

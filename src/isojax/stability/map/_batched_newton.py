@@ -13,7 +13,8 @@ from jaxtyping import Array, Complex, Float, Int
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
 from ..orbit import Crossings, Sine, advance_across_kinks, modulus, multipliers
-from ._starts import Candidates, PlacedSurface, candidate_starts
+from ._map_method import Lane, MapMethod
+from ._starts import Candidates, PlacedSurface, read_surface
 from ._surface import Surface
 
 _NEWTON_STEPS = 12
@@ -28,6 +29,9 @@ FULLY_CLOSED = 1e-9
 
 _WIDE = {"xla_cpu_prefer_vector_width": 512}
 """A tenth faster where processors have such vectors; the compiler's own preference is half of it."""
+
+WHOLE_STEPS = 4
+"""Times the steps of orbits that are not split at kinks."""
 
 FOUND, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
 """Codes of how the search in a cell ended."""
@@ -53,73 +57,6 @@ class Found(NamedTuple):
     radius: Float[np.ndarray, " candidate"]
     response: Float[np.ndarray, " candidate"]
     code: Int[np.ndarray, " candidate"]
-
-
-class Lane(NamedTuple):
-    """What one orbit is found from: one number each, or one lane of numbers.
-
-    Attributes:
-        state: start.
-        drive: the drive, tau counted from the start.
-        phases: where the orbit passes kinks.
-        response: half the peak-to-peak displacement [m].
-    """
-
-    state: State
-    drive: Sine
-    phases: State
-    response: Lanes
-
-
-class MapMethod(eqx.Module):
-    """How a period is integrated over.
-
-    Attributes:
-        integrator: the solver and the tolerances.
-        half: whether the half-period map is used.
-        sides: signs of the kinks on each piece; None where orbits are not split.
-        steps: a period; a number on the device, so that one compiled step serves for all.
-    """
-
-    integrator: Integrator
-    half: bool = eqx.field(static=True)
-    sides: Float[Array, "piece kink"] | None
-    steps: Int[Array, ""]
-
-    def finer(self, times: int) -> "MapMethod":
-        """Give the same way with more steps.
-
-        Args:
-            times: how many times as many.
-
-        Returns:
-            The method.
-        """
-        return MapMethod(self.integrator, self.half, self.sides, self.steps * times)
-
-    def moved(self, model: Isolator, lane: Lane) -> State:
-        """Give the state one period later, or minus the state half a period later.
-
-        Args:
-            model: the isolator.
-            lane: one orbit.
-
-        Returns:
-            The state.
-        """
-        phases = () if self.sides is None else lane.phases
-        pieces = len(phases) + 1
-        parts = pieces * (2 if self.half else 1)
-        steps = (self.steps + parts - 1) // parts
-        crossings = Crossings(
-            jnp.stack(phases) if phases else jnp.zeros(0),
-            jnp.full(pieces - 1, -1),
-            self.sides,
-            jnp.array(True),
-        )
-        end = math.pi if self.half else 2.0 * math.pi
-        after, _ = advance_across_kinks(model, self.integrator, lane.drive, lane.state, crossings, end, steps)
-        return tuple(-value for value in after) if self.half else after
 
 
 def newton_step(model: Isolator, method: MapMethod, lane: Lane) -> tuple[State, Float[Array, "state state"]]:
@@ -165,11 +102,10 @@ def _newton_steps(model: Isolator, method: MapMethod, lanes: Lane) -> tuple[Stat
 
 @eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
 def _lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
-    force, column, interval = where
-    push, rate = surface.amplitudes[force], surface.frequencies[column]
-    starts = candidate_starts(surface, 2 + model.internal_states, push, column, interval)
-    sine, cosine = starts.direction
-    return Lane(starts.states, Sine(push * sine, push * cosine, rate), starts.phases, starts.response)
+    read = read_surface(surface, 2 + model.internal_states, *where)
+    push, (sine, cosine) = surface.amplitudes[where[0]], read.direction
+    drive = Sine(push * sine, push * cosine, surface.frequencies[where[1]])
+    return Lane(read.states, drive, read.phases, read.response)
 
 
 class CellSolver(eqx.Module):
@@ -186,6 +122,24 @@ class CellSolver(eqx.Module):
     method: MapMethod
     surface: PlacedSurface
     sharding: NamedSharding = eqx.field(static=True)
+
+    @property
+    def states(self) -> int:
+        """Count of states of the model."""
+        return 2 + self.model.internal_states
+
+    def with_steps(self, steps: int) -> "CellSolver":
+        """Give the same with other steps a period.
+
+        Args:
+            steps: of orbits that are split.
+
+        Returns:
+            The solver.
+        """
+        taken = jnp.asarray(steps * (1 if self.method.sides is not None else WHOLE_STEPS))
+        method = MapMethod(self.method.integrator, self.method.half, self.method.sides, taken)
+        return CellSolver(self.model, method, self.surface, self.sharding)
 
     def __call__(self, candidates: Candidates, size: int, limit: float | None = None) -> Found:
         """Find the orbits of candidates.
@@ -275,12 +229,12 @@ def cell_solvers(
     """
     mesh = Mesh(np.asarray(jax.local_devices() if devices is None else devices), ("cell",))
     everywhere = NamedSharding(mesh, PartitionSpec())
-    tables = (surface.tables, surface.amplitudes, surface.rest, forces, surface.frequencies)
+    tables = (surface.polynomials, surface.breaks, surface.rest, forces, surface.frequencies)
     placed = PlacedSurface(*(jax.device_put(jnp.asarray(table), everywhere) for table in tables))
     cells = NamedSharding(mesh, PartitionSpec("cell"))
     steps = jnp.asarray(integrator.steps_a_period(model))
     split = MapMethod(integrator, half, jnp.asarray(surface.sides), steps)
-    whole = MapMethod(integrator, half, None, 4 * steps)
+    whole = MapMethod(integrator, half, None, WHOLE_STEPS * steps)
     return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
 
 

@@ -15,6 +15,7 @@ from ..._cores import usable_cores
 from ..._progress import Counted
 from ...models import write_whole
 from ._batched_newton import CellSolver, Found
+from ._reader import SurfaceReader
 from ._starts import Candidates
 
 FEWEST = 1024
@@ -33,7 +34,7 @@ def fingerprint(*parts: object) -> str:
 
 
 def run_chunks(
-    solver: CellSolver,
+    solver: CellSolver | SurfaceReader,
     candidates: Candidates,
     chunk: int,
     folder: Path | None,
@@ -59,58 +60,56 @@ def run_chunks(
     # No wider than need be: small maps compile and run a small batch. At least one lane for each device.
     lanes = min(chunk, max(1 << max(total - 1, 0).bit_length(), FEWEST))
     begins = list(range(0, total, lanes))
-    states = 2 + solver.model.internal_states
-    kinks = solver.surface.tables.shape[0] - states - 1
+    states = solver.states
+    kinks = solver.surface.polynomials.shape[2] - states - 3
     processes, own = jax.process_count(), jax.process_index()
     paths = [None if folder is None else folder / f"{name}-{place:05d}.npz" for place in range(len(begins))]
     kept = [path is not None and path.exists() for path in paths]
     sizes = [min(lanes, total - begin) for begin in begins]
     asked = sum(size for place, size in enumerate(sizes) if place % processes == own and not kept[place])
     done: list[int] = []
+    whole = _blank(total, states, kinks)
 
-    def one(place: int) -> Found:
+    def one(place: int) -> None:
         begin, path = begins[place], paths[place]
         if place % processes != own:
-            return _blank(sizes[place], states, kinks)
+            return
         if path is not None and kept[place]:
             with np.load(path) as finished:
-                return Found(*(finished[field] for field in Found._fields))
-        part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
-        if path is not None:
-            buffer = io.BytesIO()
-            np.savez(buffer, **part._asdict())
-            write_whole(path, buffer.getvalue())
-        if progress is not None:
-            done.append(sizes[place])
-            computed = sum(done)
-            progress(Counted(f"{computed} of {asked} orbits", computed / asked))
-        return part
+                part = Found(*(finished[field] for field in Found._fields))
+        else:
+            part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
+            if path is not None:
+                buffer = io.BytesIO()
+                np.savez(buffer, **part._asdict())
+                write_whole(path, buffer.getvalue())
+            if progress is not None:
+                done.append(sizes[place])
+                computed = sum(done)
+                progress(Counted(f"{computed} of {asked} orbits", computed / asked))
+        for target, values in zip(whole, part, strict=True):
+            target[begin : begin + lanes] = values
 
     # A batch keeps one core busy; each core runs its own. Chunks over several devices go one by one.
     cores = 1 if solver.sharding.num_devices > 1 else usable_cores()
     with ThreadPoolExecutor(cores) as pool:
-        parts = list(pool.map(one, range(len(begins))))
-    whole = (
-        Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-        if parts
-        else _blank(0, states, kinks)
-    )
+        list(pool.map(one, range(len(begins))))
     if processes > 1:
         gathered = multihost_utils.process_allgather(whole)
-        owner = np.repeat(np.arange(len(begins)) % processes, [part.radius.size for part in parts])
+        owner = np.repeat(np.arange(len(begins)) % processes, sizes)
         whole = Found(*(np.asarray(values)[owner, np.arange(total)] for values in gathered))
     return whole
 
 
 def _blank(count: int, states: int, kinks: int) -> Found:
     return Found(
-        np.full((count, states), np.nan),
-        np.full((count, 2), np.nan),
-        np.full((count, kinks), np.nan),
-        np.full((count, states), np.nan + 0j),
-        np.full(count, np.nan),
-        np.full(count, np.nan),
-        np.zeros(count, np.int8),
+        np.empty((count, states)),
+        np.empty((count, 2)),
+        np.empty((count, kinks)),
+        np.empty((count, states), complex),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count, np.int8),
     )
 
 

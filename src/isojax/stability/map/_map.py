@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import diffrax
 import equinox as eqx
@@ -17,26 +17,16 @@ from ..._show import number, shown
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import Sine, ascending, is_odd
-from ._batched_newton import (
-    FOUND,
-    NOT_CONVERGED,
-    NOT_FINITE,
-    Found,
-    Lane,
-    MapMethod,
-    cell_solvers,
-    states_at_zero,
-)
+from ._batched_newton import FOUND, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chunks import claim_folder, fingerprint, run_chunks
-from ._map_error import sampled_error, steps_needed
-from ._starts import Candidates, find_candidates
-from ._surface import MapWindow, Surface, find_surface
+from ._map_error import sampled_error, steps_for, steps_needed
+from ._map_method import Lane, MapMethod
+from ._sought import seek
+from ._starts import Candidates
+from ._surface import MapWindow
 
-_TRIED = 64
-"""Steps a period with which a sample of the orbits shows how many it takes."""
-
-_STILL_STARTS = 1.25
-"""Times those steps up to which orbits found with them are good enough starts."""
+_READING_SHARE = 0.2
+"""Of the error that a map may have, where its orbits are read off: there steps cost little."""
 
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
@@ -63,7 +53,7 @@ class StabilityMap(eqx.Module):
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
         result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
-        error: largest integration error of a multiplier in a sample of cells, against steps four times finer.
+        error: of a multiplier at most, from a sample of cells against steps four times finer.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
     """
@@ -155,10 +145,11 @@ def stability_map(
 ) -> StabilityMap:
     """Find the periodic orbits over a grid of drive amplitude and frequency, and their Floquet multipliers.
 
-    The orbits are found first on a coarse grid of displacement amplitude and frequency, over which they do
-    not fold; from there each cell gets a start so good that one step of Newton's method on the period map,
-    with its derivative by `jax.jacfwd` under `vmap`, finishes nearly all. Odd models use the half-period map.
-    Orbits are split at kinks.
+    The orbits are found on a coarse grid of displacement amplitude and frequency, over which they do not
+    fold, and each cell is read off splines through them. Where a sample of cells or the nodes themselves say
+    that this is not exact enough, and for models with internal states, each cell takes steps of Newton's
+    method on the period map from there, with its derivative by `jax.jacfwd` under `vmap`. Odd models use the
+    half-period map. Orbits are split at kinks.
 
     Args:
         model: the isolator.
@@ -199,34 +190,37 @@ def stability_map(
     if chunk < 1:
         raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
     half = is_odd(model)
-    asked, integrator = integrator, Integrator().with_steps(_TRIED) if integrator is None else integrator
+    asked, integrator = integrator, Integrator() if integrator is None else integrator
     window = MapWindow(forces, band, reach)
-    sought = _seek(model, integrator, half, window, coexisting)
-    if asked is None:
-        trial = cell_solvers(model, integrator, half, sought.surface, forces, devices)
-        own, first = sought.group(0), trial[0]
-        if not own.force.size:
-            own, first = sought.group(1), trial[1]
-        integrator = integrator.with_steps(steps_needed(first, own, window))
-        if integrator.steps_per_period > _STILL_STARTS * _TRIED:
-            # Starts integrated much coarser than the map would cost each cell a second step.
-            sought = _seek(model, integrator, half, window, coexisting)
+    sought = seek(model, integrator, half, window, integrator.map_error, coexisting, devices)
+    goal = _READING_SHARE * integrator.map_error
+    if asked is None and sought.reading_error > goal:
+        integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
+        sought = seek(model, integrator, half, window, goal, coexisting, devices)
+    first = sought.groups[0]
+    if asked is None and isinstance(first.solver, CellSolver):
+        # Nothing is read off: each orbit is integrated for itself, and steps cost.
+        integrator = integrator.with_steps(steps_needed(first.solver, first.candidates, window))
+        sought = sought.with_steps(integrator.steps_a_period(model))
     if progress is not None:
         progress("orbits over displacement and frequency found")
-    surface, candidates = sought.surface, sought.candidates
     folder = None if checkpoint is None else Path(checkpoint)
     if folder is not None:
         claim_folder(folder, fingerprint(model, integrator, forces, band, coexisting, reach, chunk))
-    parts, errors = [], []
-    solvers = cell_solvers(model, integrator, half, surface, forces, devices)
-    for place, (name, solver) in enumerate(zip(("split", "whole"), solvers, strict=True)):
-        own = sought.group(place)
-        if own.force.size:
-            parts.append(run_chunks(solver, own, chunk, folder, name, progress))
-            errors.append(sampled_error(solver, own, parts[-1], window))
-    found = Found(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    parts, errors = [], [sought.reading_error]
+    for name, solver, candidates in sought.groups:
+        parts.append(run_chunks(solver, candidates, chunk, folder, name, progress))
+        if isinstance(solver, CellSolver):
+            errors.append(sampled_error(solver, candidates, parts[-1], window))
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
-    split = np.arange(candidates.force.size) < sought.split
+    found = parts[0] if len(parts) == 1 else Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))
+    lists = [group.candidates for group in sought.groups]
+    candidates = (
+        lists[0]
+        if len(lists) == 1
+        else Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
+    )
+    split = np.repeat([group.name != "whole" for group in sought.groups], [own.force.size for own in lists])
     arrays = _gridded(candidates, found, split, len(forces), len(band), coexisting)
     code = arrays.pop("code")
     ending = _ending
@@ -239,45 +233,11 @@ def stability_map(
         frequencies=jnp.asarray(band),
         result=result,
         error=error,
-        sides=jnp.asarray(surface.sides),
+        sides=jnp.asarray(sought.surface.sides),
         symmetric=half,
         integrator=integrator,
         **{name: jnp.asarray(values) for name, values in arrays.items()},
     )
-
-
-class _Sought(NamedTuple):
-    """What is to be found.
-
-    Attributes:
-        surface: from which the starts are read off.
-        candidates: the orbits, first those that share the order of kinks.
-        split: how many these are; the others are not split and take finer steps.
-    """
-
-    surface: Surface
-    candidates: Candidates
-    split: int
-
-    def group(self, place: int) -> Candidates:
-        """Give the orbits that are split (0) or the others (1)."""
-        part = slice(self.split) if place == 0 else slice(self.split, None)
-        return Candidates(*(values[part] for values in self.candidates))
-
-
-def _seek(
-    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, coexisting: bool
-) -> _Sought:
-    surface = find_surface(model, integrator, half, window)
-    candidates = find_candidates(surface, window.amplitudes)
-    if not coexisting and candidates.order.any():
-        candidates = Candidates(*(values[candidates.order == 0] for values in candidates))
-    if not candidates.force.size:
-        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
-    shared = surface.shared[candidates.frequency, candidates.interval]
-    if not shared.all():
-        candidates = Candidates(*(np.concatenate([v[shared], v[~shared]]) for v in candidates))
-    return _Sought(surface, candidates, int(shared.sum()))
 
 
 def _ending(code: Array) -> RESULTS:

@@ -8,15 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..orbit import Sine
-from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, Lane, padded
+from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
+from ._map_method import Lane
 from ._starts import Candidates
-from ._surface import MapWindow
+from ._surface import LEAST_SLOPE, MapWindow
 
-_STEPS_MARGIN = 1.03
-"""On the steps of a map that a sample of its orbits needs: the worst cell is seldom in the sample."""
-
-_LEAST_SLOPE = 0.1
-"""Smallest slope of the characteristic polynomial that an error of a multiplier is divided by."""
+_MARGIN = 1.25
+"""On the largest error of a sample: the worst cell of a map is seldom in it."""
 
 _DOUBLINGS = 3
 """Trials with twice the steps where some orbits were not found."""
@@ -39,7 +37,7 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
         window: of the map.
 
     Returns:
-        The largest error; NaN where nothing was found.
+        The largest error, with a margin for the cells that the sample lacks; NaN where nothing was found.
     """
     good = np.flatnonzero(found.code == FOUND)
     if not good.size:
@@ -52,8 +50,8 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]
-    ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), _LEAST_SLOPE)
-    return float(np.nanmax(nearest * ratio))
+    ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), LEAST_SLOPE)
+    return _MARGIN * float(np.nanmax(nearest * ratio))
 
 
 def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) -> int:
@@ -75,8 +73,22 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
     error = sampled_error(solver, some, found, window)
     if not error > 0.0:
         return integrator.steps_per_period
-    times = _STEPS_MARGIN * (error / integrator.map_error) ** 0.25
-    return 2 * math.ceil(0.5 * taken * min(max(times, 0.5), 128.0))
+    return steps_for(taken, error, integrator.map_error)
+
+
+def steps_for(taken: int, error: float, goal: float) -> int:
+    """Give the steps a period with which an error becomes another, which falls with the fourth power.
+
+    Args:
+        taken: steps a period of the error.
+        error: of a sample of multipliers.
+        goal: the error wanted.
+
+    Returns:
+        Steps, an even number.
+    """
+    times = min(max((error / goal) ** 0.25, 0.5), 128.0)
+    return 2 * math.ceil(0.5 * taken * times)
 
 
 def lanes_of(found: Found, candidates: Candidates, window: MapWindow, picked: np.ndarray) -> Lane:

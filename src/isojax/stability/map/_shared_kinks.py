@@ -11,7 +11,7 @@ from ..orbit import Crossings
 _EDGE = 1e-4
 """Share of the motion at either end within which a kink counts as lying at the end."""
 
-_AROUND = (2, 4)
+AROUND = (1, 2)
 """Nodes in frequency and displacement around an odd one, to which interpolation carries its difference."""
 
 
@@ -64,6 +64,6 @@ def shared_kinks(crossings: Crossings, shape: tuple[int, int], end: float) -> Sh
     if not same.all() and same.any():
         nearest = distance_transform_edt(~same, return_distances=False, return_indices=True)
         passed = passed[tuple(np.asarray(nearest))]
-    around = np.ones(tuple(2 * reach + 1 for reach in _AROUND), bool)
+    around = np.ones(tuple(2 * reach + 1 for reach in AROUND), bool)
     shared = np.logical_not(binary_dilation(~same, structure=around))
     return SharedKinks(passed, sides[example, before[example] : before[example] + count + 1], shared)

@@ -1,44 +1,50 @@
-"""Starts of all orbits over a window: which orbit of the surface a force holds."""
+"""Which orbits of the surface a force holds, and what the surface says of them."""
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._types import Lanes
-from ._surface import Surface
+from ._surface import PARTS, Surface
+
+_POLISHING = 2
+"""Steps of Newton's method on the polynomial of a piece, after the parabola of a part."""
 
 
-class Starts(NamedTuple):
+class Reading(NamedTuple):
     """Orbits as read off the surface, each from the phase of its largest displacement.
 
     Attributes:
         states: there.
         direction: the drive over its amplitude: sine and cosine part, tau counted from there.
         phases: where the orbit passes kinks.
+        invariants: half the trace and the determinant of the derivative of the period map, or of its half.
         response: half the peak-to-peak displacement [m].
     """
 
     states: tuple[Lanes, ...]
     direction: tuple[Lanes, Lanes]
     phases: tuple[Lanes, ...]
+    invariants: tuple[Lanes, Lanes]
     response: Lanes
 
 
 class Candidates(NamedTuple):
-    """Orbits to be found, sorted by force, then frequency, then displacement.
+    """Orbits to be found, sorted by order, then force, then frequency.
 
     Attributes:
         force: place of the drive amplitude in the window.
         frequency: place of the frequency.
-        interval: interval of the surface's displacement amplitudes in which the orbit lies.
+        part: of the surface's displacement amplitudes, in which the orbit lies.
         order: which of the orbits of its cell, by rising displacement.
     """
 
     force: Int[np.ndarray, " candidate"]
     frequency: Int[np.ndarray, " candidate"]
-    interval: Int[np.ndarray, " candidate"]
+    part: Int[np.ndarray, " candidate"]
     order: Int[np.ndarray, " candidate"]
 
 
@@ -46,107 +52,143 @@ class PlacedSurface(NamedTuple):
     """The surface on the devices, with the axes of the map.
 
     Attributes:
-        tables: stiffness, internal states, response and phases of the surface.
-        displacements: its displacement amplitudes [m].
+        polynomials: the surface's.
+        breaks: logarithm of displacement over rest [m] where one piece ends and the next begins.
         rest: displacement at rest [m].
         amplitudes: drive amplitudes of the map.
         frequencies: of the map [Hz].
     """
 
-    tables: Float[Array, "table frequency displacement"]
-    displacements: Float[Array, " displacement"]
+    polynomials: Float[Array, "frequency piece table power"]
+    breaks: Float[Array, " break"]
     rest: Float[Array, ""]
     amplitudes: Float[Array, " amplitude"]
     frequencies: Float[Array, " frequency"]
 
 
-def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"]) -> Candidates:
-    """Find every orbit of the surface that a force of the window holds."""
-    # The count of forces below the surface; between two nodes it changes by the forces that are passed.
+def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexisting: bool) -> Candidates:
+    """Find every orbit of the surface that a force of the window holds, or that of the smallest motion."""
+    # The count of forces below the surface; between two ends it changes by the forces that are passed.
     rank = np.searchsorted(forces, surface.force).astype(np.int32)
-    low, high = np.minimum(rank[:, :-1], rank[:, 1:]), np.maximum(rank[:, :-1], rank[:, 1:])
-    passed = high - low
-    column, interval = np.nonzero(passed)
-    counts = passed[column, interval]
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    force = np.repeat(low[column, interval], counts) + np.arange(counts.sum()) - first
-    column, interval = (np.repeat(part.astype(np.int32), counts) for part in (column, interval))
-    cell = force.astype(np.int64) * len(surface.frequencies) + column
-    # By cell, and within one by displacement, in which order they come.
-    sequence = np.argsort(cell, kind="stable")
-    force, column, interval, cell = (
-        part[sequence] for part in (force.astype(np.int32), column, interval, cell)
+    risen = np.diff(rank, axis=1)
+    column, part = np.nonzero(risen)
+    risen = risen[column, part]
+    # Along one run up or down a force is passed once.
+    up = risen > 0
+    new = np.ones(up.size, bool)
+    new[1:] = (up[1:] != up[:-1]) | (column[1:] != column[:-1])
+    first = np.maximum.accumulate(
+        np.where(np.r_[True, column[1:] != column[:-1]][: column.size], np.arange(up.size), 0)
     )
-    new = np.r_[True, cell[1:] != cell[:-1]] if cell.size else np.zeros(0, bool)
-    begin = np.maximum.accumulate(np.where(new, np.arange(cell.size), 0))
-    return Candidates(force, column, interval, np.arange(cell.size) - begin)
+    runs = np.cumsum(new)
+    run = runs - runs[first] if up.size else runs
+    part = part.astype(np.int32)
+    low = np.minimum(rank[column, part], rank[column, part + 1])
+    shape = len(forces), len(surface.frequencies)
+    counts = np.zeros(shape[0] * shape[1], np.int8)
+    cells: list[np.ndarray] = []
+    for place in range(int(run.max(initial=0)) + 1):
+        own = run == place
+        passed = np.abs(risen[own])
+        begins = np.cumsum(passed) - passed
+        cell = np.repeat((low[own] - begins) * shape[1] + column[own], passed)
+        cell += np.arange(0, cell.size * shape[1], shape[1])
+        if not cells:
+            cells.append(np.full(counts.size, -1, np.int32))
+            cells[0][cell] = np.repeat(part[own], passed)
+            counts += cells[0] >= 0
+            continue
+        order = counts[cell]
+        for count in range(int(order.max(initial=-1)) + 1):
+            if count == len(cells):
+                cells.append(np.full(counts.size, -1, np.int32))
+            which = order == count
+            cells[count][cell[which]] = np.repeat(part[own], passed)[which]
+        counts[cell] += 1
+    held = cells if coexisting else cells[:1]
+    lists = []
+    for order, parts in enumerate(held):
+        cell = np.flatnonzero(parts >= 0)
+        force, column = (places.astype(np.int32) for places in np.divmod(cell, shape[1]))
+        lists.append(Candidates(force, column, parts[cell], np.full(cell.size, order, np.int32)))
+    return Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
 
 
-def _weights(share: Lanes) -> tuple[Lanes, ...]:
-    """Give Lagrange's weights of four equidistant nodes at a place between the middle two."""
-    s = share
-    return (
-        -s * (s - 1.0) * (s - 2.0) / 6.0,
-        (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
-        -(s + 1.0) * s * (s - 2.0) / 2.0,
-        (s + 1.0) * s * (s - 1.0) / 6.0,
-    )
-
-
-def candidate_starts(
+def read_surface(
     surface: PlacedSurface,
     states: int,
-    force: Float[Array, " candidate"],
+    force: Int[Array, " candidate"],
     column: Int[Array, " candidate"],
-    interval: Int[Array, " candidate"],
-) -> Starts:
-    """Give the starts of candidates, read off the surface.
+    part: Int[Array, " candidate"],
+) -> Reading:
+    """Give candidates as read off the surface.
 
     Args:
         surface: the surface.
         states: count of states.
-        force: drive amplitude of each candidate.
-        column: place of its frequency on the surface.
-        interval: interval of displacements.
+        force: place of the drive amplitude of each candidate in the window.
+        column: place of its frequency.
+        part: of the displacements.
 
     Returns:
-        The starts.
+        What the surface says of them.
     """
-    tables, displacements, rest = surface[:3]
-    base = jnp.clip(interval - 1, 0, displacements.size - 4)
-    spacing = jnp.log(displacements[1] / displacements[0])
-    logarithm = jnp.log(displacements[base + 1])
-    offset = interval - base - 1.0
-    drive = [[tables[table, column, base + neighbour] for neighbour in range(4)] for table in range(2)]
+    _, pieces, tables, powers = surface.polynomials.shape
+    # Unsigned, and promised to exist: the wrapping of negative places costs more than the reading.
+    force, column, part = (jnp.asarray(places, jnp.uint32) for places in (force, column, part))
+    piece, share = part // PARTS, (part % PARTS) / PARTS
+    base = (column * pieces + piece) * (tables * powers)
+    flat = surface.polynomials.ravel()
 
-    def excess(share: Lanes) -> Lanes:
-        weights = _weights(share)
-        parts = [sum(w * v for w, v in zip(weights, values, strict=True)) for values in drive]
-        return jnp.exp(logarithm + share * spacing) * jnp.hypot(*parts) - force
+    def at_place(values: Array, place: Array) -> Array:
+        return values.at[place].get(mode="promise_in_bounds")
 
-    left, right = offset, offset + 1.0
-    at_left, at_right = excess(left), excess(right)
-    for _ in range(3):
-        share = left - at_left * (right - left) / jnp.where(at_right == at_left, 1.0, at_right - at_left)
-        share = jnp.clip(share, offset, offset + 1.0)
-        value = excess(share)
-        same = (value > 0.0) == (at_left > 0.0)
-        # Illinois: the end that stays counts half, so that both move.
-        at_left, at_right = jnp.where(same, value, 0.5 * at_left), jnp.where(same, 0.5 * at_right, value)
-        left, right = jnp.where(same, share, left), jnp.where(same, right, share)
-    slope = jnp.where(at_right == at_left, 1.0, at_right - at_left)
-    share = jnp.clip(left - at_left * (right - left) / slope, offset, offset + 1.0)
-    weights = _weights(share)
-    size = jnp.exp(logarithm + share * spacing)
+    def polynomial(table: int) -> list[Array]:
+        return [at_place(flat, base + (table * powers + power)) for power in range(powers)]
 
-    def at(table: int) -> Lanes:
-        terms = (w * tables[table, column, base + n] for n, w in enumerate(weights))
-        return sum(terms, start=0.0 * size)
+    push, begin, end = (
+        at_place(surface.amplitudes, force),
+        *(at_place(surface.breaks, piece + k) for k in (0, 1)),
+    )
+    own = [polynomial(table) for table in range(tables)]
+    # Gathered apart from what follows, which then runs in vector registers.
+    own, push, begin, end, share = jax.lax.optimization_barrier((own, push, begin, end, share))
 
-    sine, cosine = at(0), at(1)
-    push = jnp.hypot(sine, cosine)
-    internal = tuple(at(table) * size for table in range(2, states))
-    phases = tuple(at(table) for table in range(states + 1, tables.shape[0]))
+    def value(own: list[Array], at: Array) -> Array:
+        total = own[-1]
+        for coefficient in own[-2::-1]:
+            total = total * at + coefficient
+        return total
+
+    def slope(own: list[Array], at: Array) -> Array:
+        total = (powers - 1) * own[-1]
+        for power in range(powers - 2, 0, -1):
+            total = total * at + power * own[power]
+        return total
+
+    drive = own[:2]
+
+    def square(at: Array) -> Array:
+        return value(drive[0], at) ** 2 + value(drive[1], at) ** 2
+
+    # The parabola through both ends and the middle of the part: which of its roots is known by the slope.
+    left, middle, right = (jnp.sqrt(square(share + k / PARTS)) - push for k in (0.0, 0.5, 1.0))
+    bend, rise = 2.0 * (left + right - 2.0 * middle), 4.0 * middle - 3.0 * left - right
+    root = jnp.where(right >= left, 1.0, -1.0) * jnp.sqrt(jnp.maximum(rise * rise - 4.0 * bend * left, 0.0))
+    same = rise * root >= 0.0
+    over = jnp.where(same, rise + root, 2.0 * bend)
+    passed = jnp.where(same, -2.0 * left, root - rise) / jnp.where(over == 0.0, 1.0, over)
+    at = share + jnp.clip(passed, 0.0, 1.0) / PARTS
+    for _ in range(_POLISHING):
+        parts = [(value(one, at), slope(one, at)) for one in drive]
+        steep = 2.0 * (parts[0][0] * parts[0][1] + parts[1][0] * parts[1][1])
+        gap = parts[0][0] ** 2 + parts[1][0] ** 2 - push * push
+        at = jnp.clip(at - gap / jnp.where(steep == 0.0, 1.0, steep), share, share + 1.0 / PARTS)
+    size = jnp.exp(begin + at * (end - begin))
+    sine, cosine = (value(one, at) for one in drive)
+    internal = tuple(value(own[table], at) * size for table in range(2, states))
+    phases = tuple(value(own[table], at) for table in range(states, tables - 3))
+    half_trace, determinant, response = (value(own[tables - k], at) for k in (3, 2, 1))
     # There the velocity is zero, and the displacement is what the surface counts by.
-    here = (rest + size, 0.0 * size, *internal)
-    return Starts(here, (sine / push, cosine / push), phases, at(states) * size)
+    here = (surface.rest + size, 0.0 * size, *internal)
+    return Reading(here, (sine / push, cosine / push), phases, (half_trace, determinant), response * size)

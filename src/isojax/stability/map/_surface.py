@@ -2,51 +2,52 @@
 
 Over force and frequency the orbits fold: one force belongs to several of them. Over displacement and
 frequency each point belongs to one force. So the orbits are found there, on a coarse grid, and read off for
-any force.
+any force, with the invariants of their period map, from which the multipliers follow.
 """
 
 import math
 from typing import NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
-from scipy.interpolate import make_interp_spline
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, maximum_filter
 
-from ..._types import Lanes
 from ...models import Integrator, Isolator
-from ..orbit import (
-    Crossings,
-    Sine,
-    find_crossings,
-    imposed_balance,
-    period_map,
-    response_amplitudes,
-    rest_displacement,
-    trajectory,
-)
-from ._shared_kinks import shared_kinks
+from ..orbit import response_amplitudes, rest_displacement
+from ._map_method import MapMethod
+from ._nodes import closed_nodes, node_responses, node_starts
+from ._shared_kinks import AROUND, SharedKinks, shared_kinks
+from ._spline import spline_matrix, spline_pieces
 
-_NODE_STEPS = 6
-"""Steps of Newton's method on the coarse grid."""
+_FIRST_NODES = (49, 17)
+"""Displacement amplitudes and frequencies of the first grid; each further one halves the distances."""
 
-_GRID_NODES = (96, 33)
-"""Displacement amplitudes and frequencies of the coarse grid."""
+LEVELS = 2
+"""Times at most that the distances of the nodes are halved."""
 
-_FINE = 1024
-"""Displacement amplitudes between which roots are sought."""
+_FEW = 0.002
+"""Share of the nodes whose orbits may be left to Newton's method."""
 
-_NODE_CROSSINGS = 16
-"""Kinks an orbit to make room for."""
+_LARGEST_RESPONSE = 2.0
+"""Half the peak-to-peak displacement over the largest from rest, beyond which a motion did not close: it
+starts at its largest displacement."""
 
-_NODE_CLOSED_TO = 1e-6
-"""What a node's orbit may leave open, over its size; where it leaves more, the one-harmonic start is kept."""
+_ROOM = 2
+"""Nodes of the first grid beyond the largest displacement that is held."""
 
-_SPLINE = 5
-"""Degree of the splines between the nodes."""
+PARTS = 8
+"""Parts of a spline's piece between whose ends roots are sought."""
+
+_GAIN = 64.0
+"""How many times smaller a spline of degree five makes its error with nodes half as far apart, where the
+function is smooth; a sample of cells then says whether it is."""
+
+LEAST_SLOPE = 0.1
+"""Smallest slope of the characteristic polynomial that an error of a multiplier is divided by: where two
+multipliers all but coincide they separate like the square root of any error, and their distance would say
+more of the place than of the error."""
 
 
 class MapWindow(NamedTuple):
@@ -66,86 +67,56 @@ class MapWindow(NamedTuple):
 class Surface(NamedTuple):
     """Orbits over displacement amplitude and frequency; each orbit starts at its largest displacement.
 
+    Tables are the drive, sine and cosine; over the displacement amplitude the internal states; the phases at
+    which each orbit passes the kinks that most pass in this order; half the trace and the determinant of the
+    derivative of the period map, or of its half; half the peak-to-peak displacement over the amplitude. On
+    each piece of displacements they are polynomials in its logarithm.
+
     Attributes:
         rest: displacement at rest [m].
-        amplitudes: a, largest displacement over rest [m], equidistant in the logarithm.
+        breaks: logarithm of displacement over rest [m] where one piece ends and the next begins.
         frequencies: [Hz].
-        stiffness: drive in phase (sine) and in quadrature (cosine) over a [N/m].
-        internal: internal states at the largest displacement, over a.
-        response: half the peak-to-peak displacement over a.
-        phases: phase at which each orbit passes each kink [rad], of the kinks that most pass in this order.
-        sides: signs of the kinks between these.
-        shared: whether the orbits of an interval of displacements pass the kinks in this order.
+        polynomials: of the tables; powers of the share of a piece that is passed.
+        force: drive amplitude [N, or m/s^2 for base excitation] at the ends of equal parts of the pieces.
+        sides: signs of the kinks between those that are passed.
+        shared: whether the orbits of a part pass the kinks in this order.
+        error: of multipliers read off, by the nodes that a coarser grid lacked; infinite where none can be.
     """
 
     rest: float
-    amplitudes: Float[np.ndarray, " displacement"]
+    breaks: Float[np.ndarray, " break"]
     frequencies: Float[np.ndarray, " frequency"]
-    stiffness: Float[np.ndarray, "2 frequency displacement"]
-    internal: Float[np.ndarray, "internal frequency displacement"]
-    response: Float[np.ndarray, "frequency displacement"]
-    phases: Float[np.ndarray, "crossing frequency displacement"]
+    polynomials: Float[np.ndarray, "frequency piece table power"]
+    force: Float[np.ndarray, "frequency end"]
     sides: Float[np.ndarray, "piece kink"]
-    shared: Bool[np.ndarray, "frequency interval"]
-
-    @property
-    def tables(self) -> Float[np.ndarray, "table frequency displacement"]:
-        """All that is read off for a candidate: stiffness, internal states, response, phases."""
-        return np.concatenate([self.stiffness, self.internal, self.response[None], self.phases])
-
-    @property
-    def force(self) -> Float[np.ndarray, "frequency displacement"]:
-        """Drive amplitude that holds each orbit [N, or m/s^2 for base excitation]."""
-        return self.amplitudes * np.hypot(self.stiffness[0], self.stiffness[1])
+    shared: Bool[np.ndarray, "frequency part"]
+    error: Float[np.ndarray, "frequency part"]
 
 
-@eqx.filter_jit
-def _nodes(
-    model: Isolator,
-    integrator: Integrator,
-    half: bool,
-    rest: Float[Array, ""],
-    amplitude: Float[Array, " node"],
-    frequency: Float[Array, " node"],
-) -> tuple[Array, Array, Array, Crossings]:
-    turns = 0.5 if half else 1.0
+class _Grid(NamedTuple):
+    """Orbits at the nodes of a grid.
 
-    def node(a: Array, f: Array) -> tuple[Array, Array, Array, Crossings]:
-        guess, cycle = imposed_balance(model, a, f, rest)
-        push = jnp.hypot(guess.sine, jnp.asarray(guess.cosine))
-        internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
-        inner = jnp.where(internal == 0.0, a, jnp.abs(internal))
-        omega = 2.0 * math.pi * f
+    Attributes:
+        logarithms: of the displacement amplitudes [m].
+        frequencies: [Hz].
+        tables: those of the surface, but the drive over the displacement amplitude.
+        error: of multipliers read off, by the nodes that the grid before lacked; infinite at open orbits.
+    """
 
-        def unpack(unknown: Array) -> tuple[Sine, tuple[Lanes, ...]]:
-            state = (rest + a, 0.0 * a, *(unknown[2:] * inner))
-            return Sine(unknown[0] * push, unknown[1] * push, f), state
+    logarithms: Float[np.ndarray, " displacement"]
+    frequencies: Float[np.ndarray, " frequency"]
+    tables: Float[np.ndarray, "table frequency displacement"]
+    error: Float[np.ndarray, "frequency displacement"]
 
-        def gap(unknown: Array) -> Array:
-            drive, state = unpack(unknown)
-            moved = period_map(model, integrator, drive, state, turns=turns)
-            scale = (a, a * omega, *inner)
-            return jnp.stack([(m - s) / c for m, s, c in zip(moved, state, scale, strict=True)])
-
-        start = jnp.concatenate([jnp.stack([guess.sine, guess.cosine]) / push, internal / inner])
-
-        def improve(_: Array | int, unknown: Array) -> Array:
-            step = jnp.linalg.solve(jax.jacfwd(gap)(unknown), gap(unknown))
-            # Far from the balance of one harmonic a full step may leave the basin.
-            return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
-
-        found = jax.lax.fori_loop(0, _NODE_STEPS, improve, start)
-        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _NODE_CLOSED_TO)
-        unknown = jnp.where(good, found, start)
-        drive, state = unpack(unknown)
-        path = trajectory(model, integrator, drive, state, turns=turns)
-        low, high = jnp.min(path[0]), jnp.max(path[0])
-        response = (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / a
-        stiffness = jnp.stack([drive.sine, jnp.asarray(drive.cosine)]) / a
-        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _NODE_CROSSINGS)
-        return stiffness, unknown[2:] * inner / a, response, crossings
-
-    return jax.vmap(node)(amplitude, frequency)
+    def at(
+        self, logarithms: np.ndarray, frequencies: np.ndarray
+    ) -> Float[np.ndarray, "table frequency node"]:
+        """Give the tables elsewhere."""
+        rows, columns = (
+            spline_matrix(self.frequencies, frequencies),
+            spline_matrix(self.logarithms, logarithms),
+        )
+        return rows @ (self.tables @ columns.T)
 
 
 @eqx.filter_jit
@@ -175,58 +146,180 @@ def _displacements(model: Isolator, window: MapWindow) -> tuple[float, float, fl
     return float(rest), 0.5 * low, window.reach * float(grid[int(reached.max())])
 
 
-def find_surface(model: Isolator, integrator: Integrator, half: bool, window: MapWindow) -> Surface:
-    """Find the orbits over displacement and frequency that a window of force and frequency can hold."""
-    (rest, low, high), frequencies = _displacements(model, window), window.frequencies
-    displacements, columns = _GRID_NODES
-    single = len(frequencies) == 1
-    band = (
-        frequencies if len(frequencies) <= columns else _chebyshev(frequencies[0], frequencies[-1], columns)
+def find_surface(
+    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, goal: float
+) -> Surface:
+    """Find the orbits over displacement and frequency that a window of force and frequency can hold.
+
+    Each grid starts from the spline of the one before. Nodes are added until all but a few of the orbits that
+    are asked for can be read off.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period.
+        half: whether to use the half-period map.
+        window: of the map.
+        goal: error down to which multipliers are to be read off.
+
+    Returns:
+        The surface.
+    """
+    rest, low, high = _displacements(model, window)
+    ends = math.log(low), math.log(high)
+    start, kinks = _start_grid(model, integrator, half, rest, ends, window.frequencies)
+    steps = jnp.asarray(integrator.steps_a_period(model))
+    method = MapMethod(integrator, half, jnp.asarray(kinks.sides), steps)
+    ends, grid = _ends_needed(start, window), start
+    for level in range(1, 1 + LEVELS):
+        nodes = _axes(ends, window.frequencies, level)
+        own = kinks.shared[np.ix_(_place(start.frequencies, nodes[1]), _place(start.logarithms, nodes[0]))]
+        rows = 1 if nodes[1] is window.frequencies else 2
+        grid = _closed_grid(model, method, rest, grid, nodes, rows, own)
+        if not _needs_doubling(grid, window, goal):
+            break
+    pieces = spline_pieces(grid.logarithms)
+    tables = _with_responses(model, integrator, half, rest, grid)
+    tables[:2] *= np.exp(grid.logarithms)
+    count, columns = tables.shape[0], len(window.frequencies)
+    basis = (tables @ pieces.to_basis.T).transpose(1, 0, 2).reshape(len(grid.frequencies), -1)
+    basis = spline_matrix(grid.frequencies, window.frequencies) @ basis
+    polynomials = pieces.polynomials(basis.reshape(columns, count, -1))
+    shares = (np.arange(PARTS)[:, None] / PARTS) ** np.arange(polynomials.shape[-1])
+    drive = np.moveaxis(polynomials[:, :, :2], 2, 0) @ shares.T
+    last = polynomials[:, -1, :2].sum(axis=-1)
+    square = np.concatenate(
+        [(drive**2).sum(axis=0).reshape(columns, -1), (last**2).sum(axis=1)[:, None]], axis=1
     )
-    coarse = np.geomspace(low, high, displacements)
-    frequency, amplitude = np.meshgrid(band, coarse, indexing="ij")
-    found = _nodes(
-        model,
-        integrator,
-        half,
-        jnp.asarray(rest),
-        jnp.asarray(amplitude.ravel()),
-        jnp.asarray(frequency.ravel()),
-    )
-    shape = (len(band), displacements)
-    stiffness, internal, response = (np.asarray(table).reshape(*shape, -1) for table in found[:3])
-    kinks = shared_kinks(found[3], shape, math.pi if half else 2.0 * math.pi)
-    tables = _filled(np.concatenate([stiffness, internal, response, kinks.phases], axis=-1))
-    if not single and len(frequencies) > columns:
-        tables = np.tensordot(_spline_matrix(band, frequencies), tables, axes=(1, 0))
-    fine = np.geomspace(low, high, _FINE)
-    tables = np.moveaxis(tables, -1, 0) @ _spline_matrix(np.log(coarse), np.log(fine)).T
-    last = 2 + model.internal_states
-    rows = np.searchsorted(band, frequencies).clip(0, len(band) - 1)
-    middles = np.sqrt(fine[:-1] * fine[1:])
-    shared = kinks.shared[rows][:, np.searchsorted(coarse, middles).clip(0, displacements - 1)]
-    phases = tables[last + 1 :]
-    return Surface(
-        rest, fine, frequencies, tables[:2], tables[2:last], tables[last], phases, kinks.sides, shared
+    force = np.sqrt(square)
+    parts = np.linspace(pieces.breaks[:-1], pieces.breaks[1:], 2 * PARTS + 1, axis=1)[:, 1::2].ravel()
+    shared = kinks.shared[
+        np.ix_(_place(start.frequencies, window.frequencies), _place(start.logarithms, parts))
+    ]
+    around = maximum_filter(grid.error, [2 * reach + 1 for reach in AROUND])
+    error = around[np.ix_(_place(grid.frequencies, window.frequencies), _place(grid.logarithms, parts))]
+    error = np.where(shared, error, np.inf)
+    return Surface(rest, pieces.breaks, window.frequencies, polynomials, force, kinks.sides, shared, error)
+
+
+def _start_grid(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: float,
+    ends: tuple[float, float],
+    frequencies: Float[np.ndarray, " frequency"],
+) -> tuple[_Grid, SharedKinks]:
+    """Find orbits that are not split, without their invariants, and the kinks that most of them pass."""
+    logarithms, band = _axes(ends, frequencies, 0)
+    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
+    coarse = integrator.with_steps(2 * (integrator.steps_per_period // 4 + 2))
+    starts = node_starts(model, coarse, half, rest, amplitude, frequency)
+    shape = len(band), len(logarithms)
+    kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
+    unknown = _filled(starts.unknown.T.reshape(-1, *shape)), np.moveaxis(kinks.phases, -1, 0)
+    tables = np.concatenate([*unknown, np.zeros((2, *shape)), np.ones((1, *shape))])
+    return _Grid(logarithms, band, tables, np.full(shape, np.inf)), kinks
+
+
+def _axes(ends: tuple[float, float], frequencies: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray]:
+    """Give logarithms of displacement amplitudes and frequencies of a grid."""
+    displacements, columns = (((count - 1) << level) + 1 for count in _FIRST_NODES)
+    if len(frequencies) <= columns:
+        return np.linspace(*ends, displacements), frequencies
+    # Denser at the ends, where a spline has fewest neighbours.
+    middle, reach = 0.5 * (frequencies[0] + frequencies[-1]), 0.5 * (frequencies[-1] - frequencies[0])
+    return np.linspace(*ends, displacements), middle - reach * np.cos(
+        np.pi * np.arange(columns) / (columns - 1)
     )
 
 
-def _filled(tables: Float[np.ndarray, "frequency displacement table"]) -> np.ndarray:
-    """Give the nearest node's values where the motion ran away: one such would spoil all splines."""
-    lost = ~np.isfinite(tables).all(axis=-1)
+def _ends_needed(grid: _Grid, window: MapWindow) -> tuple[float, float]:
+    """Give the least and largest logarithm of the displacements that the forces hold, with some room."""
+    force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
+    held = np.flatnonzero((force <= window.amplitudes[-1]).any(axis=0))
+    last = min(int(held.max(initial=0)) + _ROOM, len(grid.logarithms) - 1)
+    return float(grid.logarithms[0]), float(grid.logarithms[last])
+
+
+def _place(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Give the node at or behind each place."""
+    return np.searchsorted(nodes, places).clip(0, len(nodes) - 1)
+
+
+def _closed_grid(
+    model: Isolator,
+    method: MapMethod,
+    rest: float,
+    coarse: _Grid,
+    nodes: tuple[np.ndarray, np.ndarray],
+    every: int,
+    shared: Bool[np.ndarray, "frequency node"],
+) -> _Grid:
+    """Close the orbits at other nodes that share the order of kinks; the others stay as the grid has them.
+
+    The error is that of a spline through every second displacement, and every so many frequencies.
+    """
+    tables, error = coarse.at(*nodes), np.full(shared.shape, np.inf)
+    if not shared.any():
+        return _Grid(*nodes, tables, error)
+    frequency, amplitude = np.meshgrid(nodes[1], np.exp(nodes[0]), indexing="ij")
+    found = closed_nodes(model, method, rest, amplitude[shared], frequency[shared], tables[:-3, shared].T)
+    closed = shared.copy()
+    closed[shared] = found.closed
+    tables[:-1, closed] = np.concatenate([found.unknown, found.invariants], axis=1)[found.closed].T
+    tables[-3:-1] = _filled(np.where(closed, tables[-3:-1], np.nan))
+    # At the frequencies of the map itself no spline is needed over them.
+    fewer = _Grid(nodes[0][::2], nodes[1][::every], tables[:, ::every, ::2], error)
+    error[closed] = _reading_error(fewer.at(*nodes), tables, nodes[0], method.half)[closed] / _GAIN
+    return _Grid(*nodes, tables, error)
+
+
+def _with_responses(
+    model: Isolator, integrator: Integrator, half: bool, rest: float, grid: _Grid
+) -> Float[np.ndarray, "table frequency displacement"]:
+    """Give the tables of a grid with half the peak-to-peak displacements."""
+    frequency, amplitude = np.meshgrid(grid.frequencies, np.exp(grid.logarithms), indexing="ij")
+    unknown = grid.tables[: 2 + model.internal_states].reshape(-1, amplitude.size).T
+    sizes = node_responses(model, integrator, half, rest, amplitude.ravel(), frequency.ravel(), unknown)
+    sizes = sizes.reshape(1, *amplitude.shape)
+    # Of a motion that ran away there is none.
+    sizes = _filled(np.where(sizes < _LARGEST_RESPONSE, sizes, np.nan))
+    return np.concatenate([grid.tables[:-1], sizes])
+
+
+def _reading_error(
+    read: np.ndarray, tables: np.ndarray, logarithms: np.ndarray, half: bool
+) -> Float[np.ndarray, "frequency displacement"]:
+    """Give the error of multipliers that are read off tables at the same force, to first order."""
+    force, read_force = (np.log(np.hypot(own[0], own[1])) + logarithms for own in (tables, read))
+    half_trace, determinant = tables[-3:-1]
+    slopes = [np.gradient(values, logarithms, axis=1) for values in (force, half_trace, determinant)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moved = (read_force - force) / slopes[0]
+        trace_error = read[-3] - half_trace - slopes[1] * moved
+        determinant_error = read[-2] - determinant - slopes[2] * moved
+        spread = np.sqrt((half_trace**2 - determinant).astype(complex))
+        worst = np.zeros(force.shape)
+        for sign in (1.0, -1.0):
+            root = half_trace + sign * spread
+            error = np.abs(determinant_error - 2.0 * root * trace_error) / np.maximum(
+                2.0 * np.abs(spread), LEAST_SLOPE
+            )
+            worst = np.maximum(worst, error * (2.0 * np.abs(root) if half else 1.0))
+    return np.where(np.isfinite(worst), worst, np.inf)
+
+
+def _needs_doubling(grid: _Grid, window: MapWindow, goal: float) -> bool:
+    """Say whether more of the orbits that are asked for than a few cannot be read off."""
+    force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
+    asked = (force >= window.amplitudes[0]) & (force <= window.amplitudes[-1])
+    return bool(asked.any() and np.mean(grid.error[asked] > goal) > _FEW)
+
+
+def _filled(tables: Float[np.ndarray, "table frequency displacement"]) -> np.ndarray:
+    """Give the nearest node's values where there are none: one such would spoil all splines."""
+    lost = ~np.isfinite(tables).all(axis=0)
     if not lost.any() or lost.all():
         return tables
     nearest = distance_transform_edt(lost, return_distances=False, return_indices=True)
-    return tables[tuple(np.asarray(nearest))]
-
-
-def _spline_matrix(
-    nodes: Float[np.ndarray, " node"], places: Float[np.ndarray, " place"]
-) -> Float[np.ndarray, "place node"]:
-    """Give what turns values at nodes into a spline's values: one product instead of a spline a table."""
-    return make_interp_spline(nodes, np.eye(nodes.size), k=_SPLINE)(places)
-
-
-def _chebyshev(start: float, stop: float, count: int) -> Float[np.ndarray, " node"]:
-    """Give nodes that are denser at the ends, where a spline has fewest neighbours."""
-    return 0.5 * (start + stop) - 0.5 * (stop - start) * np.cos(np.pi * np.arange(count) / (count - 1))
+    return tables[:, *np.asarray(nearest)]

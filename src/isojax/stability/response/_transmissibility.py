@@ -13,8 +13,11 @@ from ..._show import number, shown
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import Integrator, Isolator, Modelled, State, as_isolator
 from ..map import StabilityMap, stability_map
-from ..orbit import Sine, ascending, period_map, trajectory
+from ..orbit import Sine, ascending, period_map, recorded_sine, trajectory
 from ._frequency_response import fundamental
+
+_CLOSING_STEPS = 3
+"""Steps of Newton's method from an orbit of a map to machine precision."""
 
 
 @shown
@@ -28,7 +31,7 @@ class Transmissibility(eqx.Module):
         frequencies: [Hz].
         ratio: of the complex amplitudes of the fundamentals.
         peak: of half the peak-to-peak values, the harmonics included: of the forces, or of the displacements.
-        spectral_radius: of each orbit.
+        spectral_radius: of each orbit; constant to JAX: `sensitivity` of a map has its derivatives.
         result: whether the orbit was found; beside NaN, why not.
     """
 
@@ -105,23 +108,26 @@ def transmissibility(
         raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
     frozen = jax.lax.stop_gradient(model)
     orbits = stability_map(frozen, held[None], band, coexisting=coexisting, integrator=integrator)
-    ratio, peak = _passed(model, frozen, force, orbits)
-    result = jax.tree.map(lambda values: values[..., 0, :], orbits.result)
+    ratio, peak = _passed(model, frozen, force, orbits, orbits.y0[..., 0, :, :])
     radius = orbits.spectral_radius[..., 0, :]
+    result = jax.tree.map(lambda values: values[..., 0, :], orbits.result)
     return Transmissibility(force, jnp.asarray(band), ratio, peak, radius, result)
 
 
 @eqx.filter_jit
 def _passed(
-    model: Isolator, frozen: Isolator, amplitude: Float[Array, ""], orbits: StabilityMap
+    model: Isolator,
+    frozen: Isolator,
+    amplitude: Float[Array, ""],
+    orbits: StabilityMap,
+    y0: Float[Array, "*orbit frequency state"],
 ) -> tuple[Complex[Array, "*orbit frequency"], Float[Array, "*orbit frequency"]]:
-    shape = orbits.spectral_radius[..., 0, :].shape
+    shape = y0.shape[:-1]
     frequency = jnp.broadcast_to(orbits.frequencies, shape).ravel()
-    sine, cosine = jnp.moveaxis(orbits.direction[..., 0, :, :].reshape(-1, 2), -1, 0)
-    drive = Sine(sine * amplitude, cosine * amplitude, frequency)
-    states = orbits.start.shape[-1]
-    start = orbits.start[..., 0, :, :].reshape(-1, states)
-    state = _closed(model, frozen, orbits, drive, start)
+    # From the phase zero of the recorded drive: one that moved with the orbit would move the steps along it.
+    drive = recorded_sine(model, jnp.broadcast_to(amplitude, frequency.shape), frequency)
+    drive = drive._replace(cosine=jnp.broadcast_to(jnp.asarray(drive.cosine), frequency.shape))
+    state = _closed(model, frozen, orbits, drive, y0.reshape(-1, y0.shape[-1]))
     path = trajectory(model, orbits.integrator, drive, tuple(state.T))
     turn = 2.0 * np.pi / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
     at = jax.vmap(drive.at)(jnp.asarray(np.sin(turn)), jnp.asarray(np.cos(turn)))
@@ -142,7 +148,10 @@ def _passed(
 def _closed(
     model: Isolator, frozen: Isolator, orbits: StabilityMap, drive: Sine, start: Float[Array, "lane state"]
 ) -> Float[Array, "lane state"]:
-    """Close each orbit by one step, whose derivative is that of the orbit itself."""
+    """Close each orbit, with the derivative of the orbit itself.
+
+    Closed to machine precision first: a step of Newton's method has the derivative of the orbit only there.
+    """
     turns = 0.5 if orbits.symmetric else 1.0
 
     def lane(sine: Array, cosine: Array, frequency: Array, state: Array) -> Array:
@@ -153,8 +162,15 @@ def _closed(
             end: State = period_map(isolator, orbits.integrator, force, tuple(here), turns=turns)
             return jnp.stack(end)
 
-        slope = jax.jacfwd(lambda here: moved(frozen, still, here))(state)
-        return state + jnp.linalg.solve(jnp.eye(state.size) - slope, moved(model, push, state) - state)
+        def improved(here: Array, live: Isolator, force: Sine) -> Array:
+            slope = jax.jacfwd(lambda it: moved(frozen, still, it))(here)
+            return here + jnp.linalg.solve(jnp.eye(state.size) - slope, moved(live, force, here) - here)
+
+        def closing(_: Array | int, here: Array) -> Array:
+            return improved(here, frozen, still)
+
+        near = jax.lax.fori_loop(0, _CLOSING_STEPS, closing, state)
+        return improved(near, model, push)
 
     return jax.vmap(lane)(drive.sine, jnp.asarray(drive.cosine), drive.frequency, start)
 

@@ -1,0 +1,96 @@
+"""How an orbit of a map is integrated over: with how many steps, and split at which kinks."""
+
+import math
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from ..._types import Lanes
+from ...models import Integrator, Isolator, State
+from ..orbit import Crossings, Sine, advance_across_kinks
+
+
+class Lane(NamedTuple):
+    """What one orbit is found from: one number each, or one lane of numbers.
+
+    Attributes:
+        state: start.
+        drive: the drive, tau counted from the start.
+        phases: where the orbit passes kinks.
+        response: half the peak-to-peak displacement [m].
+    """
+
+    state: State
+    drive: Sine
+    phases: State
+    response: Lanes
+
+
+class MapMethod(eqx.Module):
+    """How a period is integrated over.
+
+    Attributes:
+        integrator: the solver and the tolerances.
+        half: whether the half-period map is used.
+        sides: signs of the kinks on each piece; None where orbits are not split.
+        steps: a period; a number on the device, so that one compiled step serves for all.
+    """
+
+    integrator: Integrator
+    half: bool = eqx.field(static=True)
+    sides: Float[Array, "piece kink"] | None
+    steps: Int[Array, ""]
+
+    def finer(self, times: int) -> "MapMethod":
+        """Give the same way with more steps.
+
+        Args:
+            times: how many times as many.
+
+        Returns:
+            The method.
+        """
+        return MapMethod(self.integrator, self.half, self.sides, self.steps * times)
+
+    def moved(self, model: Isolator, lane: Lane) -> State:
+        """Give the state one period later, or minus the state half a period later.
+
+        Args:
+            model: the isolator.
+            lane: one orbit.
+
+        Returns:
+            The state.
+        """
+        return self.moved_past(model, lane, None)[0]
+
+    def moved_past(
+        self, model: Isolator, lane: Lane, kinks: Int[Array, " crossing"] | None
+    ) -> tuple[State, Float[Array, " crossing"]]:
+        """Give the state as `moved` does, and the kink functions where the orbit is said to pass them.
+
+        Args:
+            model: the isolator.
+            lane: one orbit.
+            kinks: which kink it passes at each phase; None where their values are of no interest.
+
+        Returns:
+            The state, and the values, zero where the phases are right.
+        """
+        phases = () if self.sides is None else lane.phases
+        pieces = len(phases) + 1
+        parts = pieces * (2 if self.half else 1)
+        steps = (self.steps + parts - 1) // parts
+        crossings = Crossings(
+            jnp.stack(phases) if phases else jnp.zeros(0),
+            jnp.full(pieces - 1, -1) if kinks is None else kinks,
+            self.sides,
+            jnp.array(True),
+        )
+        end = math.pi if self.half else 2.0 * math.pi
+        after, reached = advance_across_kinks(
+            model, self.integrator, lane.drive, lane.state, crossings, end, steps
+        )
+        return (tuple(-value for value in after) if self.half else after), reached

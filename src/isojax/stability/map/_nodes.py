@@ -1,0 +1,320 @@
+"""Orbits of imposed displacement at the nodes of a grid: with the displacement given, the drive is sought."""
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ..._cores import usable_cores
+from ..._types import Lanes
+from ...models import Integrator, Isolator
+from ..orbit import (
+    Crossings,
+    Sine,
+    find_crossings,
+    imposed_balance,
+    period_map,
+    trajectory,
+    value_and_jacobian,
+)
+from ._map_method import Lane, MapMethod
+
+_START_STEPS = 6
+"""Steps of Newton's method from the balance of one harmonic."""
+
+_CLOSING_STEPS = 6
+"""Steps of Newton's method at most from orbits that were read off a coarser grid."""
+
+_NEARLY_CLOSED = 1e-4
+"""Relative step of Newton's method after which one more, whose size is its square, is the last."""
+
+_CLOSED_TO = 1e-7
+"""Last relative step before which the multipliers of a node count as exact."""
+
+_START_CLOSED_TO = 1e-6
+"""What a start may leave open, over its size; where it leaves more, the one-harmonic balance is kept."""
+
+_CROSSINGS = 16
+"""Kinks an orbit to make room for."""
+
+_BLOCK = 544
+"""Nodes solved at once: one compiled batch serves grids of any size, and each core runs its own."""
+
+
+class NodeStarts(NamedTuple):
+    """Orbits of nodes, not split at kinks; node first.
+
+    Attributes:
+        unknown: drive in phase (sine) and in quadrature (cosine) over the displacement amplitude [N/m], then
+            the internal states at the largest displacement over it.
+        crossings: the kinks that each passes.
+    """
+
+    unknown: Float[np.ndarray, "node unknown"]
+    crossings: Crossings
+
+
+class NodeOrbits(NamedTuple):
+    """Closed orbits of nodes, split at kinks; node first.
+
+    Attributes:
+        unknown: as of `NodeStarts`, then the phases of the kinks.
+        invariants: half the trace and the determinant of the derivative of the period map, or of the half.
+        closed: whether each is closed.
+    """
+
+    unknown: Float[np.ndarray, "node unknown"]
+    invariants: Float[np.ndarray, "node 2"]
+    closed: Bool[np.ndarray, " node"]
+
+
+def _in_blocks(work: Callable[..., Any], *values: np.ndarray) -> Any:
+    """Do the work on blocks of nodes, as many at once as there are cores."""
+    count = values[0].shape[0]
+
+    def one(begin: int) -> Any:
+        rows = [value[begin : begin + _BLOCK] for value in values]
+        fill = _BLOCK - rows[0].shape[0]
+        padded = [np.concatenate([row, np.repeat(row[-1:], fill, axis=0)]) for row in rows]
+        return jax.tree.map(np.asarray, work(*padded))
+
+    with ThreadPoolExecutor(usable_cores()) as pool:
+        parts = list(pool.map(one, range(0, count, _BLOCK)))
+    return jax.tree.map(lambda *own: np.concatenate(own)[:count], *parts)
+
+
+def node_starts(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: float,
+    amplitude: Float[np.ndarray, " node"],
+    frequency: Float[np.ndarray, " node"],
+) -> NodeStarts:
+    """Find orbits of imposed displacement from the balance of one harmonic.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period.
+        half: whether to use the half-period map.
+        rest: displacement at rest [m].
+        amplitude: largest displacement over rest [m].
+        frequency: [Hz].
+
+    Returns:
+        The orbits; where none was found the balance.
+    """
+    return NodeStarts(
+        *_in_blocks(
+            lambda a, f: _starts(model, integrator, half, jnp.asarray(rest), a, f), amplitude, frequency
+        )
+    )
+
+
+@eqx.filter_jit
+def _starts(
+    model: Isolator, integrator: Integrator, half: bool, rest: Array, amplitude: Array, frequency: Array
+) -> tuple[Array, Crossings]:
+    turns = 0.5 if half else 1.0
+
+    def node(a: Array, f: Array) -> tuple[Array, Crossings]:
+        guess, cycle = imposed_balance(model, a, f, rest)
+        push = jnp.hypot(guess.sine, jnp.asarray(guess.cosine))
+        internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
+        inner = jnp.where(internal == 0.0, a, jnp.abs(internal))
+        omega = 2.0 * math.pi * f
+
+        def unpack(unknown: Array) -> tuple[Sine, tuple[Lanes, ...]]:
+            state = (rest + a, 0.0 * a, *(unknown[2:] * inner))
+            return Sine(unknown[0] * push, unknown[1] * push, f), state
+
+        def gap(unknown: Array) -> Array:
+            drive, state = unpack(unknown)
+            moved = period_map(model, integrator, drive, state, turns=turns)
+            scale = (a, a * omega, *inner)
+            return jnp.stack([(m - s) / c for m, s, c in zip(moved, state, scale, strict=True)])
+
+        start = jnp.concatenate([jnp.stack([guess.sine, guess.cosine]) / push, internal / inner])
+
+        def improve(_: Array | int, unknown: Array) -> Array:
+            left, slope = value_and_jacobian(gap, unknown)
+            step = jnp.linalg.solve(slope, left)
+            # Far from the balance of one harmonic a full step may leave the basin.
+            return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
+
+        found = jax.lax.fori_loop(0, _START_STEPS, improve, start)
+        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _START_CLOSED_TO)
+        unknown = jnp.where(good, found, start)
+        drive, state = unpack(unknown)
+        path = trajectory(model, integrator, drive, state, turns=turns)
+        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _CROSSINGS)
+        over = jnp.concatenate([jnp.full(2, push), inner]) / a
+        return unknown * over, crossings
+
+    return jax.vmap(node)(amplitude, frequency)
+
+
+def closed_nodes(
+    model: Isolator,
+    method: MapMethod,
+    rest: float,
+    amplitude: Float[np.ndarray, " node"],
+    frequency: Float[np.ndarray, " node"],
+    start: Float[np.ndarray, "node unknown"],
+) -> NodeOrbits:
+    """Close orbits of imposed displacement, split at their kinks, to machine precision.
+
+    Unknown are the drive, the internal states at the largest displacement and the phases of the kinks.
+
+    Args:
+        model: the isolator.
+        method: how to integrate.
+        rest: displacement at rest [m].
+        amplitude: largest displacement over rest [m].
+        frequency: [Hz].
+        start: near the orbits, as `NodeOrbits.unknown`.
+
+    Returns:
+        The orbits.
+    """
+    sides = np.asarray(method.sides)
+    kinks = np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
+
+    def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
+        return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *map(jnp.asarray, rows))
+
+    return NodeOrbits(*_in_blocks(work, amplitude, frequency, start))
+
+
+@eqx.filter_jit
+def _closed(
+    model: Isolator,
+    method: MapMethod,
+    kinks: Int[Array, " crossing"],
+    rest: Array,
+    amplitude: Array,
+    frequency: Array,
+    start: Array,
+) -> tuple[Array, Array, Array]:
+    states = 2 + model.internal_states
+
+    def sizes(a: Array, f: Array, scale: Array) -> Array:
+        return jnp.concatenate([jnp.stack([a, a * 2.0 * math.pi * f]), a * scale[2:states]])
+
+    def left(a: Array, f: Array, scale: Array, unknown: Array, shift: Array) -> Array:
+        real = unknown * scale
+        state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), a * real[2:states]])
+        state = state + shift * sizes(a, f, scale)
+        drive = Sine(a * real[0], a * real[1], f)
+        moved, reached = method.moved_past(model, Lane(tuple(state), drive, tuple(real[states:]), a), kinks)
+        return jnp.concatenate([(jnp.stack(moved) - state) / sizes(a, f, scale), reached])
+
+    def newton(a: Array, f: Array, scale: Array, unknown: Array) -> tuple[Array, Array]:
+        """Give the step of Newton's method and its size."""
+        gap, slope = value_and_jacobian(lambda own: left(a, f, scale, own, jnp.zeros(states)), unknown)
+        step = jnp.linalg.solve(slope, gap)
+        size = jnp.max(jnp.abs(step))
+        return step * jnp.minimum(1.0, 0.3 / size), size
+
+    def last(a: Array, f: Array, scale: Array, unknown: Array) -> tuple[Array, Array, Array]:
+        """Give the last step, its size, and half the trace and the determinant of the map's derivative."""
+        count = unknown.size
+
+        def whole(own: Array) -> Array:
+            return left(a, f, scale, own[:count], own[count:])
+
+        gap, slope = value_and_jacobian(whole, jnp.concatenate([unknown, jnp.zeros(states)]))
+        step = jnp.linalg.solve(slope[:, :count], gap)
+        matrix = slope[:states, count:] + jnp.eye(states)
+        if count > states:
+            # The instants of the kinks follow the disturbance.
+            follow = jnp.linalg.solve(slope[states:, states:count], slope[states:, count:])
+            matrix = matrix - slope[:states, states:count] @ follow
+        return step, jnp.max(jnp.abs(step)), jnp.stack([0.5 * jnp.trace(matrix), jnp.linalg.det(matrix)])
+
+    def scaled(begin: Array) -> Array:
+        push = jnp.full(2, jnp.hypot(begin[0], begin[1]))
+        inner = begin[2:states]
+        return jnp.concatenate(
+            [push, jnp.where(inner == 0.0, 1.0, jnp.abs(inner)), jnp.ones(begin.size - states)]
+        )
+
+    scale = jax.vmap(scaled)(start)
+
+    def body(carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        unknown, _, count = carry
+        step, size = jax.vmap(newton)(amplitude, frequency, scale, unknown)
+        return unknown - step, size, count + 1
+
+    def unfinished(carry: tuple[Array, Array, Array]) -> Array:
+        _, size, count = carry
+        return jnp.any((size > _NEARLY_CLOSED) & jnp.isfinite(size)) & (count < _CLOSING_STEPS)
+
+    begin = (start / scale, jnp.full(amplitude.shape, 1.0), jnp.asarray(0))
+    unknown, _, _ = jax.lax.while_loop(unfinished, body, begin)
+    step, size, invariants = jax.vmap(last)(amplitude, frequency, scale, unknown)
+    return (unknown - step) * scale, invariants, size <= _CLOSED_TO
+
+
+def node_responses(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: float,
+    amplitude: Float[np.ndarray, " node"],
+    frequency: Float[np.ndarray, " node"],
+    unknown: Float[np.ndarray, "node unknown"],
+) -> Float[np.ndarray, " node"]:
+    """Give half the peak-to-peak displacement of orbits, over their largest displacement from rest.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period.
+        half: whether the second half of each motion is minus the first.
+        rest: displacement at rest [m].
+        amplitude: largest displacement over rest [m].
+        frequency: [Hz].
+        unknown: as of `NodeStarts`.
+
+    Returns:
+        The sizes.
+    """
+    return _in_blocks(
+        lambda *rows: _responses(model, integrator, half, jnp.asarray(rest), *rows),
+        amplitude,
+        frequency,
+        unknown,
+    )
+
+
+@eqx.filter_jit
+def _responses(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    rest: Array,
+    amplitude: Array,
+    frequency: Array,
+    unknown: Array,
+) -> Array:
+    push, internal = unknown[:, :2].T * amplitude[None], unknown[:, 2:].T * amplitude[None]
+    state = (rest + amplitude, 0.0 * amplitude, *internal)
+    drive = Sine(push[0], push[1], frequency)
+    path = trajectory(model, integrator, drive, state, turns=0.5 if half else 1.0)[0]
+
+    def peak(values: Array) -> Array:
+        """Give the largest value, by the parabola through it and its neighbours."""
+        place = jnp.clip(jnp.argmax(values, axis=0), 1, values.shape[0] - 2)[None]
+        before, here, after = (jnp.take_along_axis(values, place + shift, axis=0)[0] for shift in (-1, 0, 1))
+        bend = 2.0 * here - before - after
+        vertex = here + (after - before) ** 2 / (8.0 * jnp.where(bend == 0.0, 1.0, bend))
+        return jnp.where((here >= before) & (here >= after), vertex, jnp.max(values, axis=0))
+
+    high, low = peak(path), -peak(-path)
+    return (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / amplitude

@@ -1,0 +1,136 @@
+"""Which orbits a map is to hold, and by what each is found: read off the surface, or by Newton's method."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Bool
+
+from ...models import Integrator, Isolator
+from ._batched_newton import SAMPLED, CellSolver, cell_solvers
+from ._map_error import sampled_error
+from ._reader import SurfaceReader
+from ._starts import Candidates, find_candidates
+from ._surface import MapWindow, Surface, find_surface
+
+_POOL = 1 << 15
+"""Orbits among which those of a sample are chosen."""
+
+
+class Group(NamedTuple):
+    """Orbits that are found in the same way.
+
+    Attributes:
+        name: "read" off the surface; by Newton's method, "split" at kinks or "whole".
+        solver: what finds them.
+        candidates: the orbits.
+    """
+
+    name: str
+    solver: CellSolver | SurfaceReader
+    candidates: Candidates
+
+
+class Sought(NamedTuple):
+    """What is to be found.
+
+    Attributes:
+        surface: orbits over displacement and frequency.
+        groups: all orbits, by how they are found; none is empty.
+        reading_error: largest error of multipliers read off in a sample of cells; NaN where none are.
+    """
+
+    surface: Surface
+    groups: tuple[Group, ...]
+    reading_error: float
+
+    def with_steps(self, steps: int) -> "Sought":
+        """Give the same with other steps a period of Newton's method.
+
+        Args:
+            steps: of orbits that are split; the others take four times as many.
+
+        Returns:
+            What is to be found.
+        """
+        groups = tuple(
+            Group(name, solver.with_steps(steps) if isinstance(solver, CellSolver) else solver, candidates)
+            for name, solver, candidates in self.groups
+        )
+        return self._replace(groups=groups)
+
+
+def seek(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    window: MapWindow,
+    goal: float,
+    coexisting: bool,
+    devices: Any,
+) -> Sought:
+    """Find which orbits a window of force and frequency holds, and by what each is to be found.
+
+    Orbits are read off the surface where its nodes say that this is exact enough, and only if a sample of
+    them then agrees with Newton's method and steps several times finer.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period.
+        half: whether to use the half-period map.
+        window: of the map.
+        goal: error of multipliers read off down to which nodes are added.
+        coexisting: whether to give every orbit of a cell, or that of the smallest motion.
+        devices: to spread chunks over; all local ones if None.
+
+    Returns:
+        What is to be found.
+
+    Raises:
+        ValueError: if there is no orbit anywhere.
+    """
+    surface = find_surface(model, integrator, half, window, goal)
+    candidates = find_candidates(surface, window.amplitudes, coexisting)
+    if not candidates.force.size:
+        raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
+    split, whole = cell_solvers(model, integrator, half, surface, window.amplitudes, devices)
+    reader = SurfaceReader(half, split.surface, split.sharding)
+    expected = surface.error[candidates.frequency, candidates.part]
+    read, error = (expected <= integrator.map_error) & (model.internal_states == 0), math.nan
+    if read.any():
+        some = _chosen(candidates, _sample(surface, candidates, np.flatnonzero(read)))
+        by_reading = reader(some, SAMPLED)
+        error = sampled_error(split, some, by_reading, window)
+        if error > integrator.map_error:
+            own = sampled_error(split, some, split(some, SAMPLED), window)
+            if not error <= 2.0 * own:
+                read, error = np.zeros_like(read), math.nan
+    shared = surface.shared[candidates.frequency, candidates.part]
+    ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
+    groups = tuple(Group(name, way, _chosen(candidates, own)) for name, way, own in ways if own.any())
+    return Sought(surface, groups, error)
+
+
+def _sample(surface: Surface, candidates: Candidates, known: np.ndarray) -> np.ndarray:
+    """Give places of a sample: by the largest expected error, next to folds, and evenly."""
+    # Of a long list, one in so many; but all where orbits coexist.
+    thinned = np.arange(0, known.size, max(1, known.size // _POOL))
+    known = np.union1d(known[thinned], known[candidates.order[known] > 0])
+    column, part = candidates.frequency[known], candidates.part[known]
+    count = min(SAMPLED // 3, known.size)
+    ends = surface.force[column, part], surface.force[column, part + 1]
+    # Next to a fold the force hardly changes along a part, and any error is seen through a lens.
+    flat = np.abs(np.log(ends[1] / ends[0]))
+    picked = [
+        np.argpartition(surface.error[column, part], known.size - count)[known.size - count :],
+        np.argpartition(flat, count - 1)[:count],
+        np.linspace(0, known.size - 1, count).astype(int),
+    ]
+    return known[np.unique(np.concatenate(picked))]
+
+
+def _chosen(candidates: Candidates, which: Bool[np.ndarray, " candidate"] | np.ndarray) -> Candidates:
+    """Give some of the candidates."""
+    if which.dtype == bool and which.all():
+        return candidates
+    return Candidates(*(values[which] for values in candidates))
