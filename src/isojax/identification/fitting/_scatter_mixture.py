@@ -108,7 +108,7 @@ def _with_scales(
     left = reduced.by_record + row[:, :, None] * reduced.stiffness_map[:, None, :]
     left[:, -1, -1] -= (deviation / spread) ** 2
     row[:, -1] += deviation / spread**2
-    turn = block_diag(basis, 1.0)
+    turn = np.asarray(block_diag(basis, 1.0))
     own = np.maximum(pivot - spread**-2, 0.0)
     return _Records(turn.T @ left @ turn / inflation, row @ turn / inflation, own / inflation, deviation)
 
