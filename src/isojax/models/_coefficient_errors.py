@@ -6,12 +6,15 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Inexact
+from jaxtyping import Array, Bool, Float, Inexact
 
 from .._parameters import list_parameters, replace_parameters
 from .._results import RESULTS, is_successful
 from .._show import shown
 from ._isolator import Isolator
+
+_NO_SHARE = 1e-12
+"""Share of the largest eigenvalue of a correlation below which a direction is rounding."""
 
 _DRAWN_AGAIN = 50
 """Times that draws outside the bounds of a coefficient are drawn again."""
@@ -108,6 +111,20 @@ class CoefficientErrors(NamedTuple):
         change, value = jax.jacfwd(twice, has_aux=True)(jnp.zeros(self.steps))
         return value, change
 
+    def inside(self, steps: Float[np.ndarray, "draw step"]) -> Bool[np.ndarray, " draw"]:
+        """Say for which steps all coefficients keep to their bounds.
+
+        Args:
+            steps: in standard deviations.
+
+        Returns:
+            Whether they do.
+        """
+        specs = [list_parameters(self.model)[place].spec for place in self.places]
+        lower, upper = (np.array([getattr(spec, end) for spec in specs]) for end in ("lower", "upper"))
+        moved = self.values + steps @ self.root.T
+        return np.all((moved >= lower) & (moved <= upper), axis=1)
+
     def draw(self, count: int, seed: int) -> Float[np.ndarray, "draw step"]:
         """Draw standard normal steps whose coefficients keep to their bounds.
 
@@ -122,12 +139,9 @@ class CoefficientErrors(NamedTuple):
             ValueError: if almost no draw keeps to the bounds.
         """
         generator = np.random.default_rng(seed)
-        specs = [list_parameters(self.model)[place].spec for place in self.places]
-        lower, upper = (np.array([getattr(spec, end) for spec in specs]) for end in ("lower", "upper"))
         steps = generator.standard_normal((count, self.steps))
         for _ in range(_DRAWN_AGAIN):
-            moved = self.values + steps @ self.root.T
-            outside = np.any((moved < lower) | (moved > upper), axis=1)
+            outside = ~self.inside(steps)
             if not outside.any():
                 return steps
             steps[outside] = generator.standard_normal((np.count_nonzero(outside), self.steps))
@@ -179,7 +193,8 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
     # Scaled before the roots are taken: stiffness in N/m and in N/m^3 differ by many orders.
     safe = np.where(size > 0.0, size, 1.0)
     shares, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
-    root = safe[:, None] * vectors * np.sqrt(np.maximum(shares, 0.0))
+    kept = shares > _NO_SHARE * shares.max(initial=0.0)
+    root = safe[:, None] * vectors[:, kept] * np.sqrt(shares[kept])
     names = [entry.name for entry in listed]
     values = np.array([float(held.model[name]) for name in held.free])
     return CoefficientErrors(held.model, tuple(names.index(name) for name in held.free), values, root)

@@ -1,7 +1,7 @@
 """Stability over a whole plane of drive amplitude and frequency."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +15,15 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from ..._results import RESULTS, cell_results
 from ..._show import number, shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator, Modelled, as_isolator
+from ...models import (
+    EndsEstimated,
+    Estimated,
+    Integrator,
+    Isolator,
+    Modelled,
+    as_isolator,
+    coefficient_errors,
+)
 from ..orbit import Sine, ascending, is_odd
 from ._batched_newton import (
     FOUND,
@@ -27,6 +35,7 @@ from ._batched_newton import (
     cell_solvers,
     states_at_zero,
 )
+from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._map_error import sampled_error, steps_needed
 from ._starts import Candidates, find_candidates
@@ -66,6 +75,11 @@ class StabilityMap(eqx.Module):
         error: largest integration error of a multiplier in a sample of cells, against steps four times finer.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
+        probability_stable: chance that the cell holds no unstable orbit, coexisting ones included, where a
+            fit was given.
+        probability_coexisting: chance that the cell holds several orbits, where a fit was given.
+        standard_errors: of `response` and `spectral_radius` of each orbit, where a fit was given; NaN where
+            orbits may appear or vanish.
     """
 
     model: Isolator
@@ -84,6 +98,9 @@ class StabilityMap(eqx.Module):
     error: float
     symmetric: bool = eqx.field(static=True)
     integrator: Integrator
+    probability_stable: Float[Array, "amplitude frequency"] | None = None
+    probability_coexisting: Float[Array, "amplitude frequency"] | None = None
+    standard_errors: Mapping[str, Float[Array, "*orbit amplitude frequency"]] | None = None
 
     @property
     def stable(self) -> Array:
@@ -152,6 +169,7 @@ def stability_map(
     checkpoint: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
     devices: Any = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> StabilityMap:
     """Find the periodic orbits over a grid of drive amplitude and frequency, and their Floquet multipliers.
 
@@ -174,13 +192,16 @@ def stability_map(
             gives the same numbers.
         progress: called with a line now and then.
         devices: devices to spread each chunk over; all of this process if omitted.
+        fit: with whose errors each cell is given its chances; `model` is its model. None for none. That takes
+            two more maps an independent step of its covariance, and as long again as two.
 
     Returns:
         The map. Where nothing converged the numbers are NaN and `result` says why.
 
     Raises:
         ValueError: if a grid is empty, not positive or not ascending, `reach` is below one, `chunk` is no
-            positive count, or the checkpoint belongs to another map.
+            positive count, the checkpoint belongs to another map, or the fit failed, leaves a coefficient
+            undetermined or is of another model.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
@@ -193,6 +214,7 @@ def stability_map(
     """
     model = as_isolator(model)
     check_float64()
+    carried = None if fit is None else coefficient_errors(fit, model)
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:
         raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
@@ -233,7 +255,7 @@ def stability_map(
     for _ in range(code.ndim):
         ending = jax.vmap(ending)
     result = ending(jnp.asarray(code))
-    return StabilityMap(
+    smap = StabilityMap(
         model=model,
         amplitudes=jnp.asarray(forces),
         frequencies=jnp.asarray(band),
@@ -243,6 +265,30 @@ def stability_map(
         symmetric=half,
         integrator=integrator,
         **{name: jnp.asarray(values) for name, values in arrays.items()},
+    )
+    if carried is None:
+        return smap
+
+    def find(moved: Isolator) -> StabilityMap:
+        if progress is not None:
+            progress("chances of the cells")
+        return stability_map(
+            moved, forces, band, coexisting=True, reach=reach, integrator=integrator, chunk=chunk,
+            devices=devices,
+        )  # fmt: skip
+
+    still = smap if coexisting else find(model)
+    chances = find_chances(carried, still, find, quasi_draws(carried))
+    own = slice(None) if coexisting else 0
+    return eqx.tree_at(
+        lambda one: (one.probability_stable, one.probability_coexisting, one.standard_errors),
+        smap,
+        (
+            jnp.asarray(chances.stable),
+            jnp.asarray(chances.coexisting),
+            {name: jnp.asarray(error[own]) for name, error in chances.standard_errors.items()},
+        ),
+        is_leaf=lambda one: one is None,
     )
 
 
