@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _REACH = 3.0**0.5
 """Standard deviations of the maps either way: the nodes of Gauss and Hermite."""
 
-_DISPLACEMENTS = 400
-"""Displacements, even in their logarithm, at which the maps are compared."""
+_DISPLACEMENTS, _DOUBTFUL = 400, 160
+"""Displacements, even in their logarithm, at which the maps are compared; and within what is in doubt."""
 
 _FEWEST = 6
 """Orbits at one frequency that make a curve."""
@@ -107,7 +107,7 @@ def find_chances(
     stable, coexisting = np.ones(shape), np.zeros(shape)
     curves = [_Curves(one) for one in maps]
     for column in range(columns):
-        table = _in_doubt(_tables(curves, column))
+        table = _in_doubt(curves, column)
         if table.shape[-1]:
             stable[:, column], coexisting[:, column] = _counted(weights, table, forces)
     return Chances(stable, coexisting, _standard_errors(maps))
@@ -171,33 +171,41 @@ class _Curve(NamedTuple):
     margin: np.ndarray
 
 
-def _tables(curves: list[_Curves], column: int) -> Float[np.ndarray, "2 map displacement"]:
-    """Give log force and margin of all maps over common displacements; nothing where few orbits are known."""
+def _in_doubt(curves: list[_Curves], column: int) -> Float[np.ndarray, "2 map displacement"]:
+    """Give log force and margin of all maps over the displacements that a draw may fold or destabilise.
+
+    Elsewhere all maps are far from it. Nothing where all are everywhere, or few orbits are known.
+    """
     known = [curve for one in curves if (curve := one.at(column)) is not None]
     if len(known) < len(curves):
         return np.zeros((2, len(curves), 0))
     ends = np.array([one.displacement[[0, -1]] for one in known])
     # No further than each map knows: where only some fold below the largest force, the others end before.
     grid = np.linspace(ends[:, 0].max(), ends[:, 1].min(), _DISPLACEMENTS)
+    force, margin = _tables(known, grid)
+    rise, margin = np.diff(force, axis=1), np.minimum(margin[:, :-1], margin[:, 1:])
+    near = np.any([one.min(axis=0) < 2.0 * np.ptp(one, axis=0) for one in (rise, margin)], axis=0)
+    places = np.flatnonzero(near)
+    if not places.size:
+        return np.zeros((2, len(curves), 0))
+    return _tables(known, np.linspace(grid[places[0]], grid[places[-1] + 1], _DOUBTFUL))
+
+
+def _tables(
+    curves: list[_Curve], grid: Float[np.ndarray, " displacement"]
+) -> Float[np.ndarray, "2 map displacement"]:
+    """Give log force and margin of all maps over common displacements."""
     return np.array(
         [
-            [one.force(grid) for one in known],
-            [np.interp(grid, one.displacement, one.margin) for one in known],
+            [one.force(grid) for one in curves],
+            [np.interp(grid, one.displacement, one.margin) for one in curves],
         ]
     )
 
 
-def _in_doubt(table: Float[np.ndarray, "2 map displacement"]) -> Float[np.ndarray, "2 map doubtful"]:
-    """Give the part of the curve that a draw may fold or destabilise: elsewhere all maps are far from it."""
-    rise, margin = np.diff(table[0], axis=1), np.minimum(table[1][:, :-1], table[1][:, 1:])
-    near = np.any([one.min(axis=0) < 2.0 * np.ptp(one, axis=0) for one in (rise, margin)], axis=0)
-    places = np.flatnonzero(near)
-    return table[..., places[0] : places[-1] + 2] if places.size else table[..., :0]
-
-
 def _counted(
     weights: Float[np.ndarray, "draw map"],
-    table: Float[np.ndarray, "2 map doubtful"],
+    table: Float[np.ndarray, "2 map displacement"],
     forces: Float[np.ndarray, " amplitude"],
 ) -> tuple[Float[np.ndarray, " amplitude"], Float[np.ndarray, " amplitude"]]:
     """Give the chances at one frequency, by counting what each draw has at each force."""
