@@ -26,6 +26,9 @@ _REACH = 3.0**0.5
 _DISPLACEMENTS, _DOUBTFUL = 400, 160
 """Displacements, even in their logarithm, at which the maps are compared; and within what is in doubt."""
 
+_BELOW, _ABOVE = np.geomspace(0.87, 0.97, 4), np.geomspace(1.01, 1.3, 9)
+"""Amplitudes beside the window that are mapped as well, over its least and its largest."""
+
 _FEWEST = 6
 """Orbits at one frequency that make a curve."""
 
@@ -74,43 +77,54 @@ def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarr
 
 def find_chances(
     errors: CoefficientErrors,
-    still: "StabilityMap",
-    find: Callable[[Isolator], "StabilityMap"],
+    amplitudes: Float[np.ndarray, " amplitude"],
+    find: Callable[[Isolator, Float[np.ndarray, " wide"]], "StabilityMap"],
     steps: Float[np.ndarray, "draw step"],
 ) -> Chances:
     """Give the chances of every cell.
 
     Args:
         errors: of the coefficients.
-        still: map of the fitted model with all coexisting orbits.
-        find: gives such a map of another model, on the same grid.
+        amplitudes: of the drive.
+        find: gives the map of a model with all coexisting orbits, at some amplitudes.
         steps: draws of the coefficients, in standard deviations.
 
     Returns:
-        The chances.
+        The chances; NaN in a cell with an orbit that lies beyond those of another of the maps.
     """
-    maps = [still]
+    # A fold that a draw moves out of the window must still be seen.
+    wide = np.concatenate([amplitudes[0] * _BELOW, amplitudes, amplitudes[-1] * _ABOVE])
+    inner = slice(_BELOW.size, _BELOW.size + amplitudes.size)
+    maps = [find(errors.model, wide)]
     for place in range(errors.steps):
         for sign in (1.0, -1.0):
             away = np.zeros(errors.steps)
             away[place] = sign * _REACH
-            maps.append(find(errors.moved(jnp.asarray(away))))
+            maps.append(find(errors.moved(jnp.asarray(away)), wide))
     along = steps / _REACH
     # The quadratic through three nodes of each step.
     sides = np.stack([0.5 * along * (along + 1.0), 0.5 * along * (along - 1.0)], axis=-1).reshape(
         len(steps), -1
     )
     weights = np.concatenate([1.0 - np.sum(along**2, axis=1, keepdims=True), sides], axis=1)
-    forces = np.log(np.asarray(still.amplitudes))
-    columns = still.frequencies.size
-    shape = (forces.size, columns)
+    forces, still = np.log(amplitudes), np.log(np.asarray(maps[0].response))[:, inner]
+    shape = (forces.size, maps[0].frequencies.size)
     stable, coexisting = np.ones(shape), np.zeros(shape)
     curves = [_Curves(one) for one in maps]
-    for column in range(columns):
-        table = _in_doubt(curves, column)
-        if table.shape[-1]:
+    for column in range(shape[1]):
+        known = [curve for one in curves if (curve := one.at(column)) is not None]
+        if len(known) < len(curves):
+            stable[:, column] = coexisting[:, column] = np.nan
+            continue
+        ends = np.array([one.displacement[[0, -1]] for one in known])
+        low, high = ends[:, 0].max(), ends[:, 1].min()
+        grid = _in_doubt(known, np.linspace(low, high, _DISPLACEMENTS))
+        if grid.size:
+            table = _tables(known, grid)
             stable[:, column], coexisting[:, column] = _counted(weights, table, forces)
-    return Chances(stable, coexisting, _standard_errors(maps))
+        beyond = np.any((still[..., column] < low) | (still[..., column] > high), axis=0)
+        stable[beyond, column] = coexisting[beyond, column] = np.nan
+    return Chances(stable, coexisting, _standard_errors(maps, inner))
 
 
 class _Curves:
@@ -171,24 +185,17 @@ class _Curve(NamedTuple):
     margin: np.ndarray
 
 
-def _in_doubt(curves: list[_Curves], column: int) -> Float[np.ndarray, "2 map displacement"]:
-    """Give log force and margin of all maps over the displacements that a draw may fold or destabilise.
-
-    Elsewhere all maps are far from it. Nothing where all are everywhere, or few orbits are known.
-    """
-    known = [curve for one in curves if (curve := one.at(column)) is not None]
-    if len(known) < len(curves):
-        return np.zeros((2, len(curves), 0))
-    ends = np.array([one.displacement[[0, -1]] for one in known])
-    # No further than each map knows: where only some fold below the largest force, the others end before.
-    grid = np.linspace(ends[:, 0].max(), ends[:, 1].min(), _DISPLACEMENTS)
-    force, margin = _tables(known, grid)
+def _in_doubt(
+    curves: list[_Curve], grid: Float[np.ndarray, " displacement"]
+) -> Float[np.ndarray, " doubtful"]:
+    """Give log displacements that a draw may fold or destabilise; elsewhere all maps are far from it."""
+    force, margin = _tables(curves, grid)
     rise, margin = np.diff(force, axis=1), np.minimum(margin[:, :-1], margin[:, 1:])
     near = np.any([one.min(axis=0) < 2.0 * np.ptp(one, axis=0) for one in (rise, margin)], axis=0)
     places = np.flatnonzero(near)
     if not places.size:
-        return np.zeros((2, len(curves), 0))
-    return _tables(known, np.linspace(grid[places[0]], grid[places[-1] + 1], _DOUBTFUL))
+        return np.zeros(0)
+    return np.linspace(grid[places[0]], grid[places[-1] + 1], _DOUBTFUL)
 
 
 def _tables(
@@ -238,14 +245,14 @@ def _passed(
     return np.cumsum(change.reshape(len(begin), forces + 1), axis=1)[:, :-1]
 
 
-def _standard_errors(maps: list["StabilityMap"]) -> dict[str, np.ndarray]:
+def _standard_errors(maps: list["StabilityMap"], inner: slice) -> dict[str, np.ndarray]:
     """Give standard errors by central differences, where every map has the same orbits."""
     orbits = max(one.response.shape[0] for one in maps)
-    counts = np.array([np.asarray(one.count) for one in maps])
+    counts = np.array([np.asarray(one.count)[inner] for one in maps])
     alike = np.all(counts == counts[0], axis=0)
     errors = {}
     for name in ("response", "spectral_radius"):
-        values = [np.asarray(getattr(one, name)) for one in maps]
+        values = [np.asarray(getattr(one, name))[:, inner] for one in maps]
         values = np.array(
             [np.pad(v, ((0, orbits - len(v)), (0, 0), (0, 0)), constant_values=np.nan) for v in values]
         )

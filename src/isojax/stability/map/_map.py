@@ -76,7 +76,7 @@ class StabilityMap(eqx.Module):
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
         probability_stable: chance that the cell holds no unstable orbit, coexisting ones included, where a
-            fit was given.
+            fit was given; NaN where the maps that it rests on do not reach.
         probability_coexisting: chance that the cell holds several orbits, where a fit was given.
         standard_errors: of `response` and `spectral_radius` of each orbit, where a fit was given; NaN where
             orbits may appear or vanish.
@@ -269,17 +269,17 @@ def stability_map(
     if carried is None:
         return smap
 
-    def find(moved: Isolator) -> StabilityMap:
+    def find(moved: Isolator, wide: Float[np.ndarray, " wide"]) -> StabilityMap:
         if progress is not None:
             progress("chances of the cells")
         return stability_map(
-            moved, forces, band, coexisting=True, reach=reach, integrator=integrator, chunk=chunk,
+            moved, wide, band, coexisting=True, reach=reach, integrator=integrator, chunk=chunk,
             devices=devices,
         )  # fmt: skip
 
-    still = smap if coexisting else find(model)
-    chances = find_chances(carried, still, find, quasi_draws(carried))
-    own = slice(None) if coexisting else 0
+    chances = find_chances(carried, forces, find, quasi_draws(carried))
+    orbits = smap.response.shape[0]
+    own = slice(orbits) if coexisting else 0
     return eqx.tree_at(
         lambda one: (one.probability_stable, one.probability_coexisting, one.standard_errors),
         smap,
