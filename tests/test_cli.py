@@ -320,7 +320,7 @@ def test_an_interrupted_loop_keeps_what_it_did_and_resumes_with_the_same_result(
         assert len(resumed) == again + again + 7
     assert {**whole, "seconds": 0.0} == {**result, "seconds": 0.0}
     names = sorted(entry.name for entry in out.iterdir())
-    assert names == [".isojax", "mine.txt", "model.json", "report.html", "result.json"]
+    assert names == [".isojax", "fit.json", "mine.txt", "model.json", "report.html", "result.json"]
 
     capsys.readouterr()
     assert main(["fit", str(campaign), "--out", str(out), "--quiet", "--json"]) in (0, 1)
@@ -330,7 +330,7 @@ def test_an_interrupted_loop_keeps_what_it_did_and_resumes_with_the_same_result(
     loaded = isojax.load_fit(tmp_path / "fit.json")
     assert float(loaded.model["mass"]) == 800.0
     names = sorted(entry.name for entry in out.iterdir())
-    assert names == [".isojax", "fit.txt", "mine.txt", "model.json"]
+    assert names == [".isojax", "fit.json", "fit.txt", "mine.txt", "model.json"]
 
 
 @pytest.mark.slow

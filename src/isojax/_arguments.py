@@ -66,8 +66,8 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         "--out",
         required=True,
         metavar="DIR",
-        help="where report.html, result.json and model.json go (no model after a failed fit); what an "
-        "earlier run of isojax wrote there goes, other files stay",
+        help="where report.html, result.json, model.json and fit.json go (the last two not after a failed "
+        "fit); what an earlier run of isojax wrote there goes, other files stay",
     )
     _resume(loop)
     _json(loop, "the content of result.json")
@@ -78,7 +78,7 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
     single = known.add_parser("fit", help="fit the declared model and print its report")
     _campaign(single)
     single.add_argument(
-        "--out", metavar="DIR", help="where model.json (not after a failed fit) and fit.txt go"
+        "--out", metavar="DIR", help="where model.json and fit.json (not after a failed fit) and fit.txt go"
     )
     _json(single, "the fit as `fit.save` writes it")
     _shown(single)
@@ -106,6 +106,14 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         "--folds",
         action="store_true",
         help="follow the curve of folds around cells with several orbits; takes a few times as long",
+    )
+    plane.add_argument(
+        "--chances",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="the chance of each cell to be stable and to hold several orbits, from the errors in the "
+        "fit.json that close-loop and fit write beside the model; takes some 13 times as long; default: "
+        "where there is one",
     )
     plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
     plane.add_argument(

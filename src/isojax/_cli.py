@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.console import Console
 
-    from .identification import Fit
+    from .identification import Fit, SavedFit
+    from .models import Isolator
     from .records import Campaign
 
 # Each command imports what it needs when it needs it: a bad argument or file is refused before JAX or
@@ -217,7 +218,13 @@ def _fit(asked: argparse.Namespace) -> int:
             refuse_contradictions(measured)
 
         from .identification import classical_guess, fit, fit_report
-        from .reporting import check_first_dicts, check_first_words, model_text, write_model_files
+        from .reporting import (
+            check_first_dicts,
+            check_first_words,
+            fit_text,
+            model_text,
+            write_model_files,
+        )
 
         _start_jax()
         progress(Stage("classical guess", guessing, (fitting,)))
@@ -228,7 +235,8 @@ def _fit(asked: argparse.Namespace) -> int:
         progress(KeyFigure(f"chi2/dof {fitted.stats.chi2 / fitted.stats.dof:.4g}"))
         report = "\n".join((*check_first_words(find_suspicions(measured)), fit_report(fitted)))
         if folder is not None:
-            write_model_files(folder, {"model.json": model_text(fitted), "fit.txt": report + "\n"})
+            texts = {"model.json": model_text(fitted), "fit.json": fit_text(fitted)}
+            write_model_files(folder, {**texts, "fit.txt": report + "\n"})
     console = _results(asked)
     _say(console, report)
     _say(console, f"{time.perf_counter() - begin:.1f} s with compiling")
@@ -246,6 +254,7 @@ def _map(asked: argparse.Namespace) -> int:
     from .models import load_model
 
     model = load_model(asked.model)
+    fit = _fit_beside(Path(asked.model), model) if asked.chances else None
 
     import numpy as np
 
@@ -266,6 +275,7 @@ def _map(asked: argparse.Namespace) -> int:
             coexisting=asked.coexisting,
             checkpoint=asked.checkpoint,
             progress=progress,
+            fit=fit,
         )
         several = int(np.count_nonzero(np.asarray(smap.count) > 1))
         progress(KeyFigure(f"{smap.count.size} cells, {several} with several orbits"))
@@ -283,6 +293,24 @@ def _map(asked: argparse.Namespace) -> int:
     _say(console, f"see {', '.join(str(folder / name) for name in written)}")
     _print_json(asked, lambda: map_dict(smap, folds))
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
+
+
+def _fit_beside(path: Path, model: "Isolator") -> "SavedFit | None":
+    """Give the fit that was saved beside a model, where it is of this model and its errors can be carried."""
+    beside = path.with_name("fit.json")
+    if not beside.exists():
+        return None
+
+    from .identification import load_fit
+    from .models import coefficient_errors
+
+    try:
+        fit = load_fit(beside)
+        coefficient_errors(fit, model)
+    except ValueError as problem:
+        print(f"The map has no chances: {beside} cannot serve. {problem}", file=sys.stderr)
+        return None
+    return fit
 
 
 def _values(option: str, words: Sequence[str]) -> "np.ndarray":

@@ -149,7 +149,7 @@ def test_markdown_stands_beside_its_pictures(page, found, written):
 
 def test_markdown_of_an_earlier_run_goes_where_none_is_asked_for(plain_folder):
     left = sorted(path.name for path in plain_folder.glob("[!.]*"))
-    assert left == ["mine.png", "model.json", "notes.txt", "report.html", "result.json"]
+    assert left == ["fit.json", "mine.png", "model.json", "notes.txt", "report.html", "result.json"]
 
 
 def test_headline_names_effect_strength_and_held_out_error(page, found):

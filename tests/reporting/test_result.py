@@ -108,6 +108,7 @@ def test_failed_fit_is_written_with_nulls_and_said_in_the_report(plain, tmp_path
 
 def test_files_come_together_and_others_stay(found, written):
     assert sorted(path.name for path in written.glob("[!.]*") if path.suffix != ".png") == [
+        "fit.json",
         "model.json",
         "notes.txt",
         "report.html",

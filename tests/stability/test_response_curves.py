@@ -1,13 +1,16 @@
 """Backbone, frequency response and transmissibility against closed forms and SciPy."""
 
 import math
+from typing import NamedTuple
 
+import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
+from scipy.stats import norm
 
 import isojax as ij
 from isojax.stability import find_periodic_orbit
@@ -253,3 +256,75 @@ def test_bad_arguments_are_refused():
         ij.frequency_response(LINEAR, 0.0, (1.0, 2.0))
     with pytest.raises(ValueError, match="end at another"):
         ij.frequency_response(LINEAR, 1.0, (1.0, 1.0))
+
+
+class Fitted(NamedTuple):
+    """What a band asks of a fit."""
+
+    model: ij.Isolator
+    free: tuple[str, ...]
+    covariance: np.ndarray
+    result: ij.RESULTS
+
+
+def uncertain(model, **errors):
+    """A fit of a model with independent standard errors, by name with __ for the dot."""
+    free = tuple(name.replace("__", ".") for name in errors)
+    return Fitted(model, free, np.diag(np.square(list(errors.values()))), SUCCESS)
+
+
+SUCCESS = ij.RESULTS.promote(diffrax.RESULTS.successful)
+LOOSE = uncertain(LINEAR, linear_stiffness__coefficient=0.05, linear_damping__coefficient=0.01)
+
+
+def test_the_band_of_a_linear_transmissibility_is_that_of_its_closed_form():
+    frequency = np.array([0.4, 0.79, 1.5])
+    band = ij.transmissibility(LINEAR, 3.0, frequency, fit=LOOSE).band
+    k, c = jax.numpy.array(50.0), jax.numpy.array(0.8)
+
+    def size(k, c):
+        omega = TURN * frequency
+        return jax.numpy.abs((k + 1j * c * omega) / (k - 2.0 * omega**2 + 1j * c * omega))
+
+    slopes = jax.jacfwd(size, (0, 1))(k, c)
+    expected = np.hypot(0.05 * slopes[0], 0.01 * slopes[1])
+    np.testing.assert_allclose(band.standard_error["magnitude"], expected, rtol=1e-6)
+    width = np.asarray(band.upper["magnitude"] - band.lower["magnitude"])
+    np.testing.assert_allclose(width, 2.0 * norm.ppf(0.975) * expected, rtol=1e-6)
+
+
+def test_the_band_of_a_backbone_is_that_of_free_vibration():
+    backbone = ij.backbone_curve(LINEAR, SIZES[:2], fit=LOOSE)
+    expected = 0.05 / (2.0 * math.sqrt(50.0 * 2.0) * TURN)
+    np.testing.assert_allclose(backbone.band.standard_error["natural_frequency"], expected, rtol=1e-8)
+    assert ij.plot.backbone(backbone).axes[0].patches
+
+
+@pytest.mark.slow
+def test_the_ends_of_a_response_band_lie_on_the_curves_of_moved_models():
+    stiff = uncertain(LINEAR, linear_stiffness__coefficient=0.05)
+    response = ij.frequency_response(LINEAR, 3.0, (0.5, 1.2), fit=stiff)
+    width, ends = norm.ppf(0.975) * 0.05, (response.band.lower, response.band.upper)
+    moved = []
+    for end in ends:
+        omega, size = TURN * np.asarray(end["frequency"]), np.asarray(end["amplitude"])
+        # k of the curve through each point: |k - m w^2 + i c w| = F / X.
+        root = np.sqrt((3.0 / size) ** 2 - (0.8 * omega) ** 2 + 0j).real
+        moved.append(
+            2.0 * omega**2 + np.where(TURN * response.frequency < math.sqrt(25.0), root, -root) - 50.0
+        )
+    away = np.abs(np.asarray(response.frequency) * TURN / 5.0 - 1.0) > 0.03
+    for one, other in zip(*moved, strict=True):
+        assert one * other < 0.0
+    np.testing.assert_allclose(np.abs(np.array(moved))[:, away], width, rtol=0.02)
+    # One end lies below the peak all along: of the stiffer model on one flank, of the softer on the other.
+    assert np.count_nonzero(np.diff(np.sign(moved[0][away]))) == 1
+    assert ij.plot.frequency_response(response).axes[0].patches
+
+
+def test_a_band_asks_for_the_model_of_the_fit():
+    with pytest.raises(ValueError, match=r"differs in linear_damping\.coefficient"):
+        ij.transmissibility(LINEAR.replace(linear_damping__coefficient=0.9), 3.0, [0.4, 0.5], fit=LOOSE)
+    lost = LOOSE._replace(covariance=np.full((2, 2), np.nan))
+    with pytest.raises(ValueError, match="do not determine linear_stiffness"):
+        ij.transmissibility(LINEAR, 3.0, [0.4, 0.5], fit=lost)

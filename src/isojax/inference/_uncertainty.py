@@ -9,18 +9,12 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.special import ndtri
 
-from .._parameters import list_parameters, replace_parameters
-from .._results import RESULTS, is_successful
 from .._show import Row, brief, shown
 from .._types import check_float64
-from ..identification import Fit, Fitted, SavedFit, as_fit
-from ..models import Isolator
+from ..models import EndsEstimated, Estimated, Isolator, coefficient_errors
 
 _BEND = 0.1
 """Share of an interval by which delta method and draws may differ."""
-
-_DRAWN_AGAIN = 50
-"""Times that draws outside the bounds of a coefficient are drawn again."""
 
 
 @shown
@@ -62,7 +56,7 @@ class UncertainQuantity(NamedTuple):
 
 
 def uncertainty(
-    fit: Fit | Fitted | SavedFit,
+    fit: Estimated | EndsEstimated,
     quantity: Callable[[Isolator], Any],
     *,
     confidence: float = 0.95,
@@ -103,31 +97,23 @@ def uncertainty(
         True
     """
     check_float64()
-    held = fit if isinstance(fit, SavedFit) else as_fit(fit)
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
     if draws < 100:
         raise ValueError(f"Argument `draws` must be at least 100, but is {draws}.")
-    values, root = _distribution(held)
-    model, places = held.model, _places(held)
-    numbers = [entry.value for entry in list_parameters(model)]
+    errors = coefficient_errors(fit)
 
-    def at(steps: Float[Array, " coefficient"]) -> Array:
-        moved = list(numbers)
-        for place, number in zip(places, values + root @ steps, strict=True):
-            moved[place] = number
-        return jnp.asarray(quantity(replace_parameters(model, moved)))
+    def at(steps: Float[Array, " step"]) -> Array:
+        return jnp.asarray(quantity(errors.moved(steps)))
 
-    still = jnp.zeros(len(places))
-    value = at(still)
+    value, change = errors.carry(quantity)
     if jnp.iscomplexobj(value) or not np.all(np.isfinite(value)):
         raise ValueError(
             "Argument `quantity` must give finite real numbers at the fitted coefficients, but gave "
             f"{brief(value)}."
         )
-    value = jnp.asarray(value, dtype=float)
-    error = jnp.linalg.norm(jax.jacfwd(at)(still), axis=-1)
-    drawn = _quantity_at(at, _drawn_steps(held, values, root, draws, seed))
+    value, error = jnp.asarray(value, dtype=float), jnp.linalg.norm(change, axis=-1)
+    drawn = _quantity_at(at, errors.draw(draws, seed))
     finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
     if not finite.any():
         raise ValueError(
@@ -146,57 +132,6 @@ def uncertainty(
         np.asarray(curved),
         drawn,
         float(1.0 - finite.mean()),
-    )
-
-
-def _places(held: Fit | SavedFit) -> tuple[int, ...]:
-    names = [entry.name for entry in list_parameters(held.model)]
-    return tuple(names.index(name) for name in held.free)
-
-
-def _distribution(
-    held: Fit | SavedFit,
-) -> tuple[Float[np.ndarray, " coefficient"], Float[np.ndarray, "coefficient coefficient"]]:
-    """Give the fitted coefficients, and the root of their covariance."""
-    if not is_successful(held.result):
-        raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[held.result]}")
-    covariance = np.asarray(held.covariance, dtype=float)
-    size = np.sqrt(np.diag(covariance))
-    lost = [name for name, one in zip(held.free, size, strict=True) if not np.isfinite(one)]
-    if lost:
-        raise ValueError(
-            "Argument `fit` must determine each free coefficient, but its data do not determine "
-            f"{', '.join(lost)}."
-        )
-    # Scaled before the roots are taken: stiffness in N/m and in N/m^3 differ by many orders.
-    safe = np.where(size > 0.0, size, 1.0)
-    shares, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
-    root = safe[:, None] * vectors * np.sqrt(np.maximum(shares, 0.0))
-    values = np.array([float(held.model[name]) for name in held.free])
-    return values, root
-
-
-def _drawn_steps(
-    held: Fit | SavedFit,
-    values: Float[np.ndarray, " coefficient"],
-    root: Float[np.ndarray, "coefficient coefficient"],
-    draws: int,
-    seed: int,
-) -> Float[np.ndarray, "draw coefficient"]:
-    """Draw standard normal steps whose coefficients keep to their bounds."""
-    generator = np.random.default_rng(seed)
-    specs = [list_parameters(held.model)[place].spec for place in _places(held)]
-    lower, upper = (np.array([getattr(spec, end) for spec in specs]) for end in ("lower", "upper"))
-    steps = generator.standard_normal((draws, values.size))
-    for _ in range(_DRAWN_AGAIN):
-        moved = values + steps @ root.T
-        outside = np.any((moved < lower) | (moved > upper), axis=1)
-        if not outside.any():
-            return steps
-        steps[outside] = generator.standard_normal((np.count_nonzero(outside), values.size))
-    raise ValueError(
-        "Argument `fit` must leave its coefficients room between their bounds, but almost no draw falls "
-        "there."
     )
 
 

@@ -3,11 +3,18 @@
 In: a mass, elements and a drive. Out: an `Isolator`, its simulated motion and readings, its JSON file.
 Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at one time), then `_rk4.py` and
 `_integrator.py` (the step), `_scan.py` (many records), `_solve.py` (diffrax) and `_simulate.py` (one drive).
-`_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file.
+`_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file;
+`_coefficient_errors.py` carries the covariance of a fit into answers, and `_band.py` into curves.
 """
 
 from ._as_isolator import Modelled as Modelled
 from ._as_isolator import as_isolator as as_isolator
+from ._band import Band as Band
+from ._band import find_band as find_band
+from ._coefficient_errors import CoefficientErrors as CoefficientErrors
+from ._coefficient_errors import EndsEstimated as EndsEstimated
+from ._coefficient_errors import Estimated as Estimated
+from ._coefficient_errors import coefficient_errors as coefficient_errors
 from ._event_step import Ringing as Ringing
 from ._event_step import Step as Step
 from ._event_step import add_ringing as add_ringing

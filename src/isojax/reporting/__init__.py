@@ -10,6 +10,7 @@ from ._closed_loop import close_loop as close_loop
 from ._compile_seconds import compile_seconds as compile_seconds
 from .page import catalogue_table as catalogue_table
 from .page import error_table as error_table
+from .page import fit_text as fit_text
 from .page import folds_around as folds_around
 from .page import inspection_dict as inspection_dict
 from .page import inspection_summary as inspection_summary

@@ -4,7 +4,7 @@ In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget` and
 `drive_noise` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
-What follows the search is in `_evaluation`, `_errors`, `_covariance` and `_fit_result`.
+What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture` and `_fit_result`.
 """
 
 from ._as_fit import Fitted as Fitted

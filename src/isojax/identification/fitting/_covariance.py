@@ -1,8 +1,8 @@
 """Uncertainty of fitted coefficients, in physical units: where information turns into error bars.
 
 What the error bars hold: the noise of the output, by its density inside its band; the initial states; the
-scatter of the linear stiffness from record to record, by its prior, so that the mean over n records is
-uncertain by scatter/sqrt(n) too.
+scatter of the linear stiffness from record to record, so that the mean over n records is uncertain by
+scatter/sqrt(n) too; and that n records show this scatter only so well, see `_scatter_mixture`.
 
 What they do not hold, and what can exceed them once the noise is small:
 
@@ -65,9 +65,58 @@ def invert_information(matrix: Float[np.ndarray, "column column"], inflation: fl
 
     Source: Seber & Wild 1989, Nonlinear Regression, eq. (2.21).
     """
-    count = matrix.shape[0]
     if not np.all(np.isfinite(matrix)):
-        return unknown(count)
+        return unknown(matrix.shape[0])
+    known = find_determined(matrix)
+    return known.uncertainty(inflation * (known.vectors / known.values) @ known.vectors.T)
+
+
+@shown
+class Determined(NamedTuple):
+    """What an information matrix determines, its columns scaled to a unit diagonal.
+
+    Attributes:
+        size: of each column; one where the data hold no trace of it.
+        values: information along each determined direction.
+        vectors: these directions.
+        columns: False where a coefficient belongs to a combination that is not determined.
+        partners: for each such combination, the places of the coefficients in it.
+    """
+
+    size: Float[np.ndarray, " column"]
+    values: Float[np.ndarray, " direction"]
+    vectors: Float[np.ndarray, "column direction"]
+    columns: Bool[np.ndarray, " column"]
+    partners: tuple[tuple[int, ...], ...]
+
+    def uncertainty(self, covariance: Float[np.ndarray, "column column"]) -> Uncertainty:
+        """Give the uncertainty in physical units.
+
+        Args:
+            covariance: of the scaled columns.
+
+        Returns:
+            It, with NaN for what is not determined.
+        """
+        covariance = covariance / np.outer(self.size, self.size)
+        covariance[~self.columns, :] = np.nan
+        covariance[:, ~self.columns] = np.nan
+        error = np.sqrt(np.diag(covariance))
+        return Uncertainty(
+            covariance, error, covariance / np.outer(error, error), self.columns, self.partners
+        )
+
+
+def find_determined(matrix: Float[np.ndarray, "column column"]) -> Determined:
+    """Separate what an information matrix determines from what it does not.
+
+    Args:
+        matrix: finite [inverse product of units].
+
+    Returns:
+        Directions of either kind.
+    """
+    count = matrix.shape[0]
     size = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     dead = ~(size > 0.0)
     safe = np.where(dead, 1.0, size)
@@ -81,12 +130,7 @@ def invert_information(matrix: Float[np.ndarray, "column column"], inflation: fl
     determined = ~dead
     for group in partners:
         determined[list(group)] = False
-    inverse = (vectors[:, good] / values[good]) @ vectors[:, good].T
-    covariance = inflation * inverse / np.outer(safe, safe)
-    covariance[~determined, :] = np.nan
-    covariance[:, ~determined] = np.nan
-    error = np.sqrt(np.diag(covariance))
-    return Uncertainty(covariance, error, covariance / np.outer(error, error), determined, partners)
+    return Determined(safe, values[good], vectors[:, good], determined, partners)
 
 
 def unknown(count: int) -> Uncertainty:

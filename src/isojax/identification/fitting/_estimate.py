@@ -22,6 +22,7 @@ from ._descent import descend
 from ._elimination import Nuisances, Spread
 from ._initial_states import HELD, best_nuisances
 from ._problem import Point, Problem, one_hot
+from ._scatter_mixture import integrate_scatter
 from ._search import ROUGH, Search
 from ._segment_scatter import segment_scatter
 from ._simulator import Simulator
@@ -252,13 +253,16 @@ def estimate(
             found = descend(simulator, found.point.model, places, sizes, settled, again)
             steps += found.steps
     point = found.point
-    dof = max(1.0, point.free_samples - len(places))
-    error = (
-        invert_information(point.reduced.matrix[:-1, :-1], max(1.0, point.chi2 / dof))
-        if is_successful(found.result)
-        else unknown(len(places))
-    )
-    return Estimate(point.model, places, simulator, point, error, found.result, steps)
+    errors = _uncertainty(point, places, scatters) if is_successful(found.result) else unknown(len(places))
+    return Estimate(point.model, places, simulator, point, errors, found.result, steps)
+
+
+def _uncertainty(point: Point, places: tuple[int, ...], scatters: bool) -> Uncertainty:
+    """Give the error bars; a single record shows no scatter and has none in them."""
+    inflation = max(1.0, point.chi2 / max(1.0, point.free_samples - len(places)))
+    if scatters and point.samples.size > 1:
+        return integrate_scatter(point.reduced, point.nuisances, inflation)
+    return invert_information(point.reduced.matrix[:-1, :-1], inflation)
 
 
 def _start(simulator: Simulator, model: Isolator, nuisances: Nuisances | None, spread: Spread) -> Nuisances:

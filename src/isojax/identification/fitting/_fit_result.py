@@ -39,7 +39,7 @@ class Fit(NamedTuple):
         start: the isolator that the search started from.
         campaign: the measurements.
         free: names of the fitted coefficients.
-        covariance: of the fitted coefficients [product of their units], scaled by max(1, chi2/dof).
+        covariance: of the fitted coefficients [product of their units]; max(1, chi2/dof) enlarges it.
         stats: counts and criteria.
         noise: the noise that errors are compared with.
         result: how the search ended.

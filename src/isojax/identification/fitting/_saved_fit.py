@@ -61,7 +61,7 @@ class SavedFit(NamedTuple):
         start: the isolator that the search started from.
         free: names of the fitted coefficients.
         parameters: the coefficients with standard error, unit and start, by name or symbol.
-        covariance: of the fitted coefficients [product of their units], scaled by max(1, chi2/dof).
+        covariance: of the fitted coefficients [product of their units]; max(1, chi2/dof) enlarges it.
         stats: counts and criteria.
         noise: the noise that errors are compared with.
         errors: by role, "fit" and "holdout" (None without such records).

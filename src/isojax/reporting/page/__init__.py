@@ -23,6 +23,7 @@ from ._summary import parameter_table as parameter_table
 from ._summary import ranking_table as ranking_table
 from ._summary import render_text as render_text
 from ._summary import verdict_summary as verdict_summary
+from ._write import fit_text as fit_text
 from ._write import model_text as model_text
 from ._write import write_model_files as write_model_files
 from ._write import write_report as write_report

@@ -47,6 +47,11 @@ def map_arrays(smap: StabilityMap) -> dict[str, np.ndarray]:
         `result_words`, and `model` what `save_model` writes.
     """
     arrays = {name: np.asarray(getattr(smap, name)) for name in _ARRAYS}
+    for name in ("probability_stable", "probability_coexisting"):
+        if getattr(smap, name) is not None:
+            arrays[name] = np.asarray(getattr(smap, name))
+    for name, error in (smap.standard_errors or {}).items():
+        arrays[f"{name}_standard_error"] = np.asarray(error)
     arrays["result"] = result_codes(smap)
     arrays["result_names"] = np.array(_CODES)
     words = [RESULTS[getattr(RESULTS, name)] for name in _CODES]

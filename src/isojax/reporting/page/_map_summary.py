@@ -8,6 +8,9 @@ from ...stability import FoldCurve, StabilityMap
 from ..plots import drive_unit, quantity
 from ._map_files import result_codes
 
+_SURE = 0.05
+"""Chance below which, or below which of the contrary, a cell counts as sure."""
+
 _REASONS = {1: "not converged", 2: "left every bound"}
 
 
@@ -51,6 +54,8 @@ def map_summary(
         steps, aim = smap.integrator.steps_per_period, smap.integrator.map_error
         missed = f"; more than the {aim:.0e} that a map aims at" if smap.error > aim else ""
         lines.append(("error", f"{smap.error:.1e} in |µ| by integration, {steps} steps a period{missed}"))
+    if smap.probability_stable is not None:
+        lines.append(("chances", _chance_words(smap)))
     if folds is not None:
         lines.append(("folds", _fold_curve_words(folds, unit)))
     elif several.any():
@@ -91,6 +96,18 @@ def _coexisting_words(smap: StabilityMap, several: np.ndarray, sought: bool) -> 
         return "nowhere; each cell holds at most one orbit"
     most = int(np.max(np.asarray(smap.count)))
     return f"{_cells_holding(several)} several orbits, up to {most}{_where(smap, several)}"
+
+
+def _chance_words(smap: StabilityMap) -> str:
+    words = []
+    for name, chance in (
+        ("stable", smap.probability_stable),
+        ("with several orbits", smap.probability_coexisting),
+    ):
+        values = np.asarray(chance)
+        open_cells = int(np.sum((values > _SURE) & (values < 1.0 - _SURE)))
+        words.append(f"{int(np.sum(values >= 1.0 - _SURE))} cells {name} with 95 %, {open_cells} open")
+    return "; ".join(words)
 
 
 def _scope(smap: StabilityMap) -> str:

@@ -16,17 +16,17 @@ from ._result import result_dict
 MAP_FILES = ("map.npz", "map.png", "response.png", "folds.png", "curves.png")
 """What a map writes."""
 
-MODEL_FILES = ("model.json", "fit.txt", "report.html", "result.json", "report.md", "report_*.png")
+MODEL_FILES = ("model.json", "fit.json", "fit.txt", "report.html", "result.json", "report.md", "report_*.png")
 """What a fit or a loop writes, as patterns."""
 
 
 def write_report(
     loop: Loop, folder: str | Path, health: CampaignHealth | None = None, *, markdown: bool = False
 ) -> None:
-    """Write report.html, result.json and model.json; everything is ready before the first is written.
+    """Write report.html, result.json, model.json and fit.json; all is ready before the first is written.
 
-    Where the last fit failed there is no model: no model.json is written, and one of before is removed. So
-    are the other files that isojax wrote there: they belong to another run.
+    Where the last fit failed there is no model: neither of the last two is written, and those of before are
+    removed. So are the other files that isojax wrote there: they belong to another run.
 
     Args:
         loop: the closed loop.
@@ -42,6 +42,7 @@ def write_report(
     health = campaign_health(loop) if health is None else health
     texts = {
         "model.json": model_text(loop.after),
+        "fit.json": fit_text(loop.after),
         **render_pages(page_content(loop, health), markdown=markdown),
         "result.json": json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n",
     }
@@ -70,12 +71,26 @@ def model_text(fit: Fit) -> str | None:
     return json.dumps(model_to_dict(fit.model), indent=1, allow_nan=False) + "\n"
 
 
+def fit_text(fit: Fit) -> str | None:
+    """Give a fit as `Fit.save` writes it, from which a map of its model takes the errors.
+
+    Args:
+        fit: the fit.
+
+    Returns:
+        JSON; None where the search failed.
+    """
+    if not is_successful(fit.result):
+        return None
+    return json.dumps(fit.to_dict(), indent=1, allow_nan=False) + "\n"
+
+
 def write_model_files(folder: Path, contents: Mapping[str, str | bytes | None]) -> None:
     """Write what belongs to a model; what an earlier run wrote there, a map included, belongs to another.
 
     Args:
         folder: where they go.
-        contents: content by file name; no model.json where that is None.
+        contents: content by file name; a file whose content is None is not written.
 
     Raises:
         KeptElsewhereError: if they could not be written there; it names the folder that has them.

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from ...stability import BackboneCurve, Branch, FrequencyResponse, SpecialPoint, Transmissibility
+from ._draw_band import draw_band
 from ._stability_style import (
     MILLIMETRES,
     draw_curve,
@@ -96,6 +97,15 @@ def plot_frequency_response(
         x, y, stable = (_row(np.asarray(v), place) for v in (response.frequency, values, response.stable))
         unstable |= _any_unstable(y, stable)
         draw_curve(ax, x, y, stable, colour, _level(branch, place))
+        if response.band is not None and what == "displacement":
+            lower, upper = (
+                (
+                    _row(np.asarray(end["frequency"]), place),
+                    MILLIMETRES * _row(np.asarray(end["amplitude"]), place),
+                )
+                for end in (response.band.lower, response.band.upper)
+            )
+            draw_band(ax, lower, upper, colour)
         for point in response.special_points:
             if point.branch == place:
                 nearest = _nearest_point(branch, place, point)
@@ -150,6 +160,13 @@ def plot_transmissibility(transmissibility: Transmissibility, *, ax: Axes | None
     for x, y, held in threads(frequency, ratio, stable):
         unstable |= _any_unstable(y, held)
         draw_curve(ax, x, y, held, level_colours(1)[0])
+    if transmissibility.band is not None:
+        ends = (transmissibility.band.lower, transmissibility.band.upper)
+        lower, upper = (np.atleast_2d(np.asarray(end["magnitude"])) for end in ends)
+        for low, high in zip(lower, upper, strict=True):
+            # An interval that reaches zero has no lower end on a logarithmic axis: it is drawn a decade down.
+            low = np.maximum(low, 0.1 * high)
+            draw_band(ax, (frequency, low), (frequency, high), level_colours(1)[0])
     ax.axhline(1.0, color=MEASURED, linewidth=0.8, linestyle=":")
     ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -212,6 +229,10 @@ def _draw_backbone(ax: Axes, backbone: BackboneCurve) -> list[Line2D]:
     forced = {"color": MEASURED, "linewidth": 1.2, "linestyle": "-."}
     ax.plot(np.asarray(backbone.natural_frequency), height, **free)
     ax.plot(np.asarray(backbone.frequency), height, **forced)
+    if backbone.band is not None:
+        ends = (backbone.band.lower, backbone.band.upper)
+        lower, upper = ((np.asarray(end["frequency"]), height) for end in ends)
+        draw_band(ax, lower, upper, MEASURED)
     return [
         Line2D([], [], label="free vibration, no damping", **free),
         Line2D([], [], label="phase resonance", **forced),

@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ...stability import FoldCurve
+from ._draw_band import draw_band
 from ._stability_style import MARKS, draw_special_points, drive_unit, drive_words, mark_handle, quantity
 from ._style import BEFORE, axes_for, entitle
 
@@ -72,6 +73,10 @@ def draw_lens(ax: Axes, curve: FoldCurve, *, filled: bool) -> list[Any]:
         ax.fill(frequency, amplitude, facecolor=_INSIDE, edgecolor="none", zorder=0)
         handles.append(Patch(facecolor=_INSIDE, label="several orbits"))
     colour, width = (BEFORE, 1.4) if filled else (_OVER_MAP, 1.0)
+    if curve.band is not None:
+        ends = (curve.band.lower, curve.band.upper)
+        lower, upper = ((np.asarray(end["frequency"]), np.asarray(end["amplitude"])) for end in ends)
+        draw_band(ax, lower, upper, colour)
     ax.plot(frequency, amplitude, color=colour, linewidth=width)
     handles.insert(0, Line2D([], [], color=colour, linewidth=width, label=MARKS["fold"].words))
     places = [("cusp", float(cusp.frequency), float(cusp.amplitude)) for cusp in curve.cusps]

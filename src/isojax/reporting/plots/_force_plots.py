@@ -6,13 +6,15 @@ from typing import Literal
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._results import is_successful
 from ...identification import Fit
-from ...models import Isolator
+from ...models import Band, Isolator, find_band
 from ...records import Record, measured_state
+from ._draw_band import PALE
 from ._force_cycles import trace_cycles
 from ._style import AFTER, BAND, CURVES, MEASURED, NEUTRAL, axes_for, entitle, fits_meant, pair
 
@@ -86,6 +88,10 @@ def plot_restoring_force(
     grid = np.linspace(-1.25 * reach, 1.25 * reach, 801)
     for (label, fit, colour), width in zip(pair(before, after), CURVES, strict=False):
         ax.plot(1e3 * grid, _slice(fit.model, grid, what), color=colour, linewidth=width, label=label)
+        if is_successful(fit.result) and np.all(np.isfinite(fit.covariance)):
+            band = force_band(fit, grid, what)
+            lower, upper = (np.asarray(end["force"]) for end in (band.lower, band.upper))
+            ax.fill_between(1e3 * grid, lower, upper, color=colour, alpha=PALE, linewidth=0.0)
     ax.axvspan(-1e3 * reach, 1e3 * reach, color=BAND, alpha=0.6, zorder=0, label="visited")
     ax.set_xlim(1e3 * grid[0], 1e3 * grid[-1])
     ax.set_xlabel("displacement [mm]" if what == "stiffness" else "velocity [mm/s]")
@@ -127,10 +133,31 @@ def _crossings(
 
 
 def _slice(model: Isolator, grid: Float[np.ndarray, " point"], what: str) -> Float[np.ndarray, " point"]:
+    return np.asarray(_force_along(model, grid, what))
+
+
+def _force_along(model: Isolator, grid: Float[np.ndarray, " point"], what: str) -> Float[Array, " point"]:
     """Give the force along one axis of the plane of x and v, internal states at rest."""
     along, zero = jnp.asarray(grid), jnp.zeros(grid.size)
     pair = (along, zero) if what == "stiffness" else (zero, along)
-    return np.asarray(model.restoring_force((*pair, *(zero,) * model.internal_states)))
+    return model.restoring_force((*pair, *(zero,) * model.internal_states))
+
+
+def force_band(fit: Fit, grid: Float[np.ndarray, " point"], what: Slice) -> Band:
+    """Give the band of the restoring force over displacement at rest, or of the damping force over velocity.
+
+    Args:
+        fit: the fit.
+        grid: displacements [m] or velocities [m/s].
+        what: "stiffness" over displacement, "damping" over velocity.
+
+    Returns:
+        The band of `force` [N].
+
+    Raises:
+        ValueError: if the fit failed or leaves a coefficient undetermined.
+    """
+    return find_band(fit, fit.model, ("force",), lambda model: _force_along(model, grid, what)[None])
 
 
 def effect_on_its_own(model: Isolator, effect: str) -> Isolator:

@@ -23,6 +23,9 @@ _COLOURS = 256
 _LEAST_SPAN = 1e-3
 """Least range of the colours beyond one."""
 
+_CHANCES = (0.05, 0.95)
+"""Chances of a stable cell along which lines are drawn."""
+
 _LEAST = 1e-9
 """Least range of the colours of a response [mm]."""
 
@@ -33,7 +36,8 @@ def plot_stability_map(
     """Draw the largest modulus of the multipliers over frequency and drive amplitude.
 
     Blue is stable, orange to red unstable, and the colours break at one, where the contour lies. Cells with
-    several orbits are outlined, unless the folds are given; grey cells hold none.
+    several orbits are outlined, unless the folds are given; grey cells hold none. Where the map was given a
+    fit, dotted lines pass through the cells that hold no unstable orbit with 5 and with 95 %.
 
     Args:
         smap: the map.
@@ -60,9 +64,24 @@ def plot_stability_map(
     if _crosses(radius, 1.0):
         ax.contour(*_centres(smap), radius, levels=[1.0], colors=_OUTLINE, linewidths=0.8)
         handles.append(Line2D([], [], color=_OUTLINE, linewidth=0.8, label="|µ| = 1"))
+    handles += _draw_chance(smap, ax)
     title = f"Largest multiplier over one drive period{_which(smap, orbit, 'least stable')}{_caption(smap)}"
     _finish(smap, radius, title, handles, folds, ax)
     return figure
+
+
+def _draw_chance(smap: StabilityMap, ax: Axes) -> list[Line2D]:
+    """Draw between which lines the boundary of the unstable cells lies, given the errors of the fit."""
+    if smap.probability_stable is None or min(smap.probability_stable.shape) < 2:
+        return []
+    chance = np.asarray(smap.probability_stable)
+    levels = [level for level in _CHANCES if _crosses(chance, level)]
+    if not levels:
+        return []
+    style = {"linestyles": "dotted", "linewidths": 1.0}
+    ax.contour(*_centres(smap), chance, levels=levels, colors=_OUTLINE, **style)
+    words = " and ".join(f"{level:.0%}" for level in levels)
+    return [Line2D([], [], color=_OUTLINE, linewidth=1.0, linestyle=":", label=f"stable with {words}")]
 
 
 def plot_response_map(

@@ -6,6 +6,7 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
 from ..._show import brief, number, shown
+from ...models import Band
 
 
 @shown
@@ -42,6 +43,7 @@ class FoldCurve(eqx.Module):
         symmetric: whether they were closed with the half-period map.
         result: whether the curve was followed until it closed or left the window, every point to the
             tolerance of a single orbit; points that were not are NaN.
+        band: of frequency and amplitude, across the curve, where a fit was given.
     """
 
     amplitude: Float[Array, " point"]
@@ -53,6 +55,7 @@ class FoldCurve(eqx.Module):
     periods: int = eqx.field(static=True)
     symmetric: bool = eqx.field(static=True)
     result: RESULTS
+    band: Band | None = None
 
     def _headline(self) -> str:
         amplitude, frequency = brief(self.amplitude), brief(self.frequency)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
-from ...models import Integrator, Isolator, Modelled, as_isolator
+from ...models import EndsEstimated, Estimated, Integrator, Isolator, Modelled, as_isolator, find_band
 from ..orbit import ShootingMethod, multipliers, state_scale, trajectory
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._bifurcation_curves import Cusp, FoldCurve, PeriodDoublingCurve
@@ -51,6 +51,7 @@ def fold_curve(
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> FoldCurve:
     """Follow the folds over the plane of the drive's amplitude and frequency.
 
@@ -67,6 +68,7 @@ def fold_curve(
         step: largest step, over the size of the motion and the window.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
+        fit: with whose errors the curve is given a band; `model` is its model. None for no band.
 
     Returns:
         The curve: closed, or from edge to edge of the window.
@@ -97,7 +99,15 @@ def fold_curve(
     numbers, good = curve.numbers(found)
     method, closed = curve.method, jnp.array(followed.closed)
     result = followed.result(good)
-    return FoldCurve(*numbers, tuple(cusps), closed, method.periods, method.half, result)
+
+    def across(isolator: Isolator) -> Array:
+        moved = _curve(isolator, search_for, curve.start, integrator)
+        amplitude, frequency, _, _ = moved.numbers(moved.polished(followed.unknowns, followed.tangents))[0]
+        return jnp.stack([frequency, amplitude])
+
+    names = ("frequency", "amplitude")
+    band = None if fit is None else find_band(fit, model, names, across, across=True)
+    return FoldCurve(*numbers, tuple(cusps), closed, method.periods, method.half, result, band)
 
 
 def period_doubling_curve(

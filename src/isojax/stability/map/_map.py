@@ -1,7 +1,7 @@
 """Stability over a whole plane of drive amplitude and frequency."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,18 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from ..._results import RESULTS, cell_results
 from ..._show import number, shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator, Modelled, as_isolator
+from ...models import (
+    EndsEstimated,
+    Estimated,
+    Integrator,
+    Isolator,
+    Modelled,
+    as_isolator,
+    coefficient_errors,
+)
 from ..orbit import Sine, ascending, is_odd
 from ._batched_newton import FOUND, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
+from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
@@ -56,6 +65,11 @@ class StabilityMap(eqx.Module):
         error: of a multiplier at most, from a sample of cells against steps four times finer.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
+        probability_stable: chance that the cell holds no unstable orbit, coexisting ones included, where a
+            fit was given; NaN where the maps that it rests on do not reach.
+        probability_coexisting: chance that the cell holds several orbits, where a fit was given.
+        standard_errors: of `response` and `spectral_radius` of each orbit, where a fit was given; NaN where
+            orbits may appear or vanish.
     """
 
     model: Isolator
@@ -74,6 +88,9 @@ class StabilityMap(eqx.Module):
     error: float
     symmetric: bool = eqx.field(static=True)
     integrator: Integrator
+    probability_stable: Float[Array, "amplitude frequency"] | None = None
+    probability_coexisting: Float[Array, "amplitude frequency"] | None = None
+    standard_errors: Mapping[str, Float[Array, "*orbit amplitude frequency"]] | None = None
 
     @property
     def stable(self) -> Array:
@@ -142,6 +159,7 @@ def stability_map(
     checkpoint: str | Path | None = None,
     progress: Callable[[str], None] | None = None,
     devices: Any = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> StabilityMap:
     """Find the periodic orbits over a grid of drive amplitude and frequency, and their Floquet multipliers.
 
@@ -165,13 +183,16 @@ def stability_map(
             gives the same numbers.
         progress: called with a line now and then.
         devices: devices to spread each chunk over; all of this process if omitted.
+        fit: with whose errors each cell is given its chances; `model` is its model. None for none. That takes
+            two more maps an independent step of its covariance, and as long again as two.
 
     Returns:
         The map. Where nothing converged the numbers are NaN and `result` says why.
 
     Raises:
         ValueError: if a grid is empty, not positive or not ascending, `reach` is below one, `chunk` is no
-            positive count, or the checkpoint belongs to another map.
+            positive count, the checkpoint belongs to another map, or the fit failed, leaves a coefficient
+            undetermined or is of another model.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
@@ -184,6 +205,7 @@ def stability_map(
     """
     model = as_isolator(model)
     check_float64()
+    carried = None if fit is None else coefficient_errors(fit, model)
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:
         raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
@@ -227,7 +249,8 @@ def stability_map(
     for _ in range(code.ndim):
         ending = jax.vmap(ending)
     result = ending(jnp.asarray(code))
-    return StabilityMap(
+    fields: dict[str, Any] = {name: jnp.asarray(values) for name, values in arrays.items()}
+    smap = StabilityMap(
         model=model,
         amplitudes=jnp.asarray(forces),
         frequencies=jnp.asarray(band),
@@ -236,7 +259,31 @@ def stability_map(
         sides=jnp.asarray(sought.surface.sides),
         symmetric=half,
         integrator=integrator,
-        **{name: jnp.asarray(values) for name, values in arrays.items()},
+        **fields,
+    )
+    if carried is None:
+        return smap
+
+    def find(moved: Isolator, wide: Float[np.ndarray, " wide"]) -> StabilityMap:
+        if progress is not None:
+            progress("chances of the cells")
+        return stability_map(
+            moved, wide, band, coexisting=True, reach=reach, integrator=integrator, chunk=chunk,
+            devices=devices,
+        )  # fmt: skip
+
+    chances = find_chances(carried, forces, find, quasi_draws(carried))
+    orbits = smap.response.shape[0]
+    own = slice(orbits) if coexisting else 0
+    return eqx.tree_at(
+        lambda one: (one.probability_stable, one.probability_coexisting, one.standard_errors),
+        smap,
+        (
+            jnp.asarray(chances.stable),
+            jnp.asarray(chances.coexisting),
+            {name: jnp.asarray(error[own]) for name, error in chances.standard_errors.items()},
+        ),
+        is_leaf=lambda one: one is None,
     )
 
 

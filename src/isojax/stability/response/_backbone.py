@@ -12,7 +12,18 @@ from jaxtyping import Array, Float
 from ..._results import RESULTS
 from ..._show import brief, shown
 from ..._types import check_float64
-from ...models import Instant, Integrator, Isolator, Modelled, State, as_isolator
+from ...models import (
+    Band,
+    EndsEstimated,
+    Estimated,
+    Instant,
+    Integrator,
+    Isolator,
+    Modelled,
+    State,
+    as_isolator,
+    find_band,
+)
 from ..map import Lane, MapMethod, states_at_zero
 from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory
 from ._free_vibration import natural_frequencies
@@ -40,6 +51,7 @@ class BackboneCurve(eqx.Module):
         force: amplitude of the recorded drive there [N, or m/s^2 for base excitation].
         y0: state there at t = 0 of the recorded drive: displacement, velocity, internal states.
         result: whether phase resonance was found; its numbers are NaN where not.
+        band: of natural frequency, frequency and force, where a fit was given.
     """
 
     displacements: Float[Array, " point"]
@@ -48,6 +60,7 @@ class BackboneCurve(eqx.Module):
     force: Float[Array, " point"]
     y0: Float[Array, "point state"]
     result: RESULTS
+    band: Band | None = None
 
     def _headline(self) -> str:
         spans = f"frequency {brief(self.frequency)} Hz, displacement {brief(self.displacements)} m"
@@ -55,7 +68,11 @@ class BackboneCurve(eqx.Module):
 
 
 def backbone_curve(
-    model: Isolator | Modelled, displacements: Any, *, integrator: Integrator | None = None
+    model: Isolator | Modelled,
+    displacements: Any,
+    *,
+    integrator: Integrator | None = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> BackboneCurve:
     """Give the backbone curve, free and forced.
 
@@ -63,6 +80,7 @@ def backbone_curve(
         model: the isolator.
         displacements: largest displacement over rest, ascending and positive [m].
         integrator: solver and steps; 256 a period if omitted.
+        fit: with whose errors the curve is given a band; `model` is its model. None for no band.
 
     Returns:
         The curve.
@@ -83,8 +101,21 @@ def backbone_curve(
     check_float64()
     amplitudes = jnp.asarray(ascending("displacements", displacements))
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
-    natural = natural_frequencies(model, amplitudes)
-    return _resonance(model, amplitudes, natural, integrator)
+
+    def curve_of(isolator: Isolator) -> BackboneCurve:
+        return _resonance(isolator, amplitudes, natural_frequencies(isolator, amplitudes), integrator)
+
+    def quantities(isolator: Isolator) -> Array:
+        found = curve_of(isolator)
+        return jnp.stack([found.natural_frequency, found.frequency, found.force])
+
+    curve = curve_of(model)
+    if fit is None:
+        return curve
+    names = ("natural_frequency", "frequency", "force")
+    return eqx.tree_at(
+        lambda one: one.band, curve, find_band(fit, model, names, quantities), is_leaf=lambda x: x is None
+    )
 
 
 @eqx.filter_jit

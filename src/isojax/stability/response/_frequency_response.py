@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._results import RESULTS
 from ..._show import amount, number, shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator, Modelled, as_isolator
+from ...models import Band, EndsEstimated, Estimated, Integrator, Isolator, Modelled, as_isolator, find_band
 from ..branch import Branch, SpecialPoint, continue_branch
 from ..orbit import Sine, recorded_sine, trajectory
 
@@ -26,10 +26,12 @@ class FrequencyResponse(eqx.Module):
         branch: the orbits.
         receptance: complex amplitude of the fundamental of the displacement over that of the recorded drive
             [m/N, or s^2 for base excitation].
+        band: of frequency and amplitude, across the curve, where a fit was given.
     """
 
     branch: Branch
     receptance: Complex[Array, "*branch point"]
+    band: Band | None = None
 
     @property
     def frequency(self) -> Float[Array, "*branch point"]:
@@ -70,7 +72,7 @@ class FrequencyResponse(eqx.Module):
         return f"largest response {peak} under a drive of {drive}; {self.branch._headline()}"
 
     def _rows(self) -> list[str]:
-        return ["branch", "receptance"]
+        return ["branch", "receptance", *(["band"] if self.band is not None else [])]
 
     def _lines(self) -> list[str]:
         return self.branch._lines()
@@ -84,6 +86,7 @@ def frequency_response(
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> FrequencyResponse:
     """Follow the periodic response over frequency.
 
@@ -98,6 +101,7 @@ def frequency_response(
         step: largest step, over the size of the motion and the range of frequency.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
+        fit: with whose errors the curve is given a band; `model` is its model. None for no band.
 
     Returns:
         The response. Where it ends early `result` says so, and the points found so far stand.
@@ -128,17 +132,27 @@ def frequency_response(
             "Argument `frequencies` must hold positive numbers and end at another than it begins with, but "
             f"is {frequencies}."
         )
-    branch = continue_branch(
-        model,
-        parameter="frequency",
-        amplitude=jnp.asarray(forces),
-        start=float(ends[0]),
-        stop=float(ends[-1]),
-        step=step,
-        most=most,
-        integrator=integrator,
-    )
-    return FrequencyResponse(branch, _receptance(model, branch))
+
+    def branch_of(isolator: Isolator) -> Branch:
+        return continue_branch(
+            isolator,
+            parameter="frequency",
+            amplitude=jnp.asarray(forces),
+            start=float(ends[0]),
+            stop=float(ends[-1]),
+            step=step,
+            most=most,
+            integrator=integrator,
+        )
+
+    def curve(isolator: Isolator) -> Array:
+        points = branch_of(isolator).points
+        return jnp.stack([points.frequency, points.response])
+
+    branch = branch_of(model)
+    names = ("frequency", "amplitude")
+    band = None if fit is None else find_band(fit, model, names, curve, across=True)
+    return FrequencyResponse(branch, _receptance(model, branch), band)
 
 
 @eqx.filter_jit

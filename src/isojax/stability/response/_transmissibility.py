@@ -11,7 +11,17 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._results import RESULTS
 from ..._show import number, shown
 from ..._types import Lanes, Scalar, as_float64, check_float64
-from ...models import Integrator, Isolator, Modelled, State, as_isolator
+from ...models import (
+    Band,
+    EndsEstimated,
+    Estimated,
+    Integrator,
+    Isolator,
+    Modelled,
+    State,
+    as_isolator,
+    find_band,
+)
 from ..map import StabilityMap, stability_map
 from ..orbit import Sine, ascending, period_map, recorded_sine, trajectory
 from ._frequency_response import fundamental
@@ -33,6 +43,7 @@ class Transmissibility(eqx.Module):
         peak: of half the peak-to-peak values, the harmonics included: of the forces, or of the displacements.
         spectral_radius: of each orbit; constant to JAX: `sensitivity` of a map has its derivatives.
         result: whether the orbit was found; beside NaN, why not.
+        band: of the magnitude, where a fit was given.
     """
 
     amplitude: Float[Array, ""]
@@ -41,6 +52,7 @@ class Transmissibility(eqx.Module):
     peak: Float[Array, "*orbit frequency"]
     spectral_radius: Float[Array, "*orbit frequency"]
     result: RESULTS
+    band: Band | None = None
 
     @property
     def magnitude(self) -> Float[Array, "*orbit frequency"]:
@@ -71,6 +83,7 @@ def transmissibility(
     *,
     coexisting: bool = False,
     integrator: Integrator | None = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> Transmissibility:
     """Give the transmissibility over frequency at one drive amplitude.
 
@@ -82,6 +95,7 @@ def transmissibility(
         frequencies: ascending [Hz].
         coexisting: whether to give every orbit; else the one of the smallest motion.
         integrator: solver and steps; 256 a period if omitted.
+        fit: with whose errors the curve is given a band; `model` is its model. None for no band.
 
     Returns:
         The transmissibility.
@@ -101,17 +115,23 @@ def transmissibility(
     model = as_isolator(model)
     check_float64()
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
-    band = ascending("frequencies", frequencies)
+    grid = ascending("frequencies", frequencies)
     force = as_float64(amplitude)
     held = np.asarray(jax.lax.stop_gradient(force))
     if held.ndim or not np.isfinite(held) or not held > 0.0:
         raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
     frozen = jax.lax.stop_gradient(model)
-    orbits = stability_map(frozen, held[None], band, coexisting=coexisting, integrator=integrator)
-    ratio, peak = _passed(model, frozen, force, orbits, orbits.y0[..., 0, :, :])
-    radius = orbits.spectral_radius[..., 0, :]
+    orbits = stability_map(frozen, held[None], grid, coexisting=coexisting, integrator=integrator)
+    starts = orbits.y0[..., 0, :, :]
+    ratio, peak = _passed(model, frozen, force, orbits, starts)
+
+    def curve(isolator: Isolator) -> Array:
+        return jnp.abs(_passed(isolator, frozen, force, orbits, starts)[0])[None]
+
+    band = None if fit is None else find_band(fit, model, ("magnitude",), curve)
     result = jax.tree.map(lambda values: values[..., 0, :], orbits.result)
-    return Transmissibility(force, jnp.asarray(band), ratio, peak, radius, result)
+    radius = orbits.spectral_radius[..., 0, :]
+    return Transmissibility(force, jnp.asarray(grid), ratio, peak, radius, result, band)
 
 
 @eqx.filter_jit

@@ -1,0 +1,200 @@
+"""The coefficients of a fitted model with their errors: what carries a covariance into any answer."""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Inexact
+
+from .._parameters import list_parameters, replace_parameters
+from .._results import RESULTS, is_successful
+from .._show import shown
+from ._isolator import Isolator
+
+_NO_SHARE = 1e-12
+"""Share of the largest eigenvalue of a correlation below which a direction is rounding."""
+
+_DRAWN_AGAIN = 50
+"""Times that draws outside the bounds of a coefficient are drawn again."""
+
+
+@runtime_checkable
+class Estimated(Protocol):
+    """Whatever holds a fitted model with the covariance of its coefficients: a fit, or a saved one."""
+
+    @property
+    def model(self) -> Isolator:
+        """The fitted isolator."""
+        ...
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the fitted coefficients."""
+        ...
+
+    @property
+    def covariance(self) -> Float[np.ndarray, "coefficient coefficient"]:
+        """Of these [product of their units]."""
+        ...
+
+    @property
+    def result(self) -> RESULTS:
+        """How the search ended."""
+        ...
+
+
+@runtime_checkable
+class EndsEstimated(Protocol):
+    """Whatever ends with a fit as `.after`: an extension, a closed loop."""
+
+    @property
+    def after(self) -> Estimated | None:
+        """The last fit."""
+        ...
+
+
+@shown
+class CoefficientErrors(NamedTuple):
+    """A fitted model, and independent steps of one standard deviation from it.
+
+    Attributes:
+        model: the fitted isolator.
+        places: of the fitted coefficients in `list_parameters`.
+        values: of these.
+        root: of their covariance, which is `root @ root.T`.
+    """
+
+    model: Isolator
+    places: tuple[int, ...]
+    values: Float[np.ndarray, " coefficient"]
+    root: Float[np.ndarray, "coefficient step"]
+
+    @property
+    def steps(self) -> int:
+        """How many independent steps there are."""
+        return self.root.shape[1]
+
+    def moved(self, steps: Float[Array, " step"]) -> Isolator:
+        """Give the isolator some standard deviations away.
+
+        Args:
+            steps: so many along each independent direction.
+
+        Returns:
+            The isolator.
+        """
+        numbers = [entry.value for entry in list_parameters(self.model)]
+        for place, number in zip(self.places, self.values + self.root @ steps, strict=True):
+            numbers[place] = number
+        return replace_parameters(self.model, numbers)
+
+    def carry(
+        self, quantity: Callable[[Isolator], Array]
+    ) -> tuple[Inexact[Array, "..."], Inexact[Array, "... step"]]:
+        """Give a quantity of the model, and its change by each independent step, to first order.
+
+        The norm of the changes is the standard error.
+
+        Args:
+            quantity: function of an isolator, differentiable by `jax.jacfwd`.
+
+        Returns:
+            Both.
+        """
+
+        def twice(steps: Array) -> tuple[Array, Array]:
+            value = jnp.asarray(quantity(self.moved(steps)))
+            return value, value
+
+        change, value = jax.jacfwd(twice, has_aux=True)(jnp.zeros(self.steps))
+        return value, change
+
+    def inside(self, steps: Float[np.ndarray, "draw step"]) -> Bool[np.ndarray, " draw"]:
+        """Say for which steps all coefficients keep to their bounds.
+
+        Args:
+            steps: in standard deviations.
+
+        Returns:
+            Whether they do.
+        """
+        specs = [list_parameters(self.model)[place].spec for place in self.places]
+        lower, upper = (np.array([getattr(spec, end) for spec in specs]) for end in ("lower", "upper"))
+        moved = self.values + steps @ self.root.T
+        return np.all((moved >= lower) & (moved <= upper), axis=1)
+
+    def draw(self, count: int, seed: int) -> Float[np.ndarray, "draw step"]:
+        """Draw standard normal steps whose coefficients keep to their bounds.
+
+        Args:
+            count: how many.
+            seed: of the draws.
+
+        Returns:
+            The steps.
+
+        Raises:
+            ValueError: if almost no draw keeps to the bounds.
+        """
+        generator = np.random.default_rng(seed)
+        steps = generator.standard_normal((count, self.steps))
+        for _ in range(_DRAWN_AGAIN):
+            outside = ~self.inside(steps)
+            if not outside.any():
+                return steps
+            steps[outside] = generator.standard_normal((np.count_nonzero(outside), self.steps))
+        raise ValueError(
+            "Argument `fit` must leave its coefficients room between their bounds, but almost no draw falls "
+            "there."
+        )
+
+
+def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = None) -> CoefficientErrors:
+    """Give the fitted coefficients and the root of their covariance.
+
+    Args:
+        fit: a fit, a saved one, or what ends with one.
+        model: that answers are asked of, if any: it must be the fitted one.
+
+    Returns:
+        Them.
+
+    Raises:
+        ValueError: if there is no fit or it failed, the data do not determine a coefficient, or `model` is
+            another than the fitted one.
+    """
+    held = fit if isinstance(fit, Estimated) else getattr(fit, "after", None)
+    if not isinstance(held, Estimated):
+        raise ValueError(
+            "Argument `fit` must be a fit, a saved one, or an extension or a closed loop, whose last fit is "
+            f"taken, but is of type {type(fit).__name__}."
+        )
+    if not is_successful(held.result):
+        raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[held.result]}")
+    listed = list_parameters(held.model)
+    if model is not None:
+        asked = {entry.name: float(entry.value) for entry in list_parameters(model)}
+        other = [entry.name for entry in listed if asked.get(entry.name) != float(entry.value)]
+        if other or len(asked) != len(listed):
+            raise ValueError(
+                "Argument `model` must be that of argument `fit`, such as fit.model, but differs in "
+                f"{', '.join(other) or 'its elements'}."
+            )
+    covariance = np.asarray(held.covariance, dtype=float)
+    size = np.sqrt(np.diag(covariance))
+    lost = [name for name, one in zip(held.free, size, strict=True) if not np.isfinite(one)]
+    if lost:
+        raise ValueError(
+            "Argument `fit` must determine each free coefficient, but its data do not determine "
+            f"{', '.join(lost)}."
+        )
+    # Scaled before the roots are taken: stiffness in N/m and in N/m^3 differ by many orders.
+    safe = np.where(size > 0.0, size, 1.0)
+    shares, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
+    kept = shares > _NO_SHARE * shares.max(initial=0.0)
+    root = safe[:, None] * vectors[:, kept] * np.sqrt(shares[kept])
+    names = [entry.name for entry in listed]
+    values = np.array([float(held.model[name]) for name in held.free])
+    return CoefficientErrors(held.model, tuple(names.index(name) for name in held.free), values, root)

@@ -1,0 +1,261 @@
+"""Chances of a map: how probable a stable cell is, and one with several orbits, given the errors of a fit.
+
+At a fold a cell gains or loses two orbits at once, so that no derivative of the cell says how probable that
+is. Over displacement and frequency the orbits do not fold: there the force that an orbit takes and its
+stability are smooth in the coefficients. Both are read off a map, and off one map either way along each
+independent step of the covariance. Draws of the coefficients then cost a product of matrices each.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
+from scipy.stats.qmc import MultivariateNormalQMC
+
+from ...models import CoefficientErrors, Isolator
+
+if TYPE_CHECKING:
+    from ._map import StabilityMap
+
+_REACH = 3.0**0.5
+"""Standard deviations of the maps either way: the nodes of Gauss and Hermite."""
+
+_DISPLACEMENTS, _DOUBTFUL = 400, 160
+"""Displacements, even in their logarithm, at which the maps are compared; and within what is in doubt."""
+
+_BELOW, _ABOVE = np.geomspace(0.87, 0.97, 4), np.geomspace(1.01, 1.3, 9)
+"""Amplitudes beside the window that are mapped as well, over its least and its largest."""
+
+_FEWEST = 6
+"""Orbits at one frequency that make a curve."""
+
+_SAME, _FLAT = 1e-9, 0.2
+"""Difference of log displacement below which two orbits are one; slope of log force over log displacement
+below which the determinant knows it better than a spline."""
+
+DRAWS = 512
+"""Draws of the coefficients: quasi-random, so that their chances scatter by less than 0.01."""
+
+
+class Chances(NamedTuple):
+    """What the errors of the coefficients make of a map.
+
+    Attributes:
+        stable: chance that a cell holds no unstable orbit.
+        coexisting: chance that it holds several orbits.
+        standard_errors: of `response` and `spectral_radius` of each orbit; NaN where not every map has it.
+    """
+
+    stable: Float[np.ndarray, "amplitude frequency"]
+    coexisting: Float[np.ndarray, "amplitude frequency"]
+    standard_errors: Mapping[str, Float[np.ndarray, "orbit amplitude frequency"]]
+
+
+def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarray, "draw step"]:
+    """Give quasi-random standard normal steps, without those that leave the bounds of a coefficient.
+
+    Args:
+        errors: of the coefficients.
+        count: how many; fewer come back where bounds are near.
+
+    Returns:
+        The steps.
+
+    Source: Owen 1998, ACM Trans. Model. Comput. Simul. 8:71 (scrambled Sobol points).
+    """
+    if errors.steps == 0:
+        return np.zeros((1, 0))
+    # Sobol points are even in numbers of a power of two; the first of them do as well.
+    powers = 2 ** int(np.ceil(np.log2(count)))
+    steps = MultivariateNormalQMC(np.zeros(errors.steps), rng=0).random(powers)[:count]
+    kept = steps[errors.inside(steps)]
+    return kept if len(kept) else np.zeros((1, errors.steps))
+
+
+def find_chances(
+    errors: CoefficientErrors,
+    amplitudes: Float[np.ndarray, " amplitude"],
+    find: Callable[[Isolator, Float[np.ndarray, " wide"]], "StabilityMap"],
+    steps: Float[np.ndarray, "draw step"],
+) -> Chances:
+    """Give the chances of every cell.
+
+    Args:
+        errors: of the coefficients.
+        amplitudes: of the drive.
+        find: gives the map of a model with all coexisting orbits, at some amplitudes.
+        steps: draws of the coefficients, in standard deviations.
+
+    Returns:
+        The chances; NaN in a cell with an orbit that lies beyond those of another of the maps.
+    """
+    # A fold that a draw moves out of the window must still be seen.
+    wide = np.concatenate([amplitudes[0] * _BELOW, amplitudes, amplitudes[-1] * _ABOVE])
+    inner = slice(_BELOW.size, _BELOW.size + amplitudes.size)
+    maps = [find(errors.model, wide)]
+    for place in range(errors.steps):
+        for sign in (1.0, -1.0):
+            away = np.zeros(errors.steps)
+            away[place] = sign * _REACH
+            maps.append(find(errors.moved(jnp.asarray(away)), wide))
+    along = steps / _REACH
+    # The quadratic through three nodes of each step.
+    sides = np.stack([0.5 * along * (along + 1.0), 0.5 * along * (along - 1.0)], axis=-1).reshape(
+        len(steps), -1
+    )
+    weights = np.concatenate([1.0 - np.sum(along**2, axis=1, keepdims=True), sides], axis=1)
+    forces, still = np.log(amplitudes), np.log(np.asarray(maps[0].response))[:, inner]
+    shape = (forces.size, maps[0].frequencies.size)
+    stable, coexisting = np.ones(shape), np.zeros(shape)
+    curves = [_Curves(one) for one in maps]
+    for column in range(shape[1]):
+        known = [curve for one in curves if (curve := one.at(column)) is not None]
+        if len(known) < len(curves):
+            stable[:, column] = coexisting[:, column] = np.nan
+            continue
+        ends = np.array([one.displacement[[0, -1]] for one in known])
+        low, high = ends[:, 0].max(), ends[:, 1].min()
+        grid = _in_doubt(known, np.linspace(low, high, _DISPLACEMENTS))
+        if grid.size:
+            table = _tables(known, grid)
+            stable[:, column], coexisting[:, column] = _counted(weights, table, forces)
+        beyond = np.any((still[..., column] < low) | (still[..., column] > high), axis=0)
+        stable[beyond, column] = coexisting[beyond, column] = np.nan
+    return Chances(stable, coexisting, _standard_errors(maps, inner))
+
+
+class _Curves:
+    """The orbits of a map, frequency by frequency: displacement, force and distance from instability."""
+
+    def __init__(self, smap: "StabilityMap"):
+        """Read them off."""
+        self.response = np.log(np.asarray(smap.response))
+        roots = np.asarray(smap.multipliers)
+        first, second = np.triu_indices(roots.shape[-1], 1)
+        self.fold = np.prod(1.0 - roots, axis=-1).real
+        self.others = np.minimum(
+            np.prod(1.0 + roots, axis=-1).real,
+            np.prod(1.0 - roots[..., first] * roots[..., second], axis=-1).real,
+        )
+        self.stable = np.asarray(smap.spectral_radius) < 1.0
+        self.force = np.broadcast_to(np.log(np.asarray(smap.amplitudes))[:, None], self.stable.shape)
+
+    def at(self, column: int) -> "_Curve | None":
+        """Give the curve at one frequency; None where too few orbits are known."""
+        x, y, fold, others, stable = (
+            one[..., column].ravel()
+            for one in (self.response, self.force, self.fold, self.others, self.stable)
+        )
+        good = np.isfinite(x) & np.isfinite(fold)
+        order = np.flatnonzero(good)[np.argsort(x[good], kind="stable")]
+        order = order[np.diff(x[order], prepend=-np.inf) > _SAME]
+        if order.size < _FEWEST:
+            return None
+        x, y, fold, others, stable = (one[order] for one in (x, y, fold, others, stable))
+        rise = CubicSpline(x, y).derivative()(x)
+        clear = np.abs(rise) > _FLAT
+        if np.count_nonzero(clear) < _FEWEST:
+            return None
+        # Both vanish at a fold, their ratio does not. Near one, where the orbits of a map lie far apart, the
+        # determinant therefore says how the force rises.
+        known = PchipInterpolator(x[clear], fold[clear] / rise[clear])
+        ratio = known(np.clip(x, *x[clear][[0, -1]]))
+        rise = np.where(clear | (ratio == 0.0), rise, fold / np.where(ratio == 0.0, 1.0, ratio))
+        # What is unstable though nothing says so, such as where two multipliers have left through one point,
+        # counts as it is.
+        margin = np.minimum(ratio, others)
+        margin = np.where(stable | (rise < 0.0), margin, -np.abs(margin))
+        return _Curve(x, CubicHermiteSpline(x, y, rise), margin)
+
+
+class _Curve(NamedTuple):
+    """The orbits of a map at one frequency.
+
+    Attributes:
+        displacement: of each, in logarithms, rising.
+        force: that takes it, over displacement, both in logarithms; where it falls the orbit is unstable.
+        margin: of each orbit, from any other loss of stability.
+    """
+
+    displacement: np.ndarray
+    force: CubicHermiteSpline
+    margin: np.ndarray
+
+
+def _in_doubt(
+    curves: list[_Curve], grid: Float[np.ndarray, " displacement"]
+) -> Float[np.ndarray, " doubtful"]:
+    """Give log displacements that a draw may fold or destabilise; elsewhere all maps are far from it."""
+    force, margin = _tables(curves, grid)
+    rise, margin = np.diff(force, axis=1), np.minimum(margin[:, :-1], margin[:, 1:])
+    near = np.any([one.min(axis=0) < 2.0 * np.ptp(one, axis=0) for one in (rise, margin)], axis=0)
+    places = np.flatnonzero(near)
+    if not places.size:
+        return np.zeros(0)
+    return np.linspace(grid[places[0]], grid[places[-1] + 1], _DOUBTFUL)
+
+
+def _tables(
+    curves: list[_Curve], grid: Float[np.ndarray, " displacement"]
+) -> Float[np.ndarray, "2 map displacement"]:
+    """Give log force and margin of all maps over common displacements."""
+    return np.array(
+        [
+            [one.force(grid) for one in curves],
+            [np.interp(grid, one.displacement, one.margin) for one in curves],
+        ]
+    )
+
+
+def _counted(
+    weights: Float[np.ndarray, "draw map"],
+    table: Float[np.ndarray, "2 map displacement"],
+    forces: Float[np.ndarray, " amplitude"],
+) -> tuple[Float[np.ndarray, " amplitude"], Float[np.ndarray, " amplitude"]]:
+    """Give the chances at one frequency, by counting what each draw has at each force."""
+    force, margin = weights @ table[0], weights @ table[1]
+    rank = np.searchsorted(forces, force)
+    falls = rank[:, 1:] < rank[:, :-1]
+    # The unstable part of each interval: whole where the force falls, else as far as the margin is negative.
+    left, right = margin[:, :-1], margin[:, 1:]
+    gap = left - right
+    share = np.clip(left / np.where(gap == 0.0, 1.0, gap), 0.0, 1.0)
+    passing = np.searchsorted(forces, force[:, :-1] + share * np.diff(force, axis=1))
+    begin = np.where(falls | (left < 0.0), rank[:, :-1], passing)
+    end = np.where(falls | (right < 0.0), rank[:, 1:], passing)
+    unstable = _passed(begin, end, falls | (left < 0.0) | (right < 0.0), forces.size)
+    # Between two folds the force falls, and an orbit that rises to it lies on either side.
+    several = _passed(rank[:, :-1], rank[:, 1:], falls, forces.size)
+    return np.mean(unstable == 0, axis=0), np.mean(several > 0, axis=0)
+
+
+def _passed(
+    begin: np.ndarray, end: np.ndarray, counts: Bool[np.ndarray, "draw interval"], forces: int
+) -> np.ndarray:
+    """Count the intervals of each draw that pass each force."""
+    draw, _ = np.nonzero(counts & (begin != end))
+    some = counts & (begin != end)
+    low, high = np.minimum(begin[some], end[some]), np.maximum(begin[some], end[some])
+    size = len(begin) * (forces + 1)
+    change = np.bincount(draw * (forces + 1) + low, minlength=size)
+    change = change - np.bincount(draw * (forces + 1) + high, minlength=size)
+    return np.cumsum(change.reshape(len(begin), forces + 1), axis=1)[:, :-1]
+
+
+def _standard_errors(maps: list["StabilityMap"], inner: slice) -> dict[str, np.ndarray]:
+    """Give standard errors by central differences, where every map has the same orbits."""
+    orbits = max(one.response.shape[0] for one in maps)
+    counts = np.array([np.asarray(one.count)[inner] for one in maps])
+    alike = np.all(counts == counts[0], axis=0)
+    errors = {}
+    for name in ("response", "spectral_radius"):
+        values = [np.asarray(getattr(one, name))[:, inner] for one in maps]
+        values = np.array(
+            [np.pad(v, ((0, orbits - len(v)), (0, 0), (0, 0)), constant_values=np.nan) for v in values]
+        )
+        slopes = (values[1::2] - values[2::2]) / (2.0 * _REACH)
+        errors[name] = np.where(alike, np.linalg.norm(slopes, axis=0), np.nan)
+    return errors

@@ -1,0 +1,110 @@
+"""Error bars over every scatter that the records allow, against quadrature by SciPy and by simulation."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.stats import halfcauchy, norm
+
+from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate
+from isojax.identification.fitting._scatter_mixture import integrate_scatter
+
+UNIT = 1e-3
+"""One unit of a stiffness scale's column: a tenth of a percent."""
+
+PRIOR = 1e-3
+
+
+def reduced_of(columns, scale, readings, spread, inflation=1.0):
+    """Equations of records that hold whitened columns of coefficients, one of the scale, and the readings."""
+    records, samples, count = columns.shape
+    whole = np.concatenate(
+        [columns, scale[..., None], np.zeros((records, samples, 1)), readings[..., None]], axis=2
+    )
+    matrices = inflation * np.einsum("rti,rtj->rij", whole, whole)
+    nuisances = Nuisances(np.zeros((records, 1)), np.zeros(records), np.zeros(records), Spread(spread))
+    return eliminate(matrices, 1.0, np.arange(records), count, nuisances), nuisances
+
+
+def mean_of(readings, noise, spread, inflation=1.0):
+    """The uncertainty of a mean [UNIT], each record showing it with its own deviation and noise."""
+    columns = np.full((len(readings), 1, 1), 1.0 / noise)
+    return integrate_scatter(
+        *reduced_of(columns, columns[..., 0], np.array(readings)[:, None] / noise, spread, inflation),
+        inflation,
+    )
+
+
+def half_width(readings, noise, about):
+    """The same by quadrature: readings of a mean with the variance noise^2 + scatter^2 [all in UNIT]."""
+    readings, count = np.array(readings), len(readings)
+    centre, squares = readings.mean(), np.sum((readings - readings.mean()) ** 2)
+
+    def density(logarithm):
+        scatter = np.exp(logarithm)
+        variance = noise**2 + scatter**2
+        likelihood = variance ** (-0.5 * (count - 1)) * np.exp(-0.5 * squares / variance)
+        return likelihood * halfcauchy.pdf(scatter * UNIT, scale=PRIOR) * scatter
+
+    def integral(weight):
+        return quad(lambda x: density(x) * weight(np.exp(x)), np.log(1e-4), np.log(300.0), limit=400)[0]
+
+    def held(width):
+        def inside(scatter):
+            error = np.sqrt((noise**2 + scatter**2) / count)
+            return norm.cdf(about + width, centre, error) - norm.cdf(about - width, centre, error)
+
+        return integral(inside) / integral(lambda _: 1.0)
+
+    return brentq(lambda width: held(width) - 0.95, 1e-3, 300.0)
+
+
+@pytest.mark.parametrize("readings", [(-0.4, 0.5), (0.1, 0.12), (-3.0, 1.0, 2.5), (-0.2, 0.4, 0.1, -0.3)])
+@pytest.mark.parametrize("spread", [1e-5, 2e-3], ids=["steady", "loose"])
+def test_the_interval_of_a_mean_is_that_of_quadrature(readings, spread):
+    noise = 0.2
+    error = float(mean_of(readings, noise, spread).standard_error[0])
+    # The fit's own mean, alike at every scatter because the records weigh alike.
+    expected = half_width(readings, noise, float(np.mean(readings)))
+    assert norm.ppf(0.975) * error == pytest.approx(expected, rel=2e-3)
+
+
+def test_noise_that_was_taken_too_small_is_inflated_first():
+    readings = (-0.4, 0.5, 0.3)
+    honest, proud = mean_of(readings, 0.2, 1e-4), mean_of(readings, 0.2, 1e-4, inflation=4.0)
+    assert proud.standard_error[0] == pytest.approx(honest.standard_error[0], rel=1e-9)
+
+
+def test_without_a_scale_in_the_readings_least_squares_is_left():
+    draw = np.random.default_rng(1)
+    columns = draw.normal(size=(3, 40, 2)) * np.array([1.0, 1e6])
+    found = integrate_scatter(*reduced_of(columns, np.zeros((3, 40)), draw.normal(size=(3, 40)), 1e-4), 1.0)
+    flat = columns.reshape(-1, 2)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(flat.T @ flat), rtol=1e-9)
+
+
+def test_what_the_data_do_not_determine_is_named_and_spoils_nothing_else():
+    draw = np.random.default_rng(2)
+    columns = draw.normal(size=(3, 40, 3))
+    columns[..., 2] = 2.0 * columns[..., 1]
+    scale, readings = columns[..., 0] + draw.normal(size=(3, 40)), draw.normal(size=(3, 40))
+    found = integrate_scatter(*reduced_of(columns, scale, readings, 1e-3), 1.0)
+    fewer = integrate_scatter(*reduced_of(columns[..., :2], scale, readings, 1e-3), 1.0)
+    assert found.determined.tolist() == [True, False, False]
+    assert found.standard_error[0] == pytest.approx(fewer.standard_error[0], rel=1e-6)
+    assert np.isnan(found.standard_error[1:]).all()
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_intervals_cover_where_the_scatter_is_drawn_from_its_prior(count):
+    draw = np.random.default_rng(count)
+    repeats, noise, inside, known = 800, 0.2, 0, 0
+    for scatter in halfcauchy.rvs(scale=PRIOR / UNIT, size=repeats, random_state=draw):
+        readings = tuple(draw.normal(size=count) * np.hypot(noise, scatter))
+        error = float(mean_of(readings, noise, 1e-5).standard_error[0])
+        inside += abs(np.mean(readings)) < norm.ppf(0.975) * error
+        moments = np.sqrt(np.maximum(np.var(readings, ddof=1), noise**2) / count)
+        known += abs(np.mean(readings)) < norm.ppf(0.975) * moments
+    assert inside / repeats == pytest.approx(0.95, abs=0.023)
+    # An estimate of the scatter taken as known covers less.
+    assert known < inside

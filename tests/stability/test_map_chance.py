@@ -1,0 +1,70 @@
+"""Chances of the cells of a map, against an independent table of folds and closed forms."""
+
+from typing import NamedTuple
+
+import diffrax
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+import isojax as ij
+
+SUCCESS = ij.RESULTS.promote(diffrax.RESULTS.successful)
+PAPER = ij.paper.y_direction()
+FOLDS = {4.0: (211.67, 211.31), 4.2: (178.12, 171.89), 4.4: (150.66, 144.52)}
+"""Frequency [Hz] to upper and lower fold [N], found by others to 0.01 N."""
+
+SHARE = 0.02
+
+
+class Fitted(NamedTuple):
+    """What a map asks of a fit."""
+
+    model: ij.Isolator
+    free: tuple[str, ...]
+    covariance: np.ndarray
+    result: ij.RESULTS
+
+
+@pytest.fixture(scope="module")
+def smap():
+    """Mass and every coefficient grow together by 2 % of standard deviation: all forces grow with them."""
+    numbers = np.array([float(entry.value) for entry in PAPER.parameters])
+    free = tuple(entry.name for entry in PAPER.parameters)
+    fit = Fitted(PAPER, free, SHARE**2 * np.outer(numbers, numbers), SUCCESS)
+    return ij.stability_map(PAPER, np.linspace(120.0, 240.0, 121), np.array(list(FOLDS)), fit=fit)
+
+
+def test_the_chance_of_several_orbits_is_that_of_the_scaled_folds(smap):
+    force = np.asarray(smap.amplitudes)
+    for column, (upper, lower) in enumerate(FOLDS.values()):
+        expected = norm.cdf((force / lower - 1.0) / SHARE) - norm.cdf((force / upper - 1.0) / SHARE)
+        found = np.asarray(smap.probability_coexisting)[:, column]
+        # At 4 Hz, beside the cusp, the lens is 0.36 N high, a third of a cell.
+        np.testing.assert_allclose(found, expected, atol=0.015)
+
+
+def test_a_cell_is_stable_where_it_holds_one_orbit(smap):
+    several = np.asarray(smap.probability_coexisting)
+    np.testing.assert_allclose(smap.probability_stable, 1.0 - several, atol=0.005)
+
+
+def test_the_standard_error_of_a_response_is_that_of_the_scaled_force(smap):
+    # The orbit depends on force over scale alone: its error is that of a force that is 2 % uncertain.
+    force, response = np.asarray(smap.amplitudes), np.asarray(smap.response)
+    place = slice(3, 12)
+    slope = np.gradient(response, force, axis=0)
+    expected = SHARE * force[place, None] * slope[place]
+    np.testing.assert_allclose(smap.standard_errors["response"][place], expected, rtol=0.02)
+    # The error is unknown where the folds may pass.
+    assert np.isnan(np.asarray(smap.standard_errors["response"])[55, 1])
+
+
+def test_a_map_draws_its_chances(smap):
+    assert "stable with 95%" in [text.get_text() for text in _legend(ij.plot.stability_map(smap))]
+
+
+def _legend(figure):
+    return [text for legend in figure.legends for text in legend.get_texts()] + [
+        text for ax in figure.axes if ax.get_legend() for text in ax.get_legend().get_texts()
+    ]
