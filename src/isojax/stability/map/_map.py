@@ -264,7 +264,7 @@ def stability_map(
         sides=jnp.asarray(surface.sides),
         symmetric=half,
         integrator=integrator,
-        **{name: jnp.asarray(values) for name, values in arrays.items()},
+        **{name: jnp.asarray(values) for name, values in arrays.items()},  # pyright: ignore[reportArgumentType]
     )
     if carried is None:
         return smap
