@@ -13,7 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
-from scipy.stats.qmc import MultivariateNormalQMC
+from scipy.special import ndtri
+from scipy.stats.qmc import Sobol
 
 from ...models import CoefficientErrors, Isolator
 
@@ -55,7 +56,7 @@ class Chances(NamedTuple):
 
 
 def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarray, "draw step"]:
-    """Give quasi-random standard normal steps, without those that leave the bounds of a coefficient.
+    """Give standard normal steps that fill space evenly, without those that leave a bound of a coefficient.
 
     Args:
         errors: of the coefficients.
@@ -64,13 +65,14 @@ def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarr
     Returns:
         The steps.
 
-    Source: Owen 1998, ACM Trans. Model. Comput. Simul. 8:71 (scrambled Sobol points).
+    Source: Sobol 1967, USSR Comput. Math. Math. Phys. 7:86; each point in the middle of its cell.
     """
     if errors.steps == 0:
         return np.zeros((1, 0))
     # Sobol points are even in numbers of a power of two; the first of them do as well.
     powers = 2 ** int(np.ceil(np.log2(count)))
-    steps = MultivariateNormalQMC(np.zeros(errors.steps), rng=0).random(powers)[:count]
+    cells = Sobol(errors.steps, scramble=False).random(powers)[:count]
+    steps = ndtri(cells + 0.5 / powers)
     kept = steps[errors.inside(steps)]
     return kept if len(kept) else np.zeros((1, errors.steps))
 
