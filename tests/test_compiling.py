@@ -9,7 +9,7 @@ import jaxlib.version
 import pytest
 
 import isojax as ij
-from isojax._compiling import keep_compiled_code
+from isojax._compiling import compiled_code_folder
 
 FLAG = "--xla_cpu_use_fusion_emitters"
 
@@ -55,10 +55,6 @@ def test_xla_knows_the_flag():
     assert done.stdout.strip() == "42.0"
 
 
-def kept_in():
-    return jax.config.values["jax_compilation_cache_dir"]
-
-
 @pytest.fixture
 def settings():
     """JAX's settings of its cache, put back afterwards."""
@@ -74,23 +70,23 @@ def test_compiled_code_is_kept_in_the_users_cache_folder(settings, monkeypatch, 
     monkeypatch.delenv("ISOJAX_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     jax.config.update("jax_compilation_cache_dir", None)
-    assert keep_compiled_code() == tmp_path / "cache" / "isojax"
-    assert kept_in() == str(tmp_path / "cache" / "isojax")
+    assert compiled_code_folder() == tmp_path / "cache" / "isojax"
+    assert (tmp_path / "cache" / "isojax").is_dir()
 
 
 def test_a_folder_that_the_user_chose_is_taken_or_none(settings, monkeypatch, tmp_path):
     monkeypatch.setenv("ISOJAX_CACHE", str(tmp_path / "own"))
-    assert keep_compiled_code() == tmp_path / "own"
+    assert compiled_code_folder() == tmp_path / "own"
     monkeypatch.setenv("ISOJAX_CACHE", "")
-    assert keep_compiled_code() is None
+    assert compiled_code_folder() is None
     monkeypatch.delenv("ISOJAX_CACHE")
     jax.config.update("jax_compilation_cache_dir", str(tmp_path / "of JAX"))
-    assert keep_compiled_code() == tmp_path / "of JAX"
+    assert compiled_code_folder() == tmp_path / "of JAX"
 
 
 def test_where_nothing_can_be_written_nothing_is_kept(settings, monkeypatch, tmp_path):
     (tmp_path / "file").touch()
     monkeypatch.setenv("ISOJAX_CACHE", str(tmp_path / "file" / "below"))
     before = kept_in()
-    assert keep_compiled_code() is None
+    assert compiled_code_folder() is None
     assert kept_in() == before

@@ -65,11 +65,15 @@ def _start_jax() -> None:
     """Set how JAX computes and compiles, before it is first asked to."""
     import jax
 
-    from ._compiling import compile_quickly, keep_compiled_code
+    from ._compiling import compile_quickly, compiled_code_folder
 
     jax.config.update("jax_enable_x64", True)
     compile_quickly()
-    keep_compiled_code()
+    folder = compiled_code_folder()
+    if folder is not None:
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+        # To read code back takes a hundredth of a second, about as long as to compile the least of it.
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 
 
 def _progress(asked: argparse.Namespace) -> contextlib.AbstractContextManager[Callable[[str], None]]:

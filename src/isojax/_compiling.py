@@ -11,9 +11,6 @@ _UNTRIED = (0, 11)
 
 _FLAG = "--xla_cpu_use_fusion_emitters"
 
-_WORTH_KEEPING = 0.1
-"""Seconds of compiling from which the result is kept: reading it back takes a hundredth [s]."""
-
 
 def compile_quickly() -> bool:
     """Have XLA compile for CPUs without its fusion emitters: half the time, and the code is as fast.
@@ -37,8 +34,8 @@ def compile_quickly() -> bool:
     return True
 
 
-def keep_compiled_code() -> Path | None:
-    """Have JAX keep what it compiles on disk, so that a later run on this machine need not compile it again.
+def compiled_code_folder() -> Path | None:
+    """Give the folder in which JAX may keep what it compiles, for later runs on this machine.
 
     JAX keeps code apart by its own version, that of XLA, the flags and the processor. The folder is the
     one that ISOJAX_CACHE names, else JAX's own where the user has set one, else `isojax` in the user's cache
@@ -58,11 +55,7 @@ def keep_compiled_code() -> Path | None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return None
-    if not os.access(folder, os.W_OK):
-        return None
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", _WORTH_KEEPING)
-    return folder
+    return folder if os.access(folder, os.W_OK) else None
 
 
 def _user_cache() -> Path:

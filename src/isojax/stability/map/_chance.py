@@ -30,7 +30,7 @@ _DISPLACEMENTS, _DOUBTFUL = 400, 160
 _BELOW, _ABOVE = np.geomspace(0.87, 0.97, 4), np.geomspace(1.01, 1.3, 9)
 """Amplitudes beside the window that are mapped as well, over its least and its largest."""
 
-_FEWEST = 6
+_FEWEST_ON_CURVE = 6
 """Orbits at one frequency that make a curve."""
 
 _SAME, _FLAT = 1e-9, 0.2
@@ -154,12 +154,12 @@ class _Curves:
         good = np.isfinite(x) & np.isfinite(fold)
         order = np.flatnonzero(good)[np.argsort(x[good], kind="stable")]
         order = order[np.diff(x[order], prepend=-np.inf) > _SAME]
-        if order.size < _FEWEST:
+        if order.size < _FEWEST_ON_CURVE:
             return None
         x, y, fold, others, stable = (one[order] for one in (x, y, fold, others, stable))
         rise = CubicSpline(x, y).derivative()(x)
         clear = np.abs(rise) > _FLAT
-        if np.count_nonzero(clear) < _FEWEST:
+        if np.count_nonzero(clear) < _FEWEST_ON_CURVE:
             return None
         # Both vanish at a fold, their ratio does not. Near one, where the orbits of a map lie far apart, the
         # determinant therefore says how the force rises.

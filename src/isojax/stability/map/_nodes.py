@@ -28,22 +28,22 @@ from ._map_method import Lane, MapMethod
 _START_STEPS = 6
 """Steps of Newton's method from the balance of one harmonic."""
 
-_CLOSING_STEPS = 6
+_MOST_CLOSING_STEPS = 6
 """Steps of Newton's method at most from orbits that were read off a coarser grid."""
 
 _NEARLY_CLOSED = 1e-4
 """Relative step of Newton's method after which one more, whose size is its square, is the last."""
 
-_CLOSED_TO = 1e-7
+_NODE_CLOSED_TO = 1e-7
 """Last relative step before which the multipliers of a node count as exact."""
 
 _START_CLOSED_TO = 1e-6
 """What a start may leave open, over its size; where it leaves more, the one-harmonic balance is kept."""
 
-_CROSSINGS = 16
+_MOST_NODE_CROSSINGS = 16
 """Kinks an orbit to make room for."""
 
-_BLOCK = 544
+_NODES_A_BLOCK = 544
 """Nodes solved at once: one compiled batch serves grids of any size, and each core runs its own."""
 
 
@@ -79,13 +79,13 @@ def _in_blocks(work: Callable[..., Any], *values: np.ndarray) -> Any:
     count = values[0].shape[0]
 
     def one(begin: int) -> Any:
-        rows = [value[begin : begin + _BLOCK] for value in values]
-        fill = _BLOCK - rows[0].shape[0]
+        rows = [value[begin : begin + _NODES_A_BLOCK] for value in values]
+        fill = _NODES_A_BLOCK - rows[0].shape[0]
         padded = [np.concatenate([row, np.repeat(row[-1:], fill, axis=0)]) for row in rows]
         return jax.tree.map(np.asarray, work(*padded))
 
     with ThreadPoolExecutor(usable_cores()) as pool:
-        parts = list(pool.map(one, range(0, count, _BLOCK)))
+        parts = list(pool.map(one, range(0, count, _NODES_A_BLOCK)))
     return jax.tree.map(lambda *own: np.concatenate(own)[:count], *parts)
 
 
@@ -153,7 +153,7 @@ def _starts(
         unknown = jnp.where(good, found, start)
         drive, state = unpack(unknown)
         path = trajectory(model, integrator, drive, state, turns=turns)
-        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _CROSSINGS)
+        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _MOST_NODE_CROSSINGS)
         over = jnp.concatenate([jnp.full(2, push), inner]) / a
         return unknown * over, crossings
 
@@ -254,12 +254,12 @@ def _closed(
 
     def unfinished(carry: tuple[Array, Array, Array]) -> Array:
         _, size, count = carry
-        return jnp.any((size > _NEARLY_CLOSED) & jnp.isfinite(size)) & (count < _CLOSING_STEPS)
+        return jnp.any((size > _NEARLY_CLOSED) & jnp.isfinite(size)) & (count < _MOST_CLOSING_STEPS)
 
     begin = (start / scale, jnp.full(amplitude.shape, 1.0), jnp.asarray(0))
     unknown, _, _ = jax.lax.while_loop(unfinished, body, begin)
     step, size, invariants = jax.vmap(last)(amplitude, frequency, scale, unknown)
-    return (unknown - step) * scale, invariants, size <= _CLOSED_TO
+    return (unknown - step) * scale, invariants, size <= _NODE_CLOSED_TO
 
 
 def node_responses(

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import BSpline, make_interp_spline
 
-DEGREE = 5
+SPLINE_DEGREE = 5
 """Degree of the splines between the nodes."""
 
 
@@ -37,24 +37,24 @@ class Pieces(NamedTuple):
             Coefficients of the powers on each piece.
         """
         frequencies, tables, _ = basis.shape
-        local = np.lib.stride_tricks.sliding_window_view(basis, DEGREE + 1, axis=2)
+        local = np.lib.stride_tricks.sliding_window_view(basis, SPLINE_DEGREE + 1, axis=2)
         by_piece = np.ascontiguousarray(local.transpose(2, 0, 1, 3)).reshape(
-            -1, frequencies * tables, DEGREE + 1
+            -1, frequencies * tables, SPLINE_DEGREE + 1
         )
         powers = by_piece @ np.ascontiguousarray(self.to_powers.transpose(0, 2, 1))
-        return np.ascontiguousarray(powers.reshape(-1, frequencies, tables, DEGREE + 1).swapaxes(0, 1))
+        return np.ascontiguousarray(powers.reshape(-1, frequencies, tables, SPLINE_DEGREE + 1).swapaxes(0, 1))
 
 
 def spline_pieces(nodes: Float[np.ndarray, " node"]) -> Pieces:
     """Take splines through values at nodes apart into polynomials."""
-    unit = make_interp_spline(nodes, np.eye(nodes.size), k=DEGREE)
+    unit = make_interp_spline(nodes, np.eye(nodes.size), k=SPLINE_DEGREE)
     knots = unit.t
-    breaks = knots[DEGREE : nodes.size + 1]
-    basis = BSpline(knots, np.eye(nodes.size), DEGREE)
-    powers = [basis(breaks[:-1])] + [basis.derivative(k)(breaks[:-1]) for k in range(1, DEGREE + 1)]
+    breaks = knots[SPLINE_DEGREE : nodes.size + 1]
+    basis = BSpline(knots, np.eye(nodes.size), SPLINE_DEGREE)
+    powers = [basis(breaks[:-1])] + [basis.derivative(k)(breaks[:-1]) for k in range(1, SPLINE_DEGREE + 1)]
     lengths = np.diff(breaks)[:, None]
     taylor = np.stack([one * lengths**k / math.factorial(k) for k, one in enumerate(powers)])
-    own = [taylor[:, piece, piece : piece + DEGREE + 1] for piece in range(breaks.size - 1)]
+    own = [taylor[:, piece, piece : piece + SPLINE_DEGREE + 1] for piece in range(breaks.size - 1)]
     return Pieces(breaks, unit.c, np.stack(own))
 
 
@@ -64,4 +64,4 @@ def spline_matrix(
     """Give what turns values at nodes into a spline's values: one product instead of a spline a table."""
     if nodes.size == places.size and (nodes == places).all():
         return np.eye(nodes.size)
-    return make_interp_spline(nodes, np.eye(nodes.size), k=DEGREE)(places)
+    return make_interp_spline(nodes, np.eye(nodes.size), k=SPLINE_DEGREE)(places)

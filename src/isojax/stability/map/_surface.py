@@ -24,7 +24,7 @@ from ._spline import spline_matrix, spline_pieces
 _FIRST_NODES = (49, 17)
 """Displacement amplitudes and frequencies of the first grid; each further one halves the distances."""
 
-LEVELS = 2
+REFINEMENTS = 2
 """Times at most that the distances of the nodes are halved."""
 
 _FEW = 0.002
@@ -170,7 +170,7 @@ def find_surface(
     steps = jnp.asarray(integrator.steps_a_period(model))
     method = MapMethod(integrator, half, jnp.asarray(kinks.sides), steps)
     ends, grid = _ends_needed(start, window), start
-    for level in range(1, 1 + LEVELS):
+    for level in range(1, 1 + REFINEMENTS):
         nodes = _axes(ends, window.frequencies, level)
         own = kinks.shared[np.ix_(_place(start.frequencies, nodes[1]), _place(start.logarithms, nodes[0]))]
         rows = 1 if nodes[1] is window.frequencies else 2
