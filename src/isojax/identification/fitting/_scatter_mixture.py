@@ -24,7 +24,7 @@ can tell apart."""
 _WIDTH = -float(ndtri(0.025))
 """Half-width of the 95 % interval of a normal law, in standard deviations."""
 
-_BISECTIONS = 40
+_ROOT_BISECTIONS = 40
 
 
 class _Records(NamedTuple):
@@ -140,7 +140,7 @@ def _half_width(
     """Give the half-width about zero that holds 95 % of each mixture of normal laws, by bisection."""
     low, high = np.zeros(error.shape[1]), (np.abs(centre) + 2.0 * _WIDTH * error).max(axis=0)
     safe = np.where(error > 0.0, error, 1.0)
-    for _ in range(_BISECTIONS):
+    for _ in range(_ROOT_BISECTIONS):
         middle = 0.5 * (low + high)
         held = ndtr((middle - centre) / safe) - ndtr((-middle - centre) / safe)
         short = weight @ held < 0.95

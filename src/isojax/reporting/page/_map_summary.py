@@ -8,7 +8,7 @@ from ...stability import FoldCurve, StabilityMap
 from ..plots import drive_unit, quantity
 from ._map_files import result_codes
 
-_DOUBTFUL_CHANCE = 0.05
+_IN_DOUBT = 0.05
 """Chance below which, or below which of the contrary, a cell counts as sure."""
 
 _REASONS = {1: "not converged", 2: "left every bound"}
@@ -105,10 +105,8 @@ def _chance_words(smap: StabilityMap) -> str:
         ("with several orbits", smap.probability_coexisting),
     ):
         values = np.asarray(chance)
-        open_cells = int(np.sum((values > _DOUBTFUL_CHANCE) & (values < 1.0 - _DOUBTFUL_CHANCE)))
-        words.append(
-            f"{int(np.sum(values >= 1.0 - _DOUBTFUL_CHANCE))} cells {name} with 95 %, {open_cells} open"
-        )
+        open_cells = int(np.sum((values > _IN_DOUBT) & (values < 1.0 - _IN_DOUBT)))
+        words.append(f"{int(np.sum(values >= 1.0 - _IN_DOUBT))} cells {name} with 95 %, {open_cells} open")
     return "; ".join(words)
 
 
