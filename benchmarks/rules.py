@@ -65,7 +65,7 @@ WITHOUT: dict[str, float] = {
     "smallest_visibility": 0.0,
     "survivors": 100,
 }
-"""Values at which a rule decides nothing any more. What ends a search has none."""
+"""Values at which a rule decides nothing any more."""
 
 Outcome = tuple[str, list[str]]
 _readers: list[dict[str, Any]] = []

@@ -58,7 +58,7 @@ def fit(
             that jumps as `simulate` does, rounded, and several times as long.
         max_steps: simulations with derivatives after which the search gives up.
         progress: receives a line a step.
-        rules: when a search is over, and what counts as scatter of the stiffness.
+        rules: what counts as scatter of the stiffness.
         anyway: whether records that contradict their declaration are fitted all the same.
 
     Returns:
