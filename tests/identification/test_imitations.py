@@ -86,9 +86,19 @@ def test_a_superfluous_finding_is_dropped_where_the_search_without_it_finds_noth
     before = fit(START, thin, integrator=Integrator())
     first = step(before, "maxwell_branch")
     second = step(first.after, "cubic_stiffness", CoulombFriction(3.0, 2e-4), CubicStiffness(1e11))
-    answers = [((first, second), second.verdict), ((), first.verdict)]
-    monkeypatch.setattr(_close_loop, "_grow", lambda *_: answers.pop(0))
-    extensions, _ = _close_loop.search_effects(before, Search(scales(thin)), 3)
+    last = Verdict("none", None, (), (), 1.0, (), {}, None, "Nothing more.")
+    answers, asked = [((first, second), second.verdict), ((), first.verdict), ((), last)], []
+
+    def grow(*given):
+        asked.append(given)
+        return answers.pop(0)
+
+    monkeypatch.setattr(_close_loop, "_grow", grow)
+    extensions, verdict = _close_loop.search_effects(before, Search(scales(thin)), 3)
+    # The last diagnosis is that of the smaller model.
+    assert verdict is last
+    assert asked[-1][0] is extensions[-1].after
+    assert asked[-1][2:] == (2, ("maxwell_branch",))
     final = extensions[-1].after
     assert [one.effect for one in findings_in(final.model, extensions)] == ["cubic_stiffness"]
     assert final.stats.chi2 == pytest.approx(second.after.stats.chi2, abs=10.0)

@@ -258,7 +258,8 @@ def search_effects(
 ) -> tuple[tuple[Extension, ...], Verdict]:
     """Add effects while they are significant; search again without one that later ones made superfluous.
 
-    Where that search finds nothing better, the effect is dropped all the same.
+    Where that search finds nothing better, but the later effects alone explain as much, the effect is dropped
+    and the search goes on from there.
     """
     extensions, verdict = _grow(before, search, max_iterations, excluded)
     if len(extensions) < 2:
@@ -285,7 +286,8 @@ def search_effects(
     if best is final:
         return extensions, verdict
     dropped = complete(best, before.model, before.campaign, before.noise)
-    return (*extensions[:-1], extensions[-1]._replace(fit=dropped)), verdict
+    more, last = _grow(dropped, search, max_iterations - len(extensions) + 1, (*excluded, name))
+    return (*extensions[:-1], extensions[-1]._replace(fit=dropped), *more), last
 
 
 def _grow(
