@@ -8,7 +8,7 @@ from scipy.linalg import block_diag
 from scipy.special import ndtr, ndtri
 
 from ..jacobian import STIFFNESS_SCALE_UNIT
-from ._covariance import Uncertainty, find_determined, unknown
+from ._covariance import Uncertainty, find_determined, invert_information, unknown
 from ._elimination import Nuisances, Reduced
 
 SCATTER_PRIOR = 1e-3
@@ -85,8 +85,12 @@ def integrate_scatter(reduced: Reduced, nuisances: Nuisances, inflation: float) 
         return unknown(matrix.shape[0])
     known = find_determined(matrix)
     records = _with_scales(reduced, nuisances, known.vectors / known.size[:, None], inflation)
-    own = _at(records, np.array([nuisances.spread.records]))
-    mixture = _at(records, _SCATTERS)
+    try:
+        own = _at(records, np.array([nuisances.spread.records]))
+        mixture = _at(records, _SCATTERS)
+    except np.linalg.LinAlgError:
+        # Where a search went far astray, rounding leaves nothing of what the records say of their scales.
+        return invert_information(matrix, inflation)
     # About the fitted value: what keeps it from the minimum, such as a bound, is no scatter.
     step = (mixture.step - own.step[0]) @ known.vectors.T
     covariance = known.vectors @ mixture.covariance @ known.vectors.T
