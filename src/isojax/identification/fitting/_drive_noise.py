@@ -3,6 +3,8 @@
 import dataclasses
 from typing import NamedTuple
 
+import numpy as np
+
 from ..._show import number, shown
 from ...records import NoiseEstimate, Record, estimate_noise
 from .._rules import Rules
@@ -44,11 +46,13 @@ def drive_noise(fit: Fit, rules: Rules = Rules()) -> DriveNoise | None:
     Source: Pintelon & Schoukens 2012, System Identification: A Frequency Domain Approach, sec. 9.2 (noise of
     both channels in the residual).
     """
+    if fit.noise.method not in ("cycle_scatter", "periods") or fit.stats.chi2 / fit.stats.dof <= rules.good:
+        return None
     runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
-    if fit.stats.chi2 / fit.stats.dof <= rules.good:
+    if not all(np.all(np.isfinite(run.residual)) for run in runs):
         return None
     seen = _noise_of(fit, tuple(dataclasses.replace(run.record, output=run.residual) for run in runs))
-    if seen.method != fit.noise.method or seen.method not in ("cycle_scatter", "periods"):
+    if seen.method != fit.noise.method:
         return None
     if fit.stats.chi2 / fit.stats.dof > rules.good * (seen.white / fit.noise.white) ** 2:
         return None
