@@ -53,7 +53,9 @@ def map_summary(
         lines.append(("largest |µ|", f"{worst[row, column]:.4f} at {place}"))
         steps, aim = smap.integrator.steps_per_period, smap.integrator.map_error
         missed = f"; more than the {aim:.0e} that a map aims at" if smap.error > aim else ""
-        lines.append(("error", f"{smap.error:.1e} in |µ| by integration, {steps} steps a period{missed}"))
+        lines.append(
+            ("error", f"{smap.error:.1e} in |µ|, from a sample of cells; {steps} steps a period{missed}")
+        )
     if smap.probability_stable is not None:
         lines.append(("chances", _chance_words(smap)))
     if folds is not None:
@@ -102,11 +104,12 @@ def _chance_words(smap: StabilityMap) -> str:
     words = []
     for name, chance in (
         ("stable", smap.probability_stable),
-        ("with several orbits", smap.probability_coexisting),
+        ("several orbits", smap.probability_coexisting),
     ):
         values = np.asarray(chance)
-        open_cells = int(np.sum((values > _IN_DOUBT) & (values < 1.0 - _IN_DOUBT)))
-        words.append(f"{int(np.sum(values >= 1.0 - _IN_DOUBT))} cells {name} with 95 %, {open_cells} open")
+        sure = int(np.sum(values >= 1.0 - _IN_DOUBT))
+        doubtful = int(np.sum((values > _IN_DOUBT) & (values < 1.0 - _IN_DOUBT)))
+        words.append(f"{name}: at least 95 % in {sure} cells, uncertain in {doubtful}")
     return "; ".join(words)
 
 
