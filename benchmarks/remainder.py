@@ -14,7 +14,7 @@ Three questions, each asked where the truth has one answer:
 
 The rules by which a reader answers were written down before any answer was seen:
 
-- From the pursuit. Cause: "source" without a law or where all laws together remove less than half of the
+- From matching pursuit. Cause: "source" without a law or where all laws together remove less than half of the
   excess; "state" where the law that removes most is slip or fade; else "static". Kind: of the first law
   that is called spring-like or damping-like, a wave counting as a spring and a slip as damping. Power: p +
   q of the first law, right if equal to the truth.
@@ -27,10 +27,10 @@ The rules by which a reader answers were written down before any answer was seen
 
 Ceilings (regressions of the force residual on held-out samples), exponents (growth of its energy with
 amplitude and frequency) and harmonic shares of its power were part of the package up to commit 61378ed. The
-rows in `results/remainder.jsonl` are of that commit and hold them; new rows hold the pursuit alone.
+rows in `results/remainder.jsonl` are of that commit and hold them; new rows hold matching pursuit alone.
 
-An addition is combined with the pursuit in two ways: it overrules the pursuit wherever it has an answer, or
-it is asked only where the pursuit has no law (cause) or no answer (kind, power). It is worth its place if
+An addition is combined with matching pursuit in two ways: it overrules that wherever it has an answer, or it
+is asked only where matching pursuit has no law (cause) or no answer (kind, power). It is worth its place if
 either way gives more right answers.
 """
 
@@ -109,8 +109,8 @@ def run(case: Case) -> Row:
     }
 
 
-def pursued_cause(row: Row) -> str:
-    """Answer the first question from the pursuit."""
+def selected_cause(row: Row) -> str:
+    """Answer the first question from matching pursuit."""
     shares = [law["share"] for law in row["laws"]]
     if not shares or shares[-1] < 0.5:
         return "source"
@@ -119,8 +119,8 @@ def pursued_cause(row: Row) -> str:
     return "state" if largest.startswith(("slip", "fade")) else "static"
 
 
-def pursued_kind(row: Row) -> str | None:
-    """Answer the second question from the pursuit."""
+def selected_kind(row: Row) -> str | None:
+    """Answer the second question from matching pursuit."""
     for law in row["laws"]:
         if "spring-like" in law["words"] or law["formula"].startswith(("sin", "cos")):
             return "spring"
@@ -129,8 +129,8 @@ def pursued_kind(row: Row) -> str | None:
     return None
 
 
-def pursued_power(row: Row) -> float | None:
-    """Answer the third question from the pursuit: the sum of the powers of the first law."""
+def selected_power(row: Row) -> float | None:
+    """Answer the third question from matching pursuit: the sum of the powers of the first law."""
     formula = row["laws"][0]["formula"] if row["laws"] else "none"
     if formula.startswith(("none", "sin", "cos", "slip", "fade")):
         return None
@@ -172,19 +172,19 @@ def exponent_power(row: Row) -> tuple[float, float] | None:
 
 
 def answers(question: str, row: Row) -> dict[str, Any]:
-    """Answer one question from the pursuit alone, and with each addition, which overrules it or steps in."""
+    """Answer one question from matching pursuit alone, and with each addition: it overrules or steps in."""
     if question == "cause":
-        own, silent = pursued_cause(row), not row["laws"]
+        own, silent = selected_cause(row), not row["laws"]
         rules = {"ceilings": ceiling_cause, "shares": shares_cause}
     elif question == "kind":
-        own = pursued_kind(row)
+        own = selected_kind(row)
         silent, rules = own is None, {"exponents": exponent_kind}
     else:
-        power = pursued_power(row)
+        power = selected_power(row)
         own = None if power is None else (power, 1e-9)
         silent, rules = own is None, {"exponents": exponent_power}
     others = {name: rule(row) for name, rule in rules.items() if name in row}
-    given = {"pursuit alone": own}
+    given = {"matching pursuit alone": own}
     for name, other in others.items():
         given[f"{name} overrule"] = own if other is None else other
         given[f"{name} step in"] = other if silent and other is not None else own

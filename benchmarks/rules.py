@@ -1,8 +1,9 @@
 """Print what each rule of the diagnosis decides: what changes at half and twice its value, and without it.
 
 Run `python benchmarks/rules.py --seeds 3000:3004`, then `... --report`. Each seed is a campaign of the blind
-trial, as `blind_trial.py` draws it. The loop runs once with the default rules, then once more for each rule
-at half, at twice its value, and at one where it decides nothing. A rule that the first run never read is not
+trial, as `blind_trial.py` draws it. Its outcome is the verdict, each finding with its look-alikes, and the
+laws that describe what is left. The loop runs once with the default rules, then once more for each rule at
+half, at twice its value, and at one where it decides nothing. A rule that the first run never read is not
 changed. A computation that reads none of the changed rules is not repeated, so that a seed takes a few times
 one loop.
 
@@ -29,9 +30,10 @@ from blind_trial import commit, read
 from isojax import compile_quickly
 from isojax.elements import Scales
 from isojax.identification import Rules, classical_guess, fit, read_campaign, scales
-from isojax.identification._close_loop import overall_verdict, search_effects
+from isojax.identification._close_loop import find_alternatives, overall_verdict, search_effects
 from isojax.identification.diagnosis import _candidate_refits, _diagnose, _imitations, findings_in
 from isojax.identification.fitting import Search
+from isojax.identification.remainder._matching_pursuit import matching_pursuit
 from isojax.models import Isolator
 from isojax.records import Campaign
 
@@ -58,6 +60,7 @@ WITHOUT: dict[str, float] = {
     "most_of_it": 0.0,
     "smallest_share": 0.0,
     "smallest_gain": 0.0,
+    "smallest_law": 0.0,
     "most_at_once": 100,
     "significance": 1.0,
     "close_bic": 0.0,
@@ -103,6 +106,8 @@ def _key(argument: Any) -> Any:
         return tuple((entry.name, float(entry.value)) for entry in argument.parameters)
     if isinstance(argument, tuple) and argument and hasattr(argument[0], "strength"):
         return tuple(element.name for element in argument)
+    if isinstance(argument, tuple) and all(isinstance(one, str) for one in argument):
+        return argument
     return argument if isinstance(argument, str | int) else id(argument)
 
 
@@ -172,8 +177,15 @@ class Trial:
             search = Search(self.scales, rules)
             extensions, last = search_effects(before, search, 3)
             after = extensions[-1].after if extensions else before
-            names = [finding.effect for finding in findings_in(after.model, extensions)]
-            return overall_verdict(before, after, len(names), last, rules), names
+            found = findings_in(after.model, extensions)
+            names = tuple(finding.effect for finding in found)
+            others = remembered(find_alternatives, self.known)(after.estimate, names, search) if names else ()
+            verdict = overall_verdict(before, after, len(names), last, rules, others)
+            words = [" or ".join(sorted((one.effect, *one.indistinguishable))) for one in found]
+            if verdict in ("unexplained", "partly_explained"):
+                left = remembered(matching_pursuit, self.known)(after.estimate, search, refit=False)
+                words += [f"remainder {law.formula}" for law in left.laws]
+            return verdict, words
         finally:
             for module, name, function in originals:
                 setattr(module, name, function)
@@ -221,7 +233,7 @@ def report(rows: list[dict]) -> None:
 
 
 def _changes(rows: list[dict], word: str) -> str:
-    """Count the campaigns whose verdict or names changed."""
+    """Count the campaigns whose outcome changed."""
     tried = [row for row in rows if word in row]
     return f"{sum(row[word] != row['default'] for row in tried)} of {len(tried)}" if tried else "-"
 

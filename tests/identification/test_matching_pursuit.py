@@ -27,7 +27,7 @@ def left_by(simulated):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("law", "formula"), [(Grip(3e6), "|x| v"), (Governor(6e6), "x |v|")])
-def test_a_law_outside_the_catalogue_is_pursued_with_its_coefficient(left_by, law, formula):
+def test_a_law_outside_the_catalogue_is_described_with_its_coefficient(left_by, law, formula):
     pursuit = left_by(law)
     assert [one.formula for one in pursuit.laws] == [formula]
     (one,) = pursuit.laws
@@ -39,7 +39,7 @@ def test_a_law_outside_the_catalogue_is_pursued_with_its_coefficient(left_by, la
 
 
 @pytest.mark.slow
-def test_relaxation_is_pursued_as_a_force_that_relaxes(left_by):
+def test_relaxation_is_described_as_a_force_that_relaxes(left_by):
     pursuit = left_by(rig.MaxwellBranch(4e4, 0.03))
     first = pursuit.laws[0]
     assert first.formula.startswith("fade(x; ")
@@ -48,7 +48,7 @@ def test_relaxation_is_pursued_as_a_force_that_relaxes(left_by):
 
 
 @pytest.mark.slow
-def test_nothing_is_pursued_in_noise(left_by):
+def test_nothing_is_selected_in_noise(left_by):
     pursuit = left_by()
     assert pursuit.laws == ()
     assert pursuit.linear == pursuit.chi2_per_dof

@@ -2,6 +2,7 @@
 
 import ast
 import dataclasses
+import itertools
 from collections import defaultdict
 from pathlib import Path
 
@@ -16,22 +17,65 @@ from isojax.models import Integrator, Isolator
 
 SOURCE = Path(isojax.__file__).parent
 ROOMS = SOURCE / "identification"
-GUARDS = {
-    "NULL_DRAWS",
-    "CYCLES",
-    "STEPS",
+ACCURACY = {
+    # Rounding, and what is too large to be a motion.
+    "HUGE",
+    "SAME_TRACE",
+    "SMALLEST_EIGENVALUE",
+    "SMALLEST_SCATTER",
+    # Integration: steps, and when they are fine enough; loops of a law that must be closed.
+    "SEGMENTS_TRIED",
+    "FINEST",
+    "SMALL_ERROR",
     "STEADY",
     "WORK_OF_STEPS",
-    "UNKNOWN",
-    "STEP_SHARES",
-    "SMALLEST_LAW",
-    "WIDTH_95",
-    "CANDIDATES_SHOWN",
+    # Where a search stands still, or goes astray.
+    "HALVINGS",
+    "IDLE",
+    "MOST_WORSENING",
+    "REFUSALS_A_STEP",
+    "ROUGH",
+    "SAME_BRANCH",
+    "SETTLED",
+    "SHRINKS",
+    "SMALL_STEP",
+    "STALLED",
+    # Draws and intervals.
+    "FEWEST_EXCEEDANCES",
+    "NULL_DRAWS",
+    "LEVEL",
+    # How records are cut, repeats recognised and spectra read.
+    "DECAY_TIMES_A_WINDOW",
+    "ENTRIES",
+    "FEWEST_CELL_SAMPLES",
+    "FEWEST_SETTLED_CYCLES",
+    "FEWEST_WINDOWS",
+    "HARMONICS",
+    "HIGHEST",
+    "HIGHEST_ORDER",
+    "HIGHEST_SHARE",
+    "LEAST_COLUMNS",
+    "LINES_A_BAND",
+    "LINES_BESIDE",
+    "MOST_LAGS",
+    "SAME_DRIVE_AND_RESPONSE",
+    "SAME_FREQUENCY",
+    "SAME_RATE",
+    "SAMPLES_A_NUMBER",
+    "SHORTEST",
+    "SHORTEST_WINDOW",
+    # What is drawn up and shown.
+    "ORDER",
+    "PARTNER",
+    "STRONG",
+    "UNMOVED",
 }
-"""Numbers of the diagnosis that set the accuracy of a computation or the start of a search: no decision."""
+"""Constants that something is compared with to compute accurately, not to decide what the records show."""
 
-NEUTRAL = {0.0, 0.5, 1.0, 2.0, 3.0, 6.0, 1e-3, 100.0, 1e3, 1e-9, 1e-12, 1e-300, 0.05, 0.25}
-"""Inline numbers of the diagnosis that decide nothing: units, rounding, Runge & Kutta's weights, wording."""
+NEUTRAL = {0, 1, 2, -1, 0.5, 1e-300, 1e-60, 1e-9}
+"""Numbers in a comparison that decide nothing: signs, counts of one or two, halves, rounding."""
+
+BOUNDS = {"min", "max", "minimum", "maximum", "clip"}
 
 
 def _constants(file):
@@ -70,22 +114,29 @@ def test_each_rule_is_read_somewhere():
     assert unread == []
 
 
-def test_the_diagnosis_has_no_numbers_of_its_own():
-    files = [
-        *(ROOMS / "diagnosis").glob("*.py"),
-        ROOMS / "_close_loop.py",
-        ROOMS / "remainder/_matching_pursuit.py",
-    ]
-    assert {name for file in files for name, _ in _constants(file)} <= GUARDS
-    inline = {
-        (file.name, node.value)
-        for file in files
-        for part in ast.parse(file.read_text(encoding="utf-8")).body
-        if not isinstance(part, ast.Assign)
-        for node in ast.walk(part)
-        if isinstance(node, ast.Constant) and isinstance(node.value, float)
-    }
-    assert {(name, value) for name, value in inline if value not in NEUTRAL} == set()
+def _compared(file):
+    """List the numbers and constants with which a file compares: by size, or as a bound of min and max."""
+    ordering = ast.Lt | ast.LtE | ast.Gt | ast.GtE
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Compare) and any(isinstance(one, ordering) for one in node.ops):
+            sides = [node]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in BOUNDS:
+            sides = node.args
+        else:
+            continue
+        for part in itertools.chain.from_iterable(map(ast.walk, sides)):
+            if isinstance(part, ast.Constant) and isinstance(part.value, int | float):
+                yield part.value
+            elif isinstance(part, ast.Name) and part.id.isupper():
+                yield part.id.lstrip("_")
+
+
+def test_what_decides_a_verdict_is_compared_with_a_rule():
+    rooms = ("diagnosis", "fitting", "jacobian", "remainder")
+    files = [ROOMS / "_close_loop.py", *(file for room in rooms for file in (ROOMS / room).glob("*.py"))]
+    found = {(file.name, one) for file in files for one in _compared(file)}
+    assert {(name, one) for name, one in found if one not in NEUTRAL | ACCURACY} == set()
+    assert ACCURACY <= {one for _, one in found}
 
 
 def test_no_two_constants_of_one_name_have_different_values():

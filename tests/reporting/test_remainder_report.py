@@ -36,7 +36,7 @@ def test_nothing_is_described_where_the_verdict_is_another(found, written):
     assert "remainder" not in result_dict(found)
 
 
-def test_dry_friction_is_pursued_as_a_force_that_opposes_the_velocity(unexplained):
+def test_dry_friction_is_described_as_a_force_that_opposes_the_velocity(unexplained):
     remainder = unexplained.remainder
     assert remainder is not None
     first = remainder.pursuit.laws[0]

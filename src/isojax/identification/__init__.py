@@ -61,7 +61,7 @@ from .remainder import AlternativeLaw as AlternativeLaw
 from .remainder import Alternatives as Alternatives
 from .remainder import DwellRemainder as DwellRemainder
 from .remainder import ForceMap as ForceMap
-from .remainder import PursuedLaw as PursuedLaw
-from .remainder import Pursuit as Pursuit
+from .remainder import MatchingPursuit as MatchingPursuit
 from .remainder import Remainder as Remainder
+from .remainder import SelectedLaw as SelectedLaw
 from .remainder import explain_remainder as explain_remainder

@@ -343,7 +343,8 @@ def doubt_of(before: Fit, final: Fit, alternatives: tuple[Alternatives, ...], ru
         return other
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
     rise = last.chi2_per_dof - first.chi2_per_dof
-    return "worse" if rise > 3.0 * 2.0 * math.sqrt(max(rise, 0.0) / last.dof) else "not down to noise"
+    scatter = 2.0 * math.sqrt(max(rise, 0.0) / last.dof)
+    return "worse" if rise > scipy.stats.norm.isf(rules.significance) * scatter else "not down to noise"
 
 
 def overall_verdict(

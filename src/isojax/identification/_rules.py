@@ -31,6 +31,10 @@ class Rules:
     """Gain in chi2/dof below which effects are ties: no test repeats so well that a smaller one means
     anything."""
 
+    smallest_law: float = 0.03
+    """Share of the excess from which a force law describes a remainder; and share of the best law's gain by
+    which a plainer one may fall short and still be chosen. See `benchmarks/remainder.py`."""
+
     most_at_once: int = 2
     """Effects that explain all a campaign lacks. More imitate together a law that the catalogue does not
     have, so that the verdict is "partly explained" at best."""

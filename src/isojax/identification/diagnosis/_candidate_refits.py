@@ -120,7 +120,7 @@ def _violation(case: Case, found: Estimate, score: Score) -> str | None:
         return "its search came no nearer to that of another effect"
     if found.result != RESULTS.successful or found.excess >= fitted.excess:
         return "its refit did not converge"
-    if not is_determined(found, score):
+    if not is_determined(found, score, case.rules):
         return "its strength is not determined"
     element = found.model.element(score.element.name)
     if element is not None and not element.signed and float(getattr(element, element.strength)) < 0.0:

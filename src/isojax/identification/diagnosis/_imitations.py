@@ -54,7 +54,7 @@ def _best_addition(found: Estimate, excluded: str, opponent: _Opponent, search: 
             pair.result == RESULTS.successful
             and len(pair.places) <= len(other.places)
             and opponent.gained(pair) > rules.close_bic
-            and is_determined(pair, score)
+            and is_determined(pair, score, search.rules)
             and find_violation(pair.model, pair.problem.records, pair.problem.quantity) is None
             and follows_freely(found, pair)
         ):

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
+from scipy import stats
 
 from ..._parameters import list_parameters, own_parameters, replace_parameters
 from ..._results import RESULTS
@@ -22,7 +23,6 @@ from ..fitting import (
     run_freely,
 )
 from ..jacobian import has_stiffness_scale
-from ._bounds import WIDTH_95
 from ._score import Score, ScoreTest
 
 STEP_SHARES = (1.0, 0.3, 0.03)
@@ -211,12 +211,12 @@ def with_own_shape(found: Estimate, name: str, search: Search) -> Estimate:
     return freed if freed.result == RESULTS.successful and clear else found
 
 
-def is_determined(found: Estimate, score: Score) -> bool:
-    """Say whether the 95 % interval of a refitted strength leaves zero out."""
+def is_determined(found: Estimate, score: Score, rules: Rules) -> bool:
+    """Say whether a refitted strength differs significantly from zero."""
     place = strength_place(found, score)
     error = float(found.uncertainty.standard_error[place])
     strength = float(list_parameters(found.model)[found.places[place]].value)
-    return abs(strength) > WIDTH_95 * error
+    return abs(strength) > float(stats.norm.isf(0.5 * rules.significance)) * error
 
 
 def strength_place(found: Estimate, score: Score) -> int:

@@ -15,6 +15,10 @@ from ..jacobian import effects_without_signal, line_coherence
 from ._projection import project
 
 NULL_DRAWS = 20_000
+"""Draws for a family-wise p-value."""
+
+FEWEST_EXCEEDANCES = 50
+"""Draws beyond a score from which their share is a p-value to within a seventh."""
 
 
 class Score(NamedTuple):
@@ -190,4 +194,4 @@ def _family_wise(
     draws = np.where(either, np.abs(draws), draws).max(axis=1)
     drawn = np.mean(draws[:, None] >= sizes, axis=0)
     bound = np.minimum(1.0, (either.size + either.sum()) * stats.norm.sf(sizes))
-    return np.where(drawn > 50 / NULL_DRAWS, drawn, bound)
+    return np.where(drawn > FEWEST_EXCEEDANCES / NULL_DRAWS, drawn, bound)

@@ -140,7 +140,7 @@ class Separation(NamedTuple):
     def _promise(self, prospect: "Prospect | None") -> str:
         """Word the gains: one number a look-alike, named where there are several."""
         gains = () if prospect is None else prospect.gains
-        numbers = [f"{gain:.3g}" if gain >= 0.05 else "0.0" for gain in gains]
+        numbers = [f"{gain:.3g}" if round(gain, 1) else "0.0" for gain in gains]
         if len(numbers) == 1 or len(set(numbers)) == 1:
             return numbers[0]
         named = zip(numbers, self.others, strict=True)

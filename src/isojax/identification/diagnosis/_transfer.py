@@ -15,7 +15,7 @@ UNKNOWN = 1e-12
 
 
 def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem, Problem]:
-    """Leave out the records of the highest level but one; without three levels every other segment.
+    """Leave out the records of the highest level but one; without an inner level every other segment.
 
     Two levels are not separated: a law fitted to the lower alone says little of the upper. Nor is a level
     left out at which the effect is not significant, unless its records are whole segments (releases): every
@@ -24,8 +24,8 @@ def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem,
     problem = extended.problem
     levels = sorted({record.level for record in problem.records if record.level is not None})
     out = set()
-    if len(levels) >= 3:
-        out = {place for place, record in enumerate(problem.records) if record.level == levels[-2]}
+    if inner := levels[1:-1]:
+        out = {place for place, record in enumerate(problem.records) if record.level == inner[-1]}
         gains = _misfit_by_record(fitted) - _misfit_by_record(extended)
         gain = gains[list(out)].sum() / max(1.0, extended.chi2 / extended.dof)
         extra = max(1, len(extended.places) - len(fitted.places))
@@ -35,7 +35,7 @@ def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem,
     if out:
         seen = tuple(part for part in problem.segments if part.record not in out)
         unseen = tuple(part for part in problem.segments if part.record in out)
-    elif len(problem.segments) >= 4:
+    elif len(problem.segments[1::2]) > 1:
         seen, unseen = problem.segments[::2], problem.segments[1::2]
     else:
         seen = unseen = ()

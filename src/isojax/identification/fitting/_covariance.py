@@ -29,6 +29,9 @@ Products are accumulated in float64, so that shares of about 1e-13 are rounding;
 margin.
 """
 
+PARTNER = 0.1
+"""Share from which a coefficient takes part in a combination that the records do not determine."""
+
 
 @shown
 class Uncertainty(NamedTuple):
@@ -124,7 +127,7 @@ def find_determined(matrix: Float[np.ndarray, "column column"]) -> Determined:
     values, vectors = np.linalg.eigh(scaled) if count else (np.zeros(0), np.zeros((0, 0)))
     good = values > SMALLEST_EIGENVALUE * max(1.0, count)
     partners = tuple(
-        tuple(int(place) for place in np.flatnonzero(np.abs(vectors[:, index]) > 0.1))
+        tuple(int(place) for place in np.flatnonzero(np.abs(vectors[:, index]) > PARTNER))
         for index in np.flatnonzero(~good)
     )
     determined = ~dead

@@ -19,6 +19,9 @@ from ._simulator import Simulator
 FIRST_DAMPING = 1e-5
 """Marquardt's damping at the first step, over the diagonal of the normal equations: starts are good."""
 
+REFUSALS_A_STEP = 4
+"""Refused steps in a row after which each one counts for one more."""
+
 MOST_REFUSALS = 10
 """Refused steps in a row after which the search stops. The later ones count for several, so that the last has
 4^15 times the damping of the first: no descent is left untried."""
@@ -28,9 +31,6 @@ DOUBTFUL = 5
 
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
-
-BEHIND = 10
-"""Ties by which a search must be behind another model to be given up: nearer ones are look-alikes."""
 
 PACE = 5
 """Evaluations over which the pace of a search is taken, where another model is ahead of it."""
@@ -180,7 +180,7 @@ def descend(
             state = _init(search.solver, scaled, local)
         accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
         # Only a refusal may count for several: an accepted point is one step on.
-        refusals = 1 if accepted else max(1 if point.is_finite else SHRINKS, 1 + refused // 4)
+        refusals = 1 if accepted else max(1 if point.is_finite else SHRINKS, 1 + refused // REFUSALS_A_STEP)
         for _ in range(refusals):
             scaled, state = _step(search.solver, scaled, local, state)
         chi2 = point.chi2 / max(1.0, point.free_samples - len(places))
@@ -207,7 +207,7 @@ def descend(
         if rival is not None:
             behind = best.chi2 - rival.chi2
             pace = _gain(reached, PACE) / PACE
-            if behind > BEHIND * rival.tie and pace * search.max_steps < behind:
+            if behind > rival.tie and pace * search.max_steps < behind:
                 result = RESULTS.outdone
                 break
         if refused == MOST_REFUSALS or (idle and is_least):

@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from ...models import Isolator
 from ...records import Record, ringing_frequency
-from ..jacobian import Segment
+from ..jacobian import SHORTEST, Segment
 from ._elimination import Nuisances, Spread, step_nuisances
 from ._problem import Point, Problem, one_hot
 from ._simulator import Simulator
@@ -69,7 +69,9 @@ def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> N
     def first(segment: Segment) -> Segment:
         record = problem.records[segment.record]
         length = round(FIRST_PERIODS * record.rate / ringing_frequency(record.output, record.rate))
-        return segment._replace(stop=min(segment.stop, max(segment.start, segment.counted) + max(length, 8)))
+        return segment._replace(
+            stop=min(segment.stop, max(segment.start, segment.counted) + max(length, SHORTEST))
+        )
 
     short = Simulator(
         problem._replace(segments=tuple(map(first, problem.segments)), heads=()), simulator.at_rest
@@ -147,7 +149,7 @@ def head_segments(records: tuple[Record, ...]) -> tuple[Segment, ...]:
     """Give the first samples of each record: those that the campaign gives for it, else the first second."""
 
     def head(place: int, record: Record) -> Segment:
-        length = record.settle if record.settle >= 8 else round(record.rate)
+        length = record.settle if record.settle >= SHORTEST else round(record.rate)
         return Segment(place, 0, min(length, record.output.size), 0)
 
     return tuple(head(place, record) for place, record in enumerate(records))

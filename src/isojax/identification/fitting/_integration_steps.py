@@ -8,6 +8,9 @@ from ..jacobian import readings, whiten
 from ._problem import Problem
 from ._simulator import Simulator
 
+SEGMENTS_TRIED = 8
+"""Segments on which the error of the steps is measured."""
+
 FINEST = 32
 
 SMALL_ERROR = 0.05
@@ -27,7 +30,7 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     """
     loudest = max(range(len(problem.records)), key=lambda place: float(np.std(problem.records[place].output)))
     own = [segment for segment in problem.segments if segment.record == loudest]
-    few = tuple(own[:: max(1, len(own) // 8)][:8])
+    few = tuple(own[:: max(1, len(own) // SEGMENTS_TRIED)][:SEGMENTS_TRIED])
     outcomes = []
     for steps in (substeps, 2 * substeps):
         # The model's own demand must not hide the difference, so that the steps are set for both runs alike.

@@ -21,8 +21,11 @@ _SCATTERS = np.geomspace(1e-6, 0.3, 64)
 """Scatters over which is summed [relative]; each is a fifth larger than the last, far less than n records
 can tell apart."""
 
-_WIDTH = -float(ndtri(0.025))
-"""Half-width of the 95 % interval of a normal law, in standard deviations."""
+_LEVEL = 0.95
+"""Chance that an interval holds the truth."""
+
+_WIDTH = float(ndtri(0.5 + 0.5 * _LEVEL))
+"""Half-width of that interval of a normal law, in standard deviations."""
 
 _ROOT_BISECTIONS = 40
 
@@ -147,6 +150,6 @@ def _half_width(
     for _ in range(_ROOT_BISECTIONS):
         middle = 0.5 * (low + high)
         held = ndtr((middle - centre) / safe) - ndtr((-middle - centre) / safe)
-        short = weight @ held < 0.95
+        short = weight @ held < _LEVEL
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return high

@@ -41,7 +41,7 @@ class Rival(NamedTuple):
 
     Attributes:
         chi2: what it reaches.
-        tie: difference of chi2 up to which two models are indistinguishable. A search that is many behind,
+        tie: difference of chi2 up to which two models are indistinguishable. A search that is further behind,
             and at its pace would not catch up within all its evaluations, is given up.
     """
 

@@ -22,6 +22,7 @@ from ._information import information as information
 from ._information import readings as readings
 from ._internal_states import internal_starts as internal_starts
 from ._score_columns import score_information as score_information
+from ._segments import SHORTEST as SHORTEST
 from ._segments import Segment as Segment
 from ._segments import cut_evenly as cut_evenly
 from ._segments import cut_segments as cut_segments

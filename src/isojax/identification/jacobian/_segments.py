@@ -17,6 +17,11 @@ from ...records import Record
 DECAY_TIMES_A_WINDOW = 25.0
 """A window of so many decay times loses less than a tenth of its information to its free start."""
 
+SHORTEST_WINDOW = 400
+"""Samples of a window at least."""
+
+FEWEST_WINDOWS = 4
+"""Windows below which a record stays whole."""
 
 SHORTEST = 8
 """Samples below which a piece of a record says nothing."""
@@ -79,9 +84,13 @@ def cut_segments(records: tuple[Record, ...], model: Isolator) -> tuple[Segment,
         if record.dwells:
             bounds = [(dwell.start, dwell.stop) for dwell in record.dwells]
         else:
-            window = count if decay == 0.0 else max(400, int(DECAY_TIMES_A_WINDOW / decay * record.rate))
+            window = (
+                count
+                if decay == 0.0
+                else max(SHORTEST_WINDOW, int(DECAY_TIMES_A_WINDOW / decay * record.rate))
+            )
             pieces = max(1, count // window)
-            bounds = cut_evenly(count, pieces if pieces >= 4 else 1)
+            bounds = cut_evenly(count, pieces if pieces >= FEWEST_WINDOWS else 1)
         segments += segments_between(place, record, bounds)
     return tuple(segments)
 

@@ -10,8 +10,8 @@ from ._alternative_laws import AlternativeLaw as AlternativeLaw
 from ._alternative_laws import Alternatives as Alternatives
 from ._alternative_laws import find_alternatives as find_alternatives
 from ._dwell_remainder import DwellRemainder as DwellRemainder
-from ._matching_pursuit import PursuedLaw as PursuedLaw
-from ._matching_pursuit import Pursuit as Pursuit
+from ._matching_pursuit import MatchingPursuit as MatchingPursuit
+from ._matching_pursuit import SelectedLaw as SelectedLaw
 from ._remainder import ForceMap as ForceMap
 from ._remainder import Remainder as Remainder
 from ._remainder import explain_remainder as explain_remainder

@@ -14,6 +14,9 @@ from ..diagnosis import Projection, least_difference, project
 from ..fitting import Estimate, Search
 from ._free_laws import AbstractFreeForce, free_laws
 
+SAME_TRACE = 1e-6
+"""Distance of a correlation from one that rounding explains."""
+
 
 @shown
 class AlternativeLaw(NamedTuple):
@@ -44,7 +47,7 @@ class AlternativeLaw(NamedTuple):
     @property
     def is_the_same(self) -> bool:
         """Whether the records show no difference from the findings themselves."""
-        return abs(self.likeness) > 1.0 - 1e-6
+        return abs(self.likeness) > 1.0 - SAME_TRACE
 
     def _headline(self) -> str:
         return f"{self.formula}, {amount(self.coefficient, self.unit, self.error)}, χ² {self.delta_chi2:+.3g}"

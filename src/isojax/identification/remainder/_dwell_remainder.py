@@ -13,6 +13,12 @@ from ._force_residual import ForceResidual
 
 HARMONICS = 7
 
+FEWEST_SETTLED_CYCLES = 4.0
+"""Cycles of a dwell over which its harmonics are read, if it has so many."""
+
+SAMPLES_A_NUMBER = 4
+"""Samples for each number of a fit of harmonics."""
+
 _PHASES = 128
 
 
@@ -77,7 +83,7 @@ def dwell_remainders(fit: Fit, residuals: tuple[ForceResidual, ...]) -> tuple[Dw
         for dwell in one.record.dwells:
             window = _window(one, dwell)
             orders = min(HARMONICS, int(one.highest / dwell.frequency))
-            if window.stop - window.start <= 4 * (2 * orders + 1) or orders < 1:
+            if window.stop - window.start <= SAMPLES_A_NUMBER * (2 * orders + 1) or orders < 1:
                 continue
             own = slice(dwell.start, dwell.stop)
             counted = max(1.0, float(np.sum(run.counted[own] > 0.0)))
@@ -94,7 +100,9 @@ def dwell_remainders(fit: Fit, residuals: tuple[ForceResidual, ...]) -> tuple[Dw
 
 def _window(one: ForceResidual, dwell: Dwell) -> slice:
     """Give the settled half of a dwell, moved to where the integrals are reliable."""
-    start, stop = settled_window(dwell, one.record.rate, max(4.0, np.floor(0.5 * dwell.cycles)))
+    start, stop = settled_window(
+        dwell, one.record.rate, max(FEWEST_SETTLED_CYCLES, np.floor(0.5 * dwell.cycles))
+    )
     late = max(0, stop - one.trusted.stop)
     return slice(max(start - late, dwell.start, one.trusted.start), stop - late)
 

@@ -30,6 +30,9 @@ _STEEP = 6
 _HIGHEST_ORDER = 8.0
 """Multiples of the drive's frequency that the force residual of a dwell keeps."""
 
+_HIGHEST_SHARE = 0.39
+"""Highest frequency of a force residual, over the sampling rate: a filter still fits in above."""
+
 _NOISE_DRAWS = 4
 """Draws of the noise."""
 
@@ -221,7 +224,7 @@ def _motion_in_band(campaign: Campaign, record: Record, band: Band) -> tuple[Flo
 def _highest(record: Record, motion: Motion) -> float:
     """Give the frequency up to which the force residual is kept."""
     orders = _HIGHEST_ORDER * max((dwell.frequency for dwell in record.dwells), default=0.0)
-    return float(min(max(motion.band.highest, orders), 0.39 * record.rate))
+    return float(min(max(motion.band.highest, orders), _HIGHEST_SHARE * record.rate))
 
 
 def _filter_to_band(

@@ -138,13 +138,13 @@ class PowerForce(AbstractFreeForce):
         far, fast = x / self.displacement, v / self.velocity
         width = _SLOW * self.slowest / self.velocity
         size, speed = _rounded(far, _NEAR_REST), _rounded(fast, width)
-        side = jnp.where(self.odd > 0.5, far / size, 1.0)
-        way = jnp.where(self.speed_odd > 0.5, fast / speed, 1.0)
+        side = jnp.where(self.odd != 0.0, far / size, 1.0)
+        way = jnp.where(self.speed_odd != 0.0, fast / speed, 1.0)
         return self.size * side * way * size**self.power * speed**self.speed_power
 
     def wording(self) -> Wording:
         p, q = float(self.power), float(self.speed_power)
-        odd, speed_odd = bool(self.odd > 0.5), bool(self.speed_odd > 0.5)
+        odd, speed_odd = bool(self.odd != 0.0), bool(self.speed_odd != 0.0)
         factors = [one for one in (_power_term("x", p, odd), _power_term("v", q, speed_odd)) if one]
         formula = " ".join(factors) or "1"
         factor = 1.0 / float(self.displacement**p * self.velocity**q)

@@ -18,13 +18,9 @@ from ..diagnosis import Projection, project, refit_from
 from ..fitting import Estimate, Search
 from ._free_laws import AbstractFreeForce, free_laws
 
-SMALLEST_LAW = 0.03
-"""Share of the excess below which a law is not selected; and share of the best law's gain by which a plainer
-one may fall short and still be selected. `benchmarks/remainder.py` counts the right decisions."""
-
 
 @shown
-class PursuedLaw(NamedTuple):
+class SelectedLaw(NamedTuple):
     """One selected law.
 
     Attributes:
@@ -54,7 +50,7 @@ class PursuedLaw(NamedTuple):
 
 
 @shown
-class Pursuit(NamedTuple):
+class MatchingPursuit(NamedTuple):
     """Force laws that would explain what a fitted model leaves.
 
     Attributes:
@@ -65,7 +61,7 @@ class Pursuit(NamedTuple):
         refitted: the same after a refit of all coefficients; NaN where none was asked for or it failed.
     """
 
-    laws: tuple[PursuedLaw, ...]
+    laws: tuple[SelectedLaw, ...]
     tried: int
     chi2_per_dof: float
     linear: float
@@ -88,7 +84,7 @@ class _Selection(NamedTuple):
     alike: tuple[int, ...]
 
 
-def _pursue(
+def _select(
     traces: Projection, ranks: Float[np.ndarray, " law"], fitted: Estimate, rules: Rules
 ) -> tuple[_Selection, ...]:
     """Select laws one after the other, each projected out of the residual and of the other laws."""
@@ -107,13 +103,13 @@ def _pursue(
         gains = np.where(free, score**2 / np.where(free, own, 1.0), 0.0)
         inflation = max(1.0, chi2 / dof)
         best = int(np.argmax(gains))
-        tie = max(rules.close_bic * inflation, SMALLEST_LAW * gains[best])
+        tie = max(rules.close_bic * inflation, rules.smallest_law * gains[best])
         close = free & (gains >= gains[best] - tie)
         order = np.lexsort((-gains, np.where(close, ranks, np.inf)))
         place = int(order[0])
         gain = float(gains[place])
         chance = tests * 2.0 * stats.norm.sf(np.sqrt(gain / inflation))
-        smallest = max(SMALLEST_LAW * excess, rules.smallest_gain * dof)
+        smallest = max(rules.smallest_law * excess, rules.smallest_gain * dof)
         if chance > rules.significance or gain < smallest:
             break
         size = np.sqrt(np.where(free, own, np.inf))
@@ -129,7 +125,7 @@ def _pursue(
     return tuple(selected)
 
 
-def pursue_laws(fitted: Estimate, search: Search, *, refit: bool) -> Pursuit:
+def matching_pursuit(fitted: Estimate, search: Search, *, refit: bool) -> MatchingPursuit:
     """Select free force laws that explain what a fit leaves: orthogonal matching pursuit on exact columns.
 
     The law of the largest score is selected and projected out of the residual and of all other laws, as the
@@ -147,25 +143,25 @@ def pursue_laws(fitted: Estimate, search: Search, *, refit: bool) -> Pursuit:
     Source: Pati, Rezaiifar & Krishnaprasad 1993 (orthogonal matching pursuit).
     """
     laws = free_laws(search.scales)
-    search.progress(f"pursuit among {len(laws)} free force laws")
+    search.progress(f"matching pursuit among {len(laws)} free force laws")
     units = np.array([1e-3 * law.typical_strength(search.scales) for law in laws])
     traces = project(fitted, laws, units)
     wordings = [law.wording() for law in laws]
-    selected = _pursue(traces, np.array([one.rank for one in wordings]), fitted, search.rules)
+    selected = _select(traces, np.array([one.rank for one in wordings]), fitted, search.rules)
     chi2_per_dof = fitted.chi2 / fitted.dof
     if not selected:
-        return Pursuit((), len(laws), chi2_per_dof, chi2_per_dof, float("nan"))
+        return MatchingPursuit((), len(laws), chi2_per_dof, chi2_per_dof, float("nan"))
     places = [one.place for one in selected]
     inverse = np.linalg.inv(traces.information[np.ix_(places, places)])
     amount = inverse @ traces.score[places]
     linear = (fitted.chi2 - sum(one.gain for one in selected)) / (fitted.dof - len(selected))
     error = np.sqrt(np.diag(inverse) * max(1.0, linear))
-    pursued, removed = [], 0.0
+    described, removed = [], 0.0
     for one, strength, spread in zip(selected, amount, error, strict=True):
         removed += one.gain
         words, unit = wordings[one.place], float(units[one.place])
-        pursued.append(
-            PursuedLaw(
+        described.append(
+            SelectedLaw(
                 words.formula,
                 words.words,
                 float(strength * unit * words.factor),
@@ -179,14 +175,14 @@ def pursue_laws(fitted: Estimate, search: Search, *, refit: bool) -> Pursuit:
         )
     refitted = float("nan")
     if refit:
-        search.progress("refit with " + ", ".join(law.formula for law in pursued))
+        search.progress("refit with " + ", ".join(law.formula for law in described))
         chosen = [
             eqx.tree_at(lambda e: getattr(e, e.strength), laws[place], jnp.asarray(float(strength)))
             for place, strength in zip(places, amount * units[places], strict=True)
         ]
         step = traces.step[:, -1] - traces.step[:, places] @ amount
         refitted = _refitted_goodness(fitted, chosen, step, search)
-    return Pursuit(tuple(pursued), len(laws), chi2_per_dof, float(linear), refitted)
+    return MatchingPursuit(tuple(described), len(laws), chi2_per_dof, float(linear), refitted)
 
 
 def _refitted_goodness(

@@ -13,7 +13,7 @@ from .._rules import Rules
 from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, search_of
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
-from ._matching_pursuit import Pursuit, pursue_laws
+from ._matching_pursuit import MatchingPursuit, matching_pursuit
 
 _SURFACE_CELLS = 20
 """Cells of the force map along each axis."""
@@ -47,7 +47,7 @@ class Remainder(NamedTuple):
         force_map: mean force residual over displacement and velocity.
     """
 
-    pursuit: Pursuit
+    pursuit: MatchingPursuit
     dwells: tuple[DwellRemainder, ...]
     force_map: ForceMap
 
@@ -72,7 +72,7 @@ def explain_remainder(
 
     Args:
         fit: the fit.
-        refit: whether to refit with the pursued laws, which checks their linear step.
+        refit: whether to refit with the selected laws, which checks their linear step.
         solver: an optimistix least-squares solver for the refit.
         progress: called with one line per step.
         rules: which laws stand out of the noise.
@@ -94,7 +94,7 @@ def explain_remainder(
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
     search = search_of(fit.campaign, rules, solver, progress)
-    pursuit = pursue_laws(fit.estimate, search, refit=refit)
+    pursuit = matching_pursuit(fit.estimate, search, refit=refit)
     progress("force residual")
     residuals = force_residuals(fit)
     return Remainder(pursuit, dwell_remainders(fit, residuals), _force_map(residuals))

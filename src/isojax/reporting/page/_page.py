@@ -25,7 +25,7 @@ from ..words import (
     health_words,
     law_rows,
     mains_words,
-    pursuit_words,
+    selected_laws_words,
     typeset_goodness,
     typeset_number,
     typeset_p_value,
@@ -144,7 +144,7 @@ def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
         ],
         "contents": _contents(same, remainder is not None, len(bounds), pictures),
         "bounds": bounds,
-        "remainder": "" if remainder is None else pursuit_words(remainder.pursuit),
+        "remainder": "" if remainder is None else selected_laws_words(remainder.pursuit),
         "remainder_laws": laws,
         "facts": _facts(loop),
         "health": (

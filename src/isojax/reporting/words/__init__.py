@@ -24,9 +24,9 @@ from ._health_words import dwell_words as dwell_words
 from ._health_words import health_dict as health_dict
 from ._health_words import mains_words as mains_words
 from ._remainder_words import law_rows as law_rows
-from ._remainder_words import pursuit_words as pursuit_words
 from ._remainder_words import remainder_dict as remainder_dict
 from ._remainder_words import remainder_summary as remainder_summary
+from ._remainder_words import selected_laws_words as selected_laws_words
 from ._sentences import caveats as caveats
 from ._sentences import effect_words as effect_words
 from ._sentences import finding_words as finding_words

@@ -12,7 +12,7 @@ from ..._quantities import (
     typeset_unit,
 )
 from ..._quantities import typeset_with_error as with_error
-from ...identification import Loop, Pursuit, Remainder
+from ...identification import Loop, MatchingPursuit, Remainder
 
 
 def remainder_summary(loop: Loop) -> tuple[str, ...]:
@@ -25,11 +25,11 @@ def remainder_summary(loop: Loop) -> tuple[str, ...]:
         The lines; none where nothing is left to describe.
     """
     remainder = loop.remainder
-    return () if remainder is None else (f"Unexplained residual: {pursuit_words(remainder.pursuit)}",)
+    return () if remainder is None else (f"Unexplained residual: {selected_laws_words(remainder.pursuit)}",)
 
 
-def pursuit_words(pursuit: Pursuit) -> str:
-    """Give the pursued laws in a sentence or two.
+def selected_laws_words(pursuit: MatchingPursuit) -> str:
+    """Give the selected laws in a sentence or two.
 
     Args:
         pursuit: the laws.
@@ -53,8 +53,8 @@ def pursuit_words(pursuit: Pursuit) -> str:
     )
 
 
-def law_rows(pursuit: Pursuit) -> list[dict[str, str]]:
-    """Give the pursued laws for a table.
+def law_rows(pursuit: MatchingPursuit) -> list[dict[str, str]]:
+    """Give the selected laws for a table.
 
     Args:
         pursuit: the laws.
