@@ -42,8 +42,8 @@ from .sense import Cause as Cause
 from .sense import Suspicion as Suspicion
 from .sense import find_suspicions as find_suspicions
 from .sense import refuse_contradictions as refuse_contradictions
-from .spectrum import Band as Band
 from .spectrum import DwellHarmonics as DwellHarmonics
+from .spectrum import ExcitedBand as ExcitedBand
 from .spectrum import FilterComparison as FilterComparison
 from .spectrum import HumLine as HumLine
 from .spectrum import MainsCollision as MainsCollision

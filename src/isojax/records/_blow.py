@@ -31,10 +31,10 @@ def driven_samples(drive: Float[np.ndarray, " time"]) -> Bool[np.ndarray, " time
         Whether it is on, (time,).
     """
     size = np.abs(drive - np.median(drive))
-    return size > max(BRIEF * float(np.max(size)), ABOVE_NOISE * drive_noise(drive))
+    return size > max(BRIEF * float(np.max(size)), ABOVE_NOISE * resting_noise(drive))
 
 
-def drive_noise(drive: Float[np.ndarray, " time"]) -> float:
+def resting_noise(drive: Float[np.ndarray, " time"]) -> float:
     """Gives the standard deviation of the noise of a drive that rests most of the time."""
     return 1.4826 * float(np.median(np.abs(drive - np.median(drive))))
 

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from ...models import Isolator
-from ...records import Band
+from ...records import ExcitedBand
 from ._force_balance import BalanceFit, fit_balance
 from ._measured_receptance import MeasuredResponse
 from ._motion import Motion
@@ -41,7 +41,7 @@ def dwell_motion(model: Isolator, responses: tuple[MeasuredResponse, ...]) -> Mo
         _over_a_cycle(angular * displacement),
         _over_a_cycle(angular**2 * displacement),
         _over_a_cycle(drive),
-        Band(float(np.min(frequency)), float(np.max(frequency)) * displacement.shape[1]),
+        ExcitedBand(float(np.min(frequency)), float(np.max(frequency)) * displacement.shape[1]),
     )
 
 

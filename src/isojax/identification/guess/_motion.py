@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from ...records import Band, Campaign, Record, excited_band, measured_state
+from ...records import Campaign, ExcitedBand, Record, excited_band, measured_state
 
 _NEARER = 1.5
 """Lowest frequency to integrate, over half the lowest excited one: the higher, the shorter the margins."""
@@ -37,7 +37,7 @@ class Motion:
     velocity: Float[np.ndarray, " time"]
     acceleration: Float[np.ndarray, " time"]
     drive: Float[np.ndarray, " time"]
-    band: Band
+    band: ExcitedBand
     margin: int = 0
 
     @property
@@ -90,7 +90,7 @@ def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> 
             # The drive may reach down to zero frequency, where the margins would take the whole record.
             whole = _MARGIN_PERIODS * record.rate / (_LARGEST_MARGIN * record.time.size)
             lowest = max(lowest, min(whole, _BROAD * band.highest))
-        band = Band(lowest, band.highest)
+        band = ExcitedBand(lowest, band.highest)
         margin = round(min(_MARGIN_PERIODS * record.rate / lowest, _LARGEST_MARGIN * record.time.size))
     x, v, a = measured_state(own, campaign.output.quantity, band.lowest, band.highest)
     return Motion(x, v, a, record.input, band, margin)

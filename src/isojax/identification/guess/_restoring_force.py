@@ -4,14 +4,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.signal.windows import tukey
 
-from ...records import TIME_DERIVATIVES, Band, Campaign, Record
+from ...records import TIME_DERIVATIVES, Campaign, ExcitedBand, Record
 from ._force_balance import BalanceProjection
 from ._motion import Motion
 from ._scales import excited_centre
 
 
 def line_projection(
-    motion: Motion, rate: float, band: Band, derivatives: int, centre: float
+    motion: Motion, rate: float, band: ExcitedBand, derivatives: int, centre: float
 ) -> BalanceProjection:
     """Give the projection on the Fourier lines of a band, which low-passes without a phase.
 
@@ -68,7 +68,7 @@ def band_projections(
         line_projection(
             motion,
             campaign.rate,
-            Band(0.0, motion.band.highest) if keeps_mean else motion.band,
+            ExcitedBand(0.0, motion.band.highest) if keeps_mean else motion.band,
             derivatives,
             excited_centre(record, motion) / (2 * np.pi),
         )

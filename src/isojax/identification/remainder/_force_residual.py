@@ -15,7 +15,7 @@ from ..._parameters import list_parameters
 from ...elements import Channels
 from ...excitations import Hold
 from ...models import RK4, Instant, Isolator, State, share_internal
-from ...records import Band, Campaign, NoiseEstimate, Record, measured_state
+from ...records import Campaign, ExcitedBand, NoiseEstimate, Record, measured_state
 from ...records.spectrum import shift_order
 from ..fitting import Fit, Run
 from ..guess import Motion, is_absolute, measured_motion
@@ -176,7 +176,7 @@ def _force_residual(
     }
     seen = _undo_instruments(model, record, channels)
     motion = measured_motion(campaign, seen)
-    motion = dataclasses.replace(motion, band=Band(motion.band.lowest, common))
+    motion = dataclasses.replace(motion, band=ExcitedBand(motion.band.lowest, common))
     if campaign.output.quantity != "acceleration":
         x, v, a = _motion_in_band(campaign, seen, motion.band)
         motion = dataclasses.replace(motion, displacement=x, velocity=v, acceleration=a)
@@ -214,7 +214,9 @@ def _force_residual(
     )
 
 
-def _motion_in_band(campaign: Campaign, record: Record, band: Band) -> tuple[Float[np.ndarray, " time"], ...]:
+def _motion_in_band(
+    campaign: Campaign, record: Record, band: ExcitedBand
+) -> tuple[Float[np.ndarray, " time"], ...]:
     """Give displacement, velocity and acceleration of a record, integrated or differentiated in a band."""
     if is_absolute(campaign):
         record = dataclasses.replace(record, output=record.output - record.input)

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from .._blow import ABOVE_NOISE, BRIEF, drive_noise, driven_samples, rest_position
+from .._blow import ABOVE_NOISE, BRIEF, driven_samples, rest_position, resting_noise
 from .._record import Dwell, ExcitationKind
 from ..spectrum import power_spectrum, ringing_frequency
 from ._find_dwells import rising_crossings, segment_dwells
@@ -112,7 +112,7 @@ def _is_brief(drive: Float[np.ndarray, " time"]) -> bool:
     """Whether the drive exceeds its noise in a small share of the record only."""
     peak = float(np.max(np.abs(drive - np.median(drive))))
     share = np.count_nonzero(driven_samples(drive)) / drive.size
-    return bool(peak > _CLEAR_BLOW * ABOVE_NOISE * drive_noise(drive) and share < BRIEF)
+    return bool(peak > _CLEAR_BLOW * ABOVE_NOISE * resting_noise(drive) and share < BRIEF)
 
 
 def _is_idle(

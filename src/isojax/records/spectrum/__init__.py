@@ -3,19 +3,19 @@
 In: a `Record` or its samples. Out: its excited band, the harmonics of its dwells, velocity and displacement,
 lines of the mains, receptances.
 Read `_basis.py`, `_dwell_end.py` and `_harmonics.py` (dwells) first, then `_filter.py`, `_noise_band.py` and
-`_band.py` (spectra), `_integrate.py`, `_mains.py` and `_filtered_receptance.py`.
+`_excited_band.py` (spectra), `_integrate.py`, `_mains.py` and `_filtered_receptance.py`.
 """
 
-from ._band import Band as Band
-from ._band import excited_band as excited_band
-from ._band import power_spectrum as power_spectrum
-from ._band import ringing_frequency as ringing_frequency
-from ._band import spectral_floor as spectral_floor
 from ._basis import without as without
 from ._dwell_end import MOST_HARMONICS as MOST_HARMONICS
 from ._dwell_end import Rest as Rest
 from ._dwell_end import dwell_rest as dwell_rest
 from ._dwell_end import dwell_window as dwell_window
+from ._excited_band import ExcitedBand as ExcitedBand
+from ._excited_band import excited_band as excited_band
+from ._excited_band import power_spectrum as power_spectrum
+from ._excited_band import ringing_frequency as ringing_frequency
+from ._excited_band import spectral_floor as spectral_floor
 from ._filter import compensate_butterworth as compensate_butterworth
 from ._filter import unsure_samples as unsure_samples
 from ._filter import zero_phase_butterworth as zero_phase_butterworth

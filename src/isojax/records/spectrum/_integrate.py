@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from .._campaign import TIME_DERIVATIVES, OutputQuantity
 from .._record import Record
-from ._band import excited_band
+from ._excited_band import excited_band
 
 
 def integrate_acceleration(

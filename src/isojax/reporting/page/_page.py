@@ -21,7 +21,6 @@ from ..words import (
     dwell_words,
     effect_words,
     finding_words,
-    headline,
     health_words,
     law_rows,
     mains_words,
@@ -31,6 +30,7 @@ from ..words import (
     typeset_p_value,
     typeset_share,
     typeset_unit,
+    verdict_sentence,
 )
 from ..words import typeset_with_error as with_error
 from ._pictures import Picture, draw_pictures
@@ -114,7 +114,7 @@ def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
         "verdict": loop.verdict,
         "verdict_words": _VERDICTS[loop.verdict],
         "check_first": check_first_words(loop.check_first),
-        "headline": headline(loop),
+        "headline": verdict_sentence(loop),
         "reason": loop.last.reason,
         "same": same,
         "findings": [

@@ -18,13 +18,13 @@ from ..words import (
     check_first_words,
     effect_words,
     finding_words,
-    headline,
     remainder_summary,
     typeset_goodness,
     typeset_number,
     typeset_p_value,
     typeset_share,
     typeset_unit,
+    verdict_sentence,
 )
 from ..words import typeset_with_error as with_error
 
@@ -221,7 +221,7 @@ def loop_summary(loop: Loop) -> RenderableType:
     lines = [line for finding in loop.findings for line in finding_words(finding)]
     return PlainGroup(
         *(Text(line, style="bold red") for line in check_first_words(loop.check_first)),
-        Text(headline(loop), style="bold"),
+        Text(verdict_sentence(loop), style="bold"),
         *(Text(line) for line in (*lines, *alternative_words(loop), *remainder_summary(loop))),
         error_table(loop.before, loop.after),
         parameter_table(loop.before, loop.after),

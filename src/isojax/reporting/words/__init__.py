@@ -30,5 +30,5 @@ from ._remainder_words import selected_laws_words as selected_laws_words
 from ._sentences import caveats as caveats
 from ._sentences import effect_words as effect_words
 from ._sentences import finding_words as finding_words
-from ._sentences import headline as headline
 from ._sentences import health_words as health_words
+from ._sentences import verdict_sentence as verdict_sentence

@@ -92,7 +92,7 @@ _DOUBTS = {
 }
 
 
-def headline(loop: Loop) -> str:
+def verdict_sentence(loop: Loop) -> str:
     """Give the verdict in one sentence, and in a second one what held-out records say against it.
 
     Args:

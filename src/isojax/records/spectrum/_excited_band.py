@@ -35,7 +35,7 @@ _FIRST_POWER = 1e-3
 
 @shown
 @dataclass(frozen=True)
-class Band:
+class ExcitedBand:
     """The frequencies at which a record has a signal.
 
     Attributes:
@@ -113,7 +113,7 @@ def ringing_frequency(signal: Float[np.ndarray, " time"], rate: float) -> float:
     return float(frequency[1 + np.argmax(power[1:])])
 
 
-def excited_band(record: Record) -> Band:
+def excited_band(record: Record) -> ExcitedBand:
     """Gives the band in which a record's signal stands above its noise.
 
     Args:
@@ -125,7 +125,7 @@ def excited_band(record: Record) -> Band:
     return record.once("excited band", lambda: _find_band(record))
 
 
-def _find_band(record: Record) -> Band:
+def _find_band(record: Record) -> ExcitedBand:
     nyquist = 0.5 * record.rate
     slowest = 2.0 * record.rate / record.time.size
     frequency, output = power_spectrum(record.output, record.rate)
@@ -142,4 +142,4 @@ def _find_band(record: Record) -> Band:
         share = np.cumsum(power) / np.sum(power)
         lowest = 0.5 * float(frequency[np.searchsorted(share, _FIRST_POWER)])
     lowest = min(max(lowest, slowest), 0.5 * nyquist)
-    return Band(lowest, max(highest, 1.5 * lowest))
+    return ExcitedBand(lowest, max(highest, 1.5 * lowest))
