@@ -33,7 +33,8 @@ IDLE = 3
 """Accepted steps that together must gain what a step must."""
 
 PACE = 5
-"""Evaluations over which the pace of a search is taken, where another model is ahead of it."""
+"""Accepted steps over which the pace of a search is taken, where another model is ahead of it. Refused ones
+tell no pace: what comes after them may gain more than what went before."""
 
 SHRINKS = 3
 """Refusals that a trial which diverged counts for: it lies far outside, not just a little too far."""
@@ -163,7 +164,6 @@ def descend(
     state: Any = None
     result: Any = RESULTS.not_converged
     evaluations, refused, decrement = 0, 0, float("inf")
-    reached: list[float] = []
     levels: list[float] = []
     while evaluations < search.max_steps:
         current, slopes = physical(trial)
@@ -197,7 +197,6 @@ def descend(
         else:
             refused += 1
         assert best is not None
-        reached.append(best.chi2)
         levels += [best.chi2] if accepted else []
         # A law with kinks lets no step pass near the solution; elsewhere so many refusals are a failure.
         # Where records are split the error itself has kinks, and a slope on either side of its least.
@@ -206,7 +205,7 @@ def descend(
         rival = search.rival
         if rival is not None:
             behind = best.chi2 - rival.chi2
-            pace = _gain(reached, PACE) / PACE
+            pace = _gain(levels, PACE) / PACE
             if behind > rival.tie and pace * search.max_steps < behind:
                 result = RESULTS.outdone
                 break
@@ -224,7 +223,7 @@ def descend(
                 search.progress("restarting the search: the predicted decrease was not reached")
                 trial, trial_nuisances, best, state, refused = best_free, settled.nuisances, None, None, 0
                 # What was promised is no measure of what is gained from here on.
-                reached, levels = [], []
+                levels = []
                 continue
         trial = state.y_eval * unit
         trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
@@ -249,9 +248,9 @@ def _with_implied_nuisances(
     return simulator.evaluate(best.model, one_hot(best.model, places, slopes), moved)
 
 
-def _gain(reached: list[float], evaluations: int) -> float:
-    """Give what the last evaluations took off chi2; more than anything before there were so many."""
-    return reached[-evaluations - 1] - reached[-1] if len(reached) > evaluations else float("inf")
+def _gain(levels: list[float], steps: int) -> float:
+    """Give what the last accepted steps took off chi2; more than anything before there were so many."""
+    return levels[-steps - 1] - levels[-1] if len(levels) > steps else float("inf")
 
 
 def _in_physical_units(point: Point, slopes: list[float]) -> Point:
