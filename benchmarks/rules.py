@@ -38,7 +38,7 @@ from isojax.models import Isolator
 from isojax.records import Campaign
 
 KEPT = Path(__file__).parent / "results" / "rules.jsonl"
-FROM_ONE = ("good", "most_of_it", "close_likeness")
+FROM_ONE = ("good", "close_likeness")
 VALUES = ("half", "twice", "without")
 DEFAULTS = {field.name: field.default for field in dataclasses.fields(Rules)}
 REPEATED = (
@@ -57,7 +57,6 @@ REPEATED = (
 
 WITHOUT: dict[str, float] = {
     "good": math.inf,
-    "most_of_it": 0.0,
     "smallest_share": 0.0,
     "smallest_gain": 0.0,
     "smallest_law": 0.0,

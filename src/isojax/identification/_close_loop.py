@@ -362,4 +362,4 @@ def overall_verdict(
     if findings <= rules.most_at_once and is_good(final, rules):
         return "partly_explained" if doubt_of(before, final, alternatives, rules) else "found"
     explained = 1.0 - found.excess / max(first.excess, 1.0)
-    return "partly_explained" if explained >= rules.most_of_it else "unexplained"
+    return "partly_explained" if explained >= 1.0 - rules.smallest_share else "unexplained"

@@ -21,11 +21,9 @@ class Rules:
     good: float = 1.05
     """chi2/dof up to which a fit is good."""
 
-    most_of_it: float = 0.8
-    """Share of the excess that an effect, or all effects together, must explain to be the explanation."""
-
     smallest_share: float = 0.2
-    """Share of the remaining excess that an effect must explain to be named where the fit is not good."""
+    """Share of the excess that matters where a fit is not good: an effect that explains less is not named, and
+    all effects together are the explanation once less is left."""
 
     smallest_gain: float = 0.0005
     """Gain in chi2/dof below which effects are ties: no test repeats so well that a smaller one means

@@ -250,7 +250,7 @@ def _verdict_of_finding(
     before, after = case.fit, complete(best.estimate, case.fit.model, case.fit.campaign, case.fit.noise)
     if is_good(after, rules):
         verdict = "found"
-    elif explained >= rules.most_of_it:
+    elif explained >= 1.0 - rules.smallest_share:
         verdict = "partly_explained"
     else:
         verdict = "unexplained"
