@@ -22,8 +22,8 @@ class Rules:
     """chi2/dof up to which a fit is good."""
 
     smallest_share: float = 0.2
-    """Share of the excess that matters where a fit is not good: an effect that explains less is not named, and
-    all effects together are the explanation once less is left."""
+    """Share of the excess that matters where a fit is not good: an effect that explains less is not named,
+    and all effects together are the explanation once less is left."""
 
     smallest_gain: float = 0.0005
     """Gain in chi2/dof below which effects are ties: no test repeats so well that a smaller one means
