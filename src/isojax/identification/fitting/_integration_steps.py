@@ -43,8 +43,8 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     difference = (outcomes[0] - outcomes[1]) * weight
     if not np.all(np.isfinite(difference)):
         return float("inf")
-    if prepared.whitening is not None:
-        rows = whiten(jnp.asarray(difference)[:, None], jnp.asarray(weight), prepared.whitening)
+    if prepared.sampling.whitening is not None:
+        rows = whiten(jnp.asarray(difference)[:, None], jnp.asarray(weight), prepared.sampling.whitening)
         difference = np.asarray(rows[:, 0])
     return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise)
 

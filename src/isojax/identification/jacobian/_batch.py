@@ -54,6 +54,24 @@ class Batch(eqx.Module):
         return Batch(self.drive, self.drive_rate, self.measured, self.weight, channels=own)
 
 
+class Sampling(NamedTuple):
+    """How segments are simulated from sample to sample, and what is read at each.
+
+    Attributes:
+        quantity: what the sensor measures.
+        time: between samples [s].
+        integrator: what simulates the segments.
+        jumps: whether the drive jumps at the samples.
+        whitening: what makes the noise in the rows of a lane white, or None where it is.
+    """
+
+    quantity: Quantity
+    time: float
+    integrator: Integrator
+    jumps: bool
+    whitening: Whitening | None = None
+
+
 class Prepared(NamedTuple):
     """Batches of one set of segments, ready to simulate.
 
@@ -63,12 +81,8 @@ class Prepared(NamedTuple):
         record: record of each lane, padding lanes included (0 there).
         starts: measured displacement and velocity at each lane's first sample; shape (2, lanes).
         spread: rms displacement and velocity of each lane; shape (2, lanes).
-        quantity: what the sensor measures.
-        sample_time: time between samples [s].
         samples: samples that count in each record.
-        integrator: what simulates the segments.
-        jumps: whether the drive jumps at the samples.
-        whitening: what makes the noise in the rows of a lane white, or None where it is.
+        sampling: how they are simulated and read.
     """
 
     batches: tuple[Batch, ...]
@@ -76,12 +90,8 @@ class Prepared(NamedTuple):
     record: Int[np.ndarray, " lanes"]
     starts: Float[np.ndarray, "2 lanes"]
     spread: Float[np.ndarray, "2 lanes"]
-    quantity: Quantity
-    sample_time: float
     samples: Float[np.ndarray, " record"]
-    integrator: Integrator
-    jumps: bool
-    whitening: Whitening | None = None
+    sampling: Sampling
 
 
 def coordinate_motion(
@@ -199,16 +209,7 @@ def prepare(
         for first in range(0, lanes, share)
     )
     count = np.bincount(owner, weights=weight.sum(axis=1), minlength=len(records))
-    return Prepared(
-        batches,
-        segments,
-        owner,
-        starts,
-        spread,
-        quantity,
-        1.0 / records[0].rate,
-        count,
-        Integrator() if integrator is None else integrator,
-        hold == "zero_order",
-        find_whitening(whitening),
-    )
+    how = Integrator() if integrator is None else integrator
+    jumps = hold == "zero_order"
+    sampling = Sampling(quantity, 1.0 / records[0].rate, how, jumps, find_whitening(whitening))
+    return Prepared(batches, segments, owner, starts, spread, count, sampling)

@@ -12,7 +12,6 @@ from ...models import (
     RK4,
     Instant,
     Isolator,
-    Quantity,
     Ringing,
     State,
     Step,
@@ -23,20 +22,18 @@ from ...models import (
     split_stages,
     split_step,
 )
-from ._batch import Batch
+from ._batch import Batch, Sampling
 from ._slopes import steps_of
-from ._unknowns import movable, scaled_model, unit_changes
-from ._whitening import Whitening, whitened_products
+from ._unknowns import Lanes, movable, scaled_model, unit_changes
+from ._whitening import whitened_products
 
 
-def _sampler(
-    model: Isolator, quantity: Quantity, sample_time: float
-) -> Callable[..., tuple[Array, State, Array | None]]:
+def _sampler(model: Isolator, sampling: Sampling) -> Callable[..., tuple[Array, State, Array | None]]:
     """Give the function that reads one sample and steps to the next, the model's numbers as arguments.
 
     Last it gives what jumps on the way leave in the next reading.
     """
-    solver = RK4()
+    solver, quantity = RK4(), sampling.quantity
 
     def sample(
         values: tuple[Array, ...], scale: Array, state: State, stages: tuple[Instant, ...]
@@ -44,7 +41,7 @@ def _sampler(
         current = scaled_model(model, values, scale)
         stages = tuple(current.with_delay_slope(at) for at in stages)
         reading = read_record(current, state, stages[0], quantity)
-        ahead, ringing = advance_record(current, solver, quantity, sample_time, state, stages)
+        ahead, ringing = advance_record(current, solver, quantity, sampling.time, state, stages)
         return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)
 
     return sample
@@ -52,25 +49,21 @@ def _sampler(
 
 @eqx.filter_jit
 def fixed_information(
-    model: Isolator,
+    start: Lanes,
     moving: tuple[int, ...],
-    directions: tuple[Array, ...],
-    columns: int,
-    scale: Array,
-    states: State,
+    directions: Float[Array, "moving coefficient"],
     state_scales: State,
     batch: Batch,
-    quantity: Quantity,
-    sample_time: float,
-    whitening: Whitening | None,
+    sampling: Sampling,
 ) -> Float[Array, "column column lanes"]:
     """Accumulate A^T W A over the samples of each lane; A holds the columns and, last, the residual.
 
     White noise weighs each sample by itself, so that no row need be kept.
     """
+    model, scale, states = start
     known, with_moved = movable(model, moving)
-    sample = _sampler(model, quantity, sample_time)
-    changes = unit_changes(model, directions, columns, state_scales)
+    sample = _sampler(model, sampling)
+    changes = unit_changes(model, directions, state_scales)
     total, lanes = changes.scale.shape
 
     def body(carry: tuple, table: tuple) -> tuple[tuple, Array | None]:
@@ -93,47 +86,45 @@ def fixed_information(
         if pending is not None:
             rows, pending = rows + pending, jnp.concatenate([change[2], -after[None]])
         rows = rows * weight[None]
-        if whitening is not None:
+        if sampling.whitening is not None:
             return (state, change[1], gram, pending), rows
         return (state, change[1], gram + rows[:, None] * rows[None], pending), None
 
     silent = jnp.zeros((total + 1, lanes)) if model.splits else None
-    start = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
+    begun = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
     tables = (batch.acting, batch.measured, batch.weight)
-    carry, rows = jax.lax.scan(body, start, tables)
-    if whitening is None or rows is None:
+    carry, rows = jax.lax.scan(body, begun, tables)
+    if sampling.whitening is None or rows is None:
         return carry[2]
-    return whitened_products(rows, batch.weight, whitening)
+    return whitened_products(rows, batch.weight, sampling.whitening)
 
 
 @eqx.filter_jit
-def fixed_readings(
-    model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> Float[Array, "time lanes"]:
+def fixed_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Array, "time lanes"]:
     """Simulate; give what the sensor chain records."""
+    model, scale, states = start
     values = tuple(entry.value for entry in list_parameters(model))
-    sample = _sampler(model, quantity, sample_time)
+    sample = _sampler(model, sampling)
 
     def body(carry: tuple[State, Array | None], table: Instant) -> tuple[tuple[State, Array | None], Array]:
         state, pending = carry
         reading, state, after = sample(values, scale, state, split_stages(table))
         return (state, after), reading if pending is None else reading + pending
 
-    start = (states, jnp.zeros_like(scale) if model.splits else None)
-    return jax.lax.scan(body, start, batch.acting)[1]
+    begun = (states, jnp.zeros_like(scale) if model.splits else None)
+    return jax.lax.scan(body, begun, batch.acting)[1]
 
 
 @eqx.filter_jit
-def fixed_path(
-    model: Isolator, scale: Array, states: State, batch: Batch, quantity: Quantity, sample_time: float
-) -> tuple[State, Ringing | None]:
+def fixed_path(start: Lanes, batch: Batch, sampling: Sampling) -> tuple[State, Ringing | None]:
     """Simulate; give the states at the start of each integration step, and the ringing of jumps."""
+    model, scale, states = start
     values = tuple(entry.value for entry in list_parameters(model))
     current = scaled_model(model, values, scale)
     acting = jax.tree_util.tree_map(steps_of, batch.acting)
     time = batch.drive.shape[0]
     steps = acting.drive.shape[0] // time
-    step_time = sample_time / steps
+    quantity, step_time = sampling.quantity, sampling.time / steps
     solver = RK4()
 
     def body(state: State, table: tuple) -> tuple[State, tuple[State, Ringing | None]]:

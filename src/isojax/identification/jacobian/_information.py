@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -14,7 +13,7 @@ from ...models import Isolator
 from ._batch import Prepared, workers
 from ._fixed_steps import fixed_information, fixed_path, fixed_readings
 from ._solved_steps import solved_information, solved_path, solved_readings
-from ._unknowns import Unknowns
+from ._unknowns import Lanes, Unknowns
 
 
 class Stepping(NamedTuple):
@@ -43,12 +42,9 @@ def find_stepping(prepared: Prepared) -> Stepping:
     Returns:
         The functions.
     """
-    if prepared.integrator.is_locked:
+    if prepared.sampling.integrator.is_locked:
         return Stepping(fixed_information, fixed_readings, fixed_path)
-    how = prepared.integrator, prepared.jumps
-    return Stepping(
-        partial(solved_information, *how), partial(solved_readings, *how), partial(solved_path, *how)
-    )
+    return Stepping(solved_information, solved_readings, solved_path)
 
 
 def share_lanes(values: np.ndarray, part: int, parts: int) -> tuple[Array, ...]:
@@ -72,24 +68,18 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
         A^T A of each lane, lanes first; not finite where a simulation diverged.
     """
     parts, stepping = len(prepared.batches), find_stepping(prepared)
-    model = unknowns.model
-    moving = tuple(int(place) for place in np.flatnonzero(unknowns.directions.any(axis=1)))
-    directions = tuple(jnp.asarray(unknowns.directions[place]) for place in moving)
+    moving = unknowns.moving
+    changed = jnp.asarray(unknowns.directions[list(moving)])
 
     def one(part: int) -> np.ndarray:
-        result = stepping.information(
-            model,
-            moving,
-            directions,
-            unknowns.directions.shape[1],
+        own = Lanes(
+            unknowns.model,
             share_lanes(unknowns.stiffness_scale[None], part, parts)[0],
             share_lanes(unknowns.states, part, parts),
-            share_lanes(unknowns.state_scales, part, parts),
-            prepared.batches[part].following(model),
-            prepared.quantity,
-            prepared.sample_time,
-            prepared.whitening,
         )
+        scales = share_lanes(unknowns.state_scales, part, parts)
+        batch = prepared.batches[part].following(unknowns.model)
+        result = stepping.information(own, moving, changed, scales, batch, prepared.sampling)
         return np.moveaxis(np.asarray(result), -1, 0)
 
     # JAX releases the interpreter while it computes, so that plain threads use every core on one device.
@@ -118,11 +108,9 @@ def readings(
 
     def one(part: int) -> np.ndarray:
         scale = share_lanes(stiffness_scale[None], part, parts)[0]
+        own = Lanes(model, scale, share_lanes(states, part, parts))
         batch = prepared.batches[part].following(model)
-        own = share_lanes(states, part, parts)
-        return np.asarray(
-            stepping.readings(model, scale, own, batch, prepared.quantity, prepared.sample_time)
-        )
+        return np.asarray(stepping.readings(own, batch, prepared.sampling))
 
     def compute() -> tuple[np.ndarray]:
         with ThreadPoolExecutor(workers()) as pool:

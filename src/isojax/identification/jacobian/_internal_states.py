@@ -48,7 +48,7 @@ def internal_starts(
     length, stages = prepared.batches[0].drive.shape[:2]
     known = {
         place: (
-            *coordinate_motion(records[place], prepared.quantity, based),
+            *coordinate_motion(records[place], prepared.sampling.quantity, based),
             records[place].output,
             records[place].input,
         )
@@ -75,7 +75,7 @@ def internal_starts(
         own = slice(part * (lanes // parts), (part + 1) * (lanes // parts))
         rows = 4 if based else 3
         tables = (tuple(_stages(row, steps) for row in motion[:rows, :, own]) for motion in (before, over))
-        step = prepared.sample_time / steps
+        step = prepared.sampling.time / steps
         rest = (jnp.zeros((len(family.places), lanes // parts)),) * family.elements.internal_states
         first, _ = internal_state_path(family.elements, next(tables), rest, step)
         places = [[int(ends[place]) + state for place in family.places] for state in range(len(rest))]

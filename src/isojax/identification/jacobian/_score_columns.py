@@ -27,7 +27,7 @@ from ._information import find_stepping, share_lanes
 from ._propagation import propagate, respond
 from ._slopes import Change, Slopes, impulse_at_samples, slopes_along
 from ._transitions import Transitions, transitions_along
-from ._unknowns import STIFFNESS_SCALE_UNIT, Unknowns, has_stiffness_scale
+from ._unknowns import STIFFNESS_SCALE_UNIT, Lanes, Unknowns, has_stiffness_scale
 from ._whitening import whitened_products
 
 _ENTRIES = 2e7
@@ -139,10 +139,11 @@ def _block(
     """Work out the columns of a few lanes, and multiply them out."""
     model, size = layout.model, 2 + layout.model.internal_states
     own = batch.following(model)
-    follow_path = find_stepping(prepared).path
-    path, ringing = follow_path(model, scale, states[:size], own, prepared.quantity, prepared.sample_time)
-    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, prepared.quantity)
-    lanes, time, step = scale.shape[0], batch.measured.shape[0], prepared.sample_time
+    sampling = prepared.sampling
+    quantity, step = sampling.quantity, sampling.time
+    path, ringing = find_stepping(prepared).path(Lanes(model, scale, states[:size]), own, sampling)
+    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, quantity)
+    lanes, time = scale.shape[0], batch.measured.shape[0]
     table = np.empty((lanes, columns, time))
     weight = np.asarray(batch.weight)
     error = (np.asarray(batch.measured) - np.asarray(slopes.reading)) * weight
@@ -150,7 +151,7 @@ def _block(
 
     exact = None
     if ringing is not None:
-        exact = transitions_along(model, layout.moving, scale, path, own.acting, prepared.quantity, step)
+        exact = transitions_along(model, layout.moving, scale, path, own.acting, quantity, step)
     group = _Group(slopes.states, exact, batch.weight, step)
     for source in _sources(layout, prepared, batch, slopes, exact, states[size:], columns, part):
         group.add(*source)
@@ -161,9 +162,9 @@ def _block(
         if group.is_full:
             group.solve(table)
     group.solve(table)
-    if prepared.whitening is not None:
+    if sampling.whitening is not None:
         rows = jnp.asarray(table.transpose(2, 1, 0))
-        return np.moveaxis(np.asarray(_weigh(rows, batch.weight, prepared.whitening)), -1, 0)
+        return np.moveaxis(np.asarray(_weigh(rows, batch.weight, sampling.whitening)), -1, 0)
     # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
         return table @ np.swapaxes(table, 1, 2)
@@ -205,7 +206,7 @@ def _sources(
         # A model without a spring has no stiffness to scale, whatever a probe would bring.
         unit = 0.0 if slopes.scale is None else STIFFNESS_SCALE_UNIT
         yield scaled - 1, *own(unit, change, -1)
-    step = prepared.sample_time
+    step = prepared.sampling.time
     starts = stack_states(layout.families, layout.probes, internal)
     inputs = {name: ready(1.0, change) for name, change in slopes.inputs.items()}
     ends = np.cumsum([0, *(family.elements.internal_states for family in layout.families)])

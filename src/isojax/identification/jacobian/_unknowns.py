@@ -28,6 +28,25 @@ class Unknowns(NamedTuple):
     states: Float[np.ndarray, "state lanes"]
     state_scales: Float[np.ndarray, "state lanes"]
 
+    @property
+    def moving(self) -> tuple[int, ...]:
+        """Places of the parameters that some direction changes."""
+        return tuple(int(place) for place in np.flatnonzero(self.directions.any(axis=1)))
+
+
+class Lanes(NamedTuple):
+    """Where segments side by side start, a lane each.
+
+    Attributes:
+        model: the isolator.
+        stiffness_scale: factor on the linear stiffness.
+        states: state at the first sample.
+    """
+
+    model: Isolator
+    stiffness_scale: Float[Array, " lanes"]
+    states: State
+
 
 STIFFNESS_SCALE_UNIT = 1e-3
 """One unit of the column of the stiffness scale: a tenth of a percent."""
@@ -82,21 +101,19 @@ class Changes(NamedTuple):
     states: tuple[Float[Array, "column lanes"], ...]
 
 
-def unit_changes(
-    model: Isolator, directions: tuple[Array, ...], columns: int, state_scales: State
-) -> Changes:
+def unit_changes(model: Isolator, directions: Float[Array, "moving coefficient"], state_scales: State) -> Changes:
     """Give the changes of all unknowns.
 
     Args:
         model: the isolator.
         directions: changes of the parameters that move, over the columns of the coefficients.
-        columns: of the coefficients.
         state_scales: size of one unit of change of each state, a lane each.
 
     Returns:
         The changes: the coefficients first, then the stiffness scale, if there is one, and the states.
     """
     has_scale, lanes = has_stiffness_scale(model), state_scales[0].shape[0]
+    columns = directions.shape[1]
     total = columns + int(has_scale) + len(state_scales)
     seeds = tuple(jnp.concatenate([seed, jnp.zeros(total - columns)]) for seed in directions)
     scale_seed = jnp.zeros((total, lanes))
