@@ -101,7 +101,9 @@ class Changes(NamedTuple):
     states: tuple[Float[Array, "column lanes"], ...]
 
 
-def unit_changes(model: Isolator, directions: Float[Array, "moving coefficient"], state_scales: State) -> Changes:
+def unit_changes(
+    model: Isolator, directions: Float[Array, "moving coefficient"], state_scales: State
+) -> Changes:
     """Give the changes of all unknowns.
 
     Args:
