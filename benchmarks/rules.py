@@ -38,7 +38,7 @@ from isojax.models import Isolator
 from isojax.records import Campaign
 
 KEPT = Path(__file__).parent / "results" / "rules.jsonl"
-FROM_ONE = ("good", "close_likeness")
+FROM_ONE = ("good",)
 VALUES = ("half", "twice", "without")
 DEFAULTS = {field.name: field.default for field in dataclasses.fields(Rules)}
 REPEATED = (
@@ -63,7 +63,6 @@ WITHOUT: dict[str, float] = {
     "most_at_once": 100,
     "significance": 1.0,
     "close_bic": 0.0,
-    "close_likeness": 1.0,
     "smallest_visibility": 0.0,
     "survivors": 100,
 }

@@ -47,9 +47,6 @@ class Rules:
     """Difference of Schwarz's criterion from which the evidence is clear: very strong in the scale of Kass
     & Raftery 1995, J. Am. Stat. Assoc. 90:773. Two effects within it are indistinguishable."""
 
-    close_likeness: float = 0.95
-    """Correlation of the traces of two effects from which they look alike, where only one was refitted."""
-
     smallest_visibility: float = 0.005
     """Share of an effect's trace that the fitted coefficients must leave; below it the records cannot show
     the effect."""

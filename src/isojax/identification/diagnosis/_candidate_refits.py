@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
 from scipy import stats
 
 from ..._results import RESULTS
@@ -64,43 +63,17 @@ def refit_candidates(case: Case) -> list[Refit]:
             break
         known = {one.score.column for one in refits}
         if score.admissible and score.p_value <= case.significance and score.column not in known:
-            refits.append(_refit(case, index, refits, ""))
-    refits = _without_imitations(case, refits)
-    for index in [] if case.is_good else _correlated(case, refits):
-        refits.append(_refit(case, index, refits, ", which resembles the best"))
-    return refits
+            refits.append(_refit(case, index, refits))
+    return _without_imitations(case, refits)
 
 
-def _refit(case: Case, index: int, refits: list[Refit], why: str) -> Refit:
+def _refit(case: Case, index: int, refits: list[Refit]) -> Refit:
     """Refit a candidate, beside those that were refitted before."""
     score = case.test.scores[index]
-    case.search.progress(f"refit with {score.element.name}{why}")
+    case.search.progress(f"refit with {score.element.name}")
     search = case.search._replace(rival=_rival(refits, case.rules))
     found = refit_candidate(case.test, index, search)
     return Refit(score, found, _violation(case, found, score))
-
-
-def _correlated(case: Case, refits: list[Refit]) -> list[int]:
-    """List the effects that resemble the best one and were not refitted, as far as so many are worth it.
-
-    Near the records derivatives that agree show that two laws do. Far from them only a refit does.
-    """
-    usable = by_evidence(refits, case.rules)
-    if not usable:
-        return []
-    scores = case.test.scores
-    names = [score.element.name for score in scores]
-    likeness = np.abs(case.test.likeness[names.index(usable[0].score.element.name)])
-    done = {refit.score.element.name for refit in refits}
-    open_still = [
-        index
-        for index, score in enumerate(scores)
-        if score.element.name not in done
-        and score.admissible
-        and score.p_value <= case.significance
-        and likeness[index] > case.rules.close_likeness
-    ]
-    return sorted(open_still, key=lambda index: -likeness[index])[: case.rules.survivors]
 
 
 def _rival(refits: list[Refit], rules: Rules) -> Rival | None:

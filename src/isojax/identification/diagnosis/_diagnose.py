@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from ..._progress import silent
 from ..._results import RESULTS
 from ...elements import CATALOGUE, AbstractElement
@@ -220,10 +218,7 @@ def _look_alikes(name: str, best: Refit, ranking: tuple[Candidate, ...], rules: 
         and entry.admissible
         # A law that contains the finding follows it everywhere, and was not found to say more.
         and name not in CATALOGUE[entry.effect].absorbs
-        and (
-            entry.delta_bic <= least_difference(best.estimate, rules)
-            or (np.isnan(entry.delta_bic) and abs(entry.likeness) > rules.close_likeness)
-        )
+        and entry.delta_bic <= least_difference(best.estimate, rules)
     )
 
 
