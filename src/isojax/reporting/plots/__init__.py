@@ -29,6 +29,7 @@ from ._force_plots import measured_forces as measured_forces
 from ._force_plots import plot_effect as plot_effect
 from ._force_plots import plot_restoring_force as plot_restoring_force
 from ._force_plots import telling_slice as telling_slice
+from ._global_sensitivity_plot import plot_global_sensitivity as plot_global_sensitivity
 from ._inspection_plot import plot_inspection as plot_inspection
 from ._map_plots import plot_response_map as plot_response_map
 from ._map_plots import plot_stability_map as plot_stability_map
