@@ -6,6 +6,8 @@ Read `_uncertainty.py`.
 
 from ._global_sensitivity import GlobalSensitivity as GlobalSensitivity
 from ._global_sensitivity import global_sensitivity as global_sensitivity
+from ._posterior import Posterior as Posterior
+from ._posterior import posterior as posterior
 from ._profile import Profile as Profile
 from ._profile import profile as profile
 from ._uncertainty import UncertainQuantity as UncertainQuantity

@@ -5,7 +5,7 @@ from ..._results import RESULTS
 from ._descent import Descent, descend
 from ._estimate import Estimate, magnitudes
 from ._initial_states import best_nuisances
-from ._problem import Point, one_hot
+from ._problem import Point
 from ._search import Search
 
 
@@ -33,17 +33,3 @@ def fit_held(found: Estimate, name: str | None, value: float, start: Point, sear
         return descend(found.simulator, model, others, sizes, start.nuisances, search)
     point = best_nuisances(found.simulator, model, start.nuisances.spread, start.nuisances)
     return Descent(point, RESULTS.successful if point.is_finite else RESULTS.not_finite, 1)
-
-
-def at_solution(found: Estimate, sizes: tuple[float, ...]) -> Point:
-    """Give the equations at the solution, a column for each free coefficient.
-
-    Args:
-        found: the fit.
-        sizes: change of each coefficient that is one unit of its column.
-
-    Returns:
-        The point, where the nuisances of the fit stand.
-    """
-    directions = one_hot(found.model, found.places, sizes)
-    return found.simulator.evaluate(found.model, directions, found.point.nuisances)

@@ -18,7 +18,7 @@ from ...identification import (
     Residual,
     Verdict,
 )
-from ...inference import GlobalSensitivity
+from ...inference import GlobalSensitivity, Posterior, Profile
 from ...models import Simulation
 from ...records import Campaign
 from ...stability import (
@@ -38,6 +38,7 @@ from ...stability import (
 from ._attractor_plots import plot_basins, plot_bifurcation_diagram, plot_phase_portrait, plot_return
 from ._branch_plots import plot_backbone, plot_branch, plot_frequency_response, plot_transmissibility
 from ._classical_plots import plot_receptance
+from ._coefficient_plots import plot_posterior, plot_profile
 from ._evidence_plots import plot_ranking
 from ._fold_curve_plot import plot_fold_curve
 from ._global_sensitivity_plot import plot_global_sensitivity
@@ -101,6 +102,8 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     Loop: plot_time_history,
     Orbit: _orbit,
     PhasePortrait: plot_phase_portrait,
+    Posterior: plot_posterior,
+    Profile: plot_profile,
     Remainder: _remainder,
     Residual: plot_correlation,
     ReturnToOrbit: plot_return,
