@@ -1,5 +1,6 @@
-"""A decay of a linear isolator under heavy noise, whose least squares SciPy can do by itself."""
+"""Decays of a linear isolator, whose least squares SciPy can do by itself."""
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -8,18 +9,18 @@ from scipy.optimize import minimize_scalar
 
 import isojax as ij
 
-SPRING, DAMPER = "linear_stiffness.coefficient", "linear_damping.coefficient"
 MASS, STIFFNESS, DAMPING = 800.0, 1.2e5, 500.0
-RATE, NOISE = 100.0, 8e-4
+RATE = 100.0
 
 
 class Decay(NamedTuple):
-    """A fit to a record: time, reading, and what the fit knows of the start before it looks.
+    """A fit to a record: noise, time, reading, and what the fit knows of the start before it looks.
 
     The measured displacement and velocity of the start, and how far each may be off, are those of the fit.
     """
 
     fit: ij.Fit
+    noise: float
     time: np.ndarray
     reading: np.ndarray
     start: np.ndarray
@@ -31,8 +32,8 @@ class Decay(NamedTuple):
         turn = np.sqrt(stiffness / MASS - decay**2)
         cosine, sine = np.cos(turn * self.time), np.sin(turn * self.time) / turn
         columns = np.exp(-decay * self.time)[:, None] * np.stack([cosine + decay * sine, sine], axis=1)
-        rows = np.concatenate([columns / NOISE, np.diag(1.0 / self.spread)])
-        right = np.concatenate([self.reading / NOISE, self.start / self.spread])
+        rows = np.concatenate([columns / self.noise, np.diag(1.0 / self.spread)])
+        right = np.concatenate([self.reading / self.noise, self.start / self.spread])
         return float(np.sum((right - rows @ np.linalg.lstsq(rows, right)[0]) ** 2))
 
     def lowest(self, damping: float) -> float:
@@ -48,20 +49,18 @@ class Decay(NamedTuple):
         )
 
 
-@pytest.fixture(scope="session")
-def decay(tmp_path_factory) -> Decay:
-    """The fit of a spring and a damper to 6 s of it."""
-    folder = tmp_path_factory.mktemp("decay")
+def _decay(folder: Path, noise: float) -> Decay:
+    """Fit a spring and a damper to 6 s of it."""
     time = np.arange(600) / RATE
     rate = 0.5 * DAMPING / MASS
     motion = 2e-3 * np.exp(-rate * time) * np.cos(np.sqrt(STIFFNESS / MASS - rate**2) * time)
-    reading = motion + NOISE * np.random.default_rng(3).normal(size=time.size)
+    reading = motion + noise * np.random.default_rng(3).normal(size=time.size)
     np.savez(folder / "decay.npz", force=np.zeros(time.size), displacement=reading)
     (folder / "campaign.toml").write_text(
         f"""
 campaign = {{ title = "decay", mass = {MASS} }}
 input = {{ quantity = "force", column = "force", unit = "N" }}
-output = {{ quantity = "displacement", column = "displacement", unit = "m", noise = {NOISE} }}
+output = {{ quantity = "displacement", column = "displacement", unit = "m", noise = {noise} }}
 sampling = {{ rate = {RATE} }}
 model = {{ stiffness = ["linear"], damping = ["linear"] }}
 
@@ -70,9 +69,20 @@ file = "decay.npz"
 role = "fit"
 """
     )
-    campaign = ij.read_campaign(folder)
     laws = (ij.LinearStiffness(STIFFNESS), ij.LinearDamping(DAMPING))
-    fit = ij.fit(ij.Isolator(MASS, laws), campaign)
+    fit = ij.fit(ij.Isolator(MASS, laws), ij.read_campaign(folder))
     simulator = fit.estimate.simulator
     starts = simulator.starts(fit.model, simulator.prepared(fit.model, 2))
-    return Decay(fit, time, reading, *(rows[:, 0] for rows in starts))
+    return Decay(fit, noise, time, reading, *(rows[:, 0] for rows in starts))
+
+
+@pytest.fixture(scope="session")
+def decay(tmp_path_factory) -> Decay:
+    """Under so much noise that intervals are curved."""
+    return _decay(tmp_path_factory.mktemp("decay"), 8e-4)
+
+
+@pytest.fixture(scope="session")
+def sharp_decay(tmp_path_factory) -> Decay:
+    """Under so little noise that they are straight."""
+    return _decay(tmp_path_factory.mktemp("sharp_decay"), 2e-5)

@@ -14,8 +14,8 @@ DAMPER, SPRING = "linear_damping.coefficient", "linear_stiffness.coefficient"
 @pytest.fixture(scope="module")
 def found(decay):
     said = []
-    answer = ij.posterior(decay.fit, draws=400, seed=4, progress=said.append)
-    assert said[-1] == "1200 of 1200 draws"
+    answer = ij.posterior(decay.fit, draws=120, seed=4, progress=said.append)
+    assert said[-1] == "440 of 440 draws"
     assert said[-1].done == 1.0
     return answer
 
@@ -30,14 +30,30 @@ def test_the_draws_have_the_moments_of_quadrature(decay, found):
     spread = np.sqrt(weight @ (values - mean) ** 2)
     place = [one.name for one in found.coefficients].index(DAMPER)
     error = spread / np.sqrt(found.effective_draws[place])
-    assert found.effective_draws[place] > 200.0
+    assert found.effective_draws[place] > 60.0
     assert found.mean[place] == pytest.approx(mean, abs=4.0 * error)
     assert found.standard_error[place] == pytest.approx(
         spread, rel=4.0 / np.sqrt(found.effective_draws[place])
     )
     assert np.all(found.r_hat < 1.05)
     assert found.divergent == 0
-    assert "2 chains of 400 draws" in repr(found)
+    assert "2 chains of 120 draws" in repr(found)
+
+
+def test_the_likelihood_is_that_of_the_closed_form(decay):
+    fit = decay.fit
+    likelihood = Likelihood(fit.estimate)
+    damper, spring = (fit.parameters[name] for name in (DAMPER, SPRING))
+
+    def both(a, b):
+        one, other = damper.value + a * damper.standard_error, spring.value + b * spring.standard_error
+        values = np.array([{DAMPER: one, SPRING: other}[name] for name in fit.free])
+        return likelihood(values)[0], -0.5 * decay.chi2(one, other)
+
+    at_fit = both(0.0, 0.0)
+    for place in ((1.0, 0.0), (-1.5, 1.0), (2.0, 2.0)):
+        found, expected = np.subtract(both(*place), at_fit)
+        assert found == pytest.approx(expected, abs=0.01)
 
 
 def test_the_gradient_is_the_slope_of_the_likelihood(decay):

@@ -6,7 +6,10 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2 as chi2_law
 
 import isojax as ij
+from isojax.inference import _profile
+from isojax.inference._profile import _Held, _walk
 
+BOUND = "the bound of the coefficient is reached before chi2 has risen."
 DAMPER, SPRING = "linear_damping.coefficient", "linear_stiffness.coefficient"
 
 
@@ -41,31 +44,47 @@ def test_each_point_is_the_best_that_the_others_can_make_of_it(decay, damping):
     assert np.all(np.diff(damping.root) > 0.0)
 
 
-def test_a_straight_profile_is_the_interval_of_the_delta_method(decay):
-    # The spring of a decay is its frequency: the phase grows in proportion to it.
-    found = ij.profile(decay.fit, SPRING, confidence=0.68)
-    width = float(np.diff(found.symmetric)[0])
-    np.testing.assert_allclose(found.interval, found.symmetric, atol=0.01 * width)
-    np.testing.assert_allclose(found.root, (found.values - found.value) / found.standard_error, atol=0.02)
+@pytest.mark.parametrize("name", [SPRING, DAMPER])
+def test_a_straight_profile_is_the_interval_of_the_delta_method(sharp_decay, name):
+    found = ij.profile(sharp_decay.fit, name)
+    np.testing.assert_allclose(found.interval, found.symmetric, atol=5e-3 * np.diff(found.symmetric)[0])
+    straight = (found.values - found.value) / found.standard_error
+    np.testing.assert_allclose(found.root, straight, atol=0.02)
 
 
-def test_a_bound_ends_the_interval_and_is_named(decay):
-    # So sure that the damper is almost nothing: a fit of the last second, where only noise is left.
-    fit = decay.fit
-    wide = fit._replace(
-        estimate=fit.estimate._replace(
-            uncertainty=fit.estimate.uncertainty._replace(
-                standard_error=40.0 * fit.estimate.uncertainty.standard_error
-            )
-        )
+def walk(root, room=np.inf, fails_beyond=np.inf):
+    """Go out along a profile that is known in closed form."""
+
+    def hold(away, near):
+        result = ij.RESULTS.not_finite if away > fails_beyond else ij.RESULTS.successful
+        return _Held(away, root(away), near), result
+
+    return _walk(_Held(0.0, 0.0, None), hold, 1.0, 1.96, room)
+
+
+def test_the_walk_ends_where_a_known_profile_does():
+    straight = walk(lambda away: away)
+    assert straight.end == pytest.approx(1.96)
+    assert len(straight.points) == 3
+    assert straight.reason == ""
+    assert walk(lambda away: away + 0.3 * away**2).end == pytest.approx(
+        (np.sqrt(3.352) - 1.0) / 0.6, rel=2e-3
     )
-    found = ij.profile(wide, DAMPER)
-    print(found, found.values, found.root)
-    assert found.interval[0] == 0.0
-    assert found.reasons[0] == (
-        "The lower end: the bound of the coefficient is reached before chi2 has risen."
-    )
-    assert found.reasons[0] in repr(found)
+    assert walk(lambda away: 4.0 * np.tanh(away / 8.0)).end == pytest.approx(8.0 * np.arctanh(0.49), rel=5e-3)
+
+
+def test_a_walk_that_cannot_go_on_says_why():
+    assert walk(lambda away: away, room=1.5)[1:] == ((), 1.5, BOUND)
+    assert walk(lambda away: away, room=0.0)[1:] == ((), 0.0, BOUND)
+    bent = walk(lambda away: away * (2.0 - away))
+    assert np.isnan(bent.end)
+    assert "another minimum" in bent.reason
+    lost = walk(lambda away: away, fails_beyond=1.5)
+    assert lost.lost == (pytest.approx(1.96),)
+    assert "the search of the others failed. The simulated response left" in lost.reason
+    flat = walk(np.arctan)
+    assert np.isnan(flat.end)
+    assert "not risen enough after 12 points" in flat.reason
 
 
 def test_the_only_free_coefficient_needs_no_search(decay):
@@ -76,21 +95,22 @@ def test_the_only_free_coefficient_needs_no_search(decay):
     assert found.interval[0] < found.value < found.interval[1]
 
 
-def test_a_search_that_fails_is_named_and_has_no_end(decay, monkeypatch):
-    from isojax.inference import _profile
+def test_a_search_that_fails_has_no_end_and_is_in_the_row(decay, monkeypatch):
+    real = _profile.fit_held
 
     def failing(found, name, value, start, search):
         descent = real(found, name, value, start, search)
         away = name is not None and value > decay.fit.parameters["c1"].value
         return descent._replace(result=ij.RESULTS.not_converged) if away else descent
 
-    real = _profile.fit_held
     monkeypatch.setattr(_profile, "fit_held", failing)
     found = ij.profile(decay.fit, "c1")
     assert np.isnan(found.interval[1])
     assert np.isfinite(found.interval[0])
     assert np.isnan(found.root[-1])
-    assert "upper end: the search of the others failed. The search stopped before" in found.reasons[0]
+    assert found.reasons[0].startswith("The upper end: the search of the others failed.")
+    assert "upper end  not found" in repr(found)
+    assert "upper end: the search" in repr(found)
 
 
 def test_what_makes_no_sense_is_refused(decay):

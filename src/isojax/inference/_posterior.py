@@ -17,7 +17,7 @@ from .._types import check_float64
 from ..identification import Coefficient, Fit, as_fit
 from ..identification.fitting import Likelihood
 
-_WARMUP = 200
+_WARMUP = 100
 """Draws of each chain that find the length of a step; the error bars of the fit give its shape."""
 
 _MIXED = 1.05
@@ -144,11 +144,16 @@ def posterior(
     draws).
 
     Example:
-        With the fit of `fit`'s example:
+        A small test on the simulated bench:
 
-        >>> found = ij.posterior(fitted, draws=50)
-        >>> found.draws.shape[:2]
-        (2, 50)
+        >>> from isojax import rig
+        >>> plant = rig.Plant((rig.LinearStiffness(8e5), rig.LinearDamping(2e3)))
+        >>> plan = rig.SteppedSine((30.0,), (4.9, 5.2), 6, ("forward",))
+        >>> laws = ("linear_stiffness", "linear_damping")
+        >>> file = rig.write_campaign("small", plant, plan, 1, "small", rig.Bench(rate=250.0), declared=laws)
+        >>> drawn = ij.posterior(ij.fit(file), draws=20)
+        >>> drawn.draws.shape
+        (2, 20, 2)
     """
     check_float64()
     numpyro = _numpyro()
@@ -170,7 +175,7 @@ def posterior(
     target = _Target(meant)
     kernel = numpyro.infer.NUTS(potential_fn=lambda z: -target.log_density(z), adapt_mass_matrix=False)
     advance = jax.jit(lambda state: kernel.sample(state, (), {}))
-    found = np.empty((chains, draws, len(own)))
+    points = np.empty((chains, draws, len(own)))
     total, cut = chains * (_WARMUP + draws), 0
     for chain, key in enumerate(jax.random.split(jax.random.key(seed), chains)):
         here, there = jax.random.split(key)
@@ -181,8 +186,9 @@ def posterior(
             done = chain * (_WARMUP + draws) + draw + _WARMUP + 1
             progress(Counted(f"{done} of {total} draws", done / total))
             if draw >= 0:
-                found[chain, draw] = target.coefficients(state.z)
+                points[chain, draw] = state.z
                 cut += int(state.diverging)
+    found = np.asarray(jax.vmap(jax.vmap(target.coefficients))(jnp.asarray(points)))
     return Posterior(
         own,
         found,

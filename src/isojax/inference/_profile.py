@@ -11,8 +11,9 @@ from scipy.special import ndtri
 
 from .._parameters import find_parameter, list_parameters
 from .._progress import silent
+from .._quantities import typeset_unit
 from .._results import RESULTS, is_successful
-from .._show import Row, amount, shown
+from .._show import Row, amount, number, shown
 from .._types import check_float64
 from ..identification import Coefficient, Fit, Rules
 from ..identification.fitting import DEFAULT_SOLVER, Point, as_fit, fit_held, invert_information, search_of
@@ -69,16 +70,18 @@ class Profile(NamedTuple):
         return np.array([self.value - spread, self.value + spread])
 
     def _headline(self) -> str:
-        low, high = (amount(float(end), self.unit) for end in self.interval)
-        return f"{self.name}, {self.confidence:.0%} interval {low} to {high}"
+        low, high = (number(float(end)) for end in self.interval)
+        return f"{self.name}, {self.confidence:.0%} interval {low} to {high} {typeset_unit(self.unit)}"
 
     def _rows(self) -> list[Row]:
         spread = _quantile(self.confidence) * self.standard_error
         rows = [Row("value", amount(self.value, self.unit, self.standard_error), "of the fit")]
         for word, end, other in zip(("lower end", "upper end"), self.interval, self.symmetric, strict=True):
             away = (float(end) - float(other)) / spread
-            beside = f"symmetric {amount(float(other), self.unit)}, {away:+.1%} of the half-width"
-            rows.append(Row(word, amount(float(end), self.unit), beside))
+            found = math.isfinite(away)
+            beside = f"symmetric {amount(float(other), self.unit)}"
+            beside += f", off by {away:+.1%} of the half-width" if found else ""
+            rows.append(Row(word, amount(float(end), self.unit) if found else "not found", beside))
         return [*rows, Row("points", str(self.values.size), "at which the others were fitted anew")]
 
     def _lines(self) -> list[str]:

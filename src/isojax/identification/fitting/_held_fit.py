@@ -1,5 +1,7 @@
 """The best fit with one coefficient held at a given value."""
 
+from typing import Any
+
 from ..._parameters import list_parameters, replace_parameters
 from ..._results import RESULTS
 from ._descent import Descent, descend
@@ -32,4 +34,5 @@ def fit_held(found: Estimate, name: str | None, value: float, start: Point, sear
         sizes = magnitudes(model, others, search.scales)
         return descend(found.simulator, model, others, sizes, start.nuisances, search)
     point = best_nuisances(found.simulator, model, start.nuisances.spread, start.nuisances)
-    return Descent(point, RESULTS.successful if point.is_finite else RESULTS.not_finite, 1)
+    result: Any = RESULTS.successful if point.is_finite else RESULTS.not_finite
+    return Descent(point, result, 1)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import block_diag
-from scipy.special import logsumexp, ndtr, ndtri, softmax
+from scipy.special import ndtr, ndtri
 
 from ..jacobian import STIFFNESS_SCALE_UNIT
 from ._covariance import Uncertainty, find_determined, invert_information, unknown
@@ -178,7 +178,8 @@ def log_likelihood(
     records = _with_scales(reduced, nuisances, np.eye(matrix.shape[0] - 1), inflation)
     whole, logarithm = _scattered(records, _SCATTERS)
     logarithm = logarithm - 0.5 * whole[:, -1, -1]
-    return float(logsumexp(logarithm)), softmax(logarithm) @ whole[:, :-1, -1]
+    weight = np.exp(logarithm - logarithm.max())
+    return float(logarithm.max() + np.log(weight.sum())), weight / weight.sum() @ whole[:, :-1, -1]
 
 
 def _half_width(
