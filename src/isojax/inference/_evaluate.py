@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from .._progress import Counted, silent
 
-_CHUNK = 1024
+_POINTS_AT_ONCE = 1024
 """Points at once: more run hardly faster, and a thousand orbits with their paths take some hundred MB."""
 
 
@@ -30,7 +30,7 @@ def evaluate(
     Returns:
         What the function gives, as NumPy arrays, point first.
     """
-    mapped, lanes = jax.jit(jax.vmap(function)), min(_CHUNK, len(points))
+    mapped, lanes = jax.jit(jax.vmap(function)), min(_POINTS_AT_ONCE, len(points))
     parts: list[Any] = []
     for begin in range(0, len(points), lanes):
         some = points[begin : begin + lanes]

@@ -18,14 +18,14 @@ from .._types import check_float64
 from ..identification import Coefficient, Fit, Rules
 from ..identification.fitting import DEFAULT_SOLVER, Point, as_fit, fit_held, invert_information, search_of
 
-_TOLERANCE = 1e-4
+_STILL_GAINED = 1e-4
 """Decrease of chi2, per max(chi2/dof, 1), below which a search is over: an end of the interval is then off
 by less than a thousandth of a standard error."""
 
 _CLOSE = 5e-3
 """Share of its distance to the value within which an end is approached before it is interpolated."""
 
-_MOST_POINTS = 12
+_MOST_HELD = 12
 """Points on either side at most: a straight profile needs two."""
 
 _LONGEST_STEP = 4.0
@@ -160,7 +160,7 @@ def profile(
     one = _coefficient(meant, name)
     estimate = meant.estimate
     search = search_of(meant.campaign, Rules(), DEFAULT_SOLVER, silent)
-    search = search._replace(tolerance=_TOLERANCE)
+    search = search._replace(tolerance=_STILL_GAINED)
     lowest = fit_held(estimate, None, one.value, estimate.point, search).point
     place = meant.free.index(one.name)
     unit_variance = invert_information(lowest.reduced.matrix[:-1, :-1]).covariance[place, place]
@@ -225,7 +225,7 @@ def _walk(
     points, lost = [start], float("nan")
     if not room > 0.0:
         return _Side(points, (), 0.0, at_bound)
-    for _ in range(_MOST_POINTS):
+    for _ in range(_MOST_HELD):
         away = min(_next_distance(points, spread, quantile), room)
         near = min(points, key=lambda one: abs(one.away - away))
         held, result = hold(away, near.point)
@@ -239,7 +239,7 @@ def _walk(
             return _Side(points, (), room, at_bound)
         if abs(held.root - quantile) < _CLOSE * quantile:
             return _Side(points, (), _distance_at(points, quantile), "")
-    return _Side(points, (), lost, f"chi2 has not risen enough after {_MOST_POINTS} points.")
+    return _Side(points, (), lost, f"chi2 has not risen enough after {_MOST_HELD} points.")
 
 
 def _next_distance(points: list[_Held], spread: float, quantile: float) -> float:
