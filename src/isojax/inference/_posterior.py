@@ -17,9 +17,6 @@ from .._types import check_float64
 from ..identification import Coefficient, Fit, as_fit
 from ..identification.fitting import Likelihood
 
-_WARMUP = 100
-"""Draws of each chain that find the length of a step; the error bars of the fit give its shape."""
-
 _MIXED = 1.05
 """Ratio of Gelman and Rubin up to which chains count as one: the draws are then good for an interval."""
 
@@ -108,6 +105,7 @@ def posterior(
     fit: object,
     *,
     draws: int = 500,
+    warmup: int = 100,
     chains: int = 2,
     confidence: float = 0.95,
     seed: int = 0,
@@ -124,7 +122,8 @@ def posterior(
 
     Args:
         fit: a fit, or what ends with one: an extension, a closed loop.
-        draws: of each chain.
+        draws: of each chain, after its warm-up.
+        warmup: draws of each chain that find the length of a step; the error bars of the fit give its shape.
         chains: started apart, one after the other; two at least, because one cannot show that it is lost.
         confidence: chance that an interval is to hold the truth.
         seed: of the draws.
@@ -135,8 +134,8 @@ def posterior(
 
     Raises:
         ImportError: if NumPyro is not installed.
-        ValueError: if the fit failed, its data do not determine a coefficient, or `draws`, `chains` or
-            `confidence` is out of range.
+        ValueError: if the fit failed, its data do not determine a coefficient, or `draws`, `warmup`,
+            `chains` or `confidence` is out of range.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Hoffman & Gelman 2014, J. Mach. Learn. Res. 15:1593 (NUTS); Phan, Pradhan & Jankowiak 2019,
@@ -151,7 +150,7 @@ def posterior(
         >>> plan = rig.SteppedSine((30.0,), (4.9, 5.2), 6, ("forward",))
         >>> laws = ("linear_stiffness", "linear_damping")
         >>> file = rig.write_campaign("small", plant, plan, 1, "small", rig.Bench(rate=250.0), declared=laws)
-        >>> drawn = ij.posterior(ij.fit(file), draws=20)
+        >>> drawn = ij.posterior(ij.fit(file), draws=20, warmup=20)
         >>> drawn.draws.shape
         (2, 20, 2)
     """
@@ -160,7 +159,7 @@ def posterior(
     meant = as_fit(fit)
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
-    for argument, count, least in (("draws", draws, 10), ("chains", chains, 2)):
+    for argument, count, least in (("draws", draws, 10), ("warmup", warmup, 10), ("chains", chains, 2)):
         if count < least:
             raise ValueError(f"Argument `{argument}` must be at least {least}, but is {count}.")
     if not is_successful(meant.result):
@@ -176,14 +175,14 @@ def posterior(
     kernel = numpyro.infer.NUTS(potential_fn=lambda z: -target.log_density(z), adapt_mass_matrix=False)
     advance = jax.jit(lambda state: kernel.sample(state, (), {}))
     points = np.empty((chains, draws, len(own)))
-    total, cut = chains * (_WARMUP + draws), 0
+    total, cut = chains * (warmup + draws), 0
     for chain, key in enumerate(jax.random.split(jax.random.key(seed), chains)):
         here, there = jax.random.split(key)
         start = jax.random.normal(there, (len(own),))
-        state = kernel.init(here, _WARMUP, start, (), {})
-        for draw in range(-_WARMUP, draws):
+        state = kernel.init(here, warmup, start, (), {})
+        for draw in range(-warmup, draws):
             state = advance(state)
-            done = chain * (_WARMUP + draws) + draw + _WARMUP + 1
+            done = chain * (warmup + draws) + draw + warmup + 1
             progress(Counted(f"{done} of {total} draws", done / total))
             if draw >= 0:
                 points[chain, draw] = state.z
