@@ -62,14 +62,14 @@ class GlobalSensitivity(NamedTuple):
 
     def _headline(self) -> str:
         lost = f", {len(self.failed_at)} failed" if len(self.failed_at) else ""
-        return f"share of the variance by each of {len(self.inputs)} inputs, {self.samples} samples{lost}"
+        return f"first and total index of {len(self.inputs)} inputs, {self.samples} samples{lost}"
 
     def _rows(self) -> list[Row]:
         return [
             Row(
                 name,
-                f"alone {_words(self.first[place], self.first_interval[:, place])}",
-                f"with interactions {_words(self.total[place], self.total_interval[:, place])}",
+                _words(self.first[place], self.first_interval[:, place]),
+                f"total {_words(self.total[place], self.total_interval[:, place])}",
             )
             for place, name in enumerate(self.inputs)
         ]

@@ -80,13 +80,13 @@ class Posterior(NamedTuple):
             Row(
                 one.name,
                 amount(float(mean), one.unit, float(error)),
-                f"{low:.5g} to {high:.5g}, spread {error / one.standard_error:.2f} of the fit's",
+                f"{low:.5g} to {high:.5g} (× {error / one.standard_error:.2f})",
             )
             for one, mean, error, low, high in numbers
         ]
 
     def _lines(self) -> list[str]:
-        lines = []
+        lines = ["In brackets: the standard deviation over the standard error of the fit."]
         if not np.all(self.r_hat < _MIXED):
             worst = self.coefficients[int(np.argmax(self.r_hat))].name
             lines.append(
