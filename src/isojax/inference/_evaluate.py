@@ -41,7 +41,8 @@ def evaluate(
         except jax.errors.JAXTypeError:
             mapped = _one_by_one(function)
             part = mapped(filled)
-        parts.append(part)
+        # As NumPy arrays, so that no chunk begins, and no line is said, before the one before is done.
+        parts.append(jax.tree.map(np.asarray, part))
         done = begin + len(some)
         progress(Counted(f"{done} of {len(points)} samples", done / len(points)))
     return jax.tree.map(lambda *values: np.concatenate(values)[: len(points)], *parts)
