@@ -19,7 +19,7 @@ README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 SCRIPTS = re.findall(r"^## ([^\n]+)\n+```python\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 
 JOURNEY = """
-    read_campaign classical_guess fit load_fit uncertainty residual explain_remainder diagnose extend
+    read_campaign classical_guess fit load_fit uncertainty profile residual explain_remainder diagnose extend
     find_separating_experiment close_loop
 """.split()
 """Examples that go on with what the one before has made, so that one test runs them in a row."""
@@ -43,6 +43,7 @@ def test_a_script_of_readme_runs_by_itself(title, script, tmp_path, monkeypatch,
 def documented():
     """Public functions and classes; result codes need no example."""
     shown = {name: getattr(ij, name) for name in dir(ij) if name != "RESULTS"}
+    shown |= {name: one for name, one in vars(ij.inference).items() if inspect.isfunction(one)}
     return {name: one for name, one in shown.items() if inspect.isfunction(one) or inspect.isclass(one)}
 
 

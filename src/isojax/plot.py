@@ -19,8 +19,11 @@ from .reporting.plots import plot_fold_curve as fold_curve
 from .reporting.plots import plot_force_residual_loops as force_residual_loops
 from .reporting.plots import plot_force_residual_map as force_residual_map
 from .reporting.plots import plot_frequency_response as frequency_response
+from .reporting.plots import plot_global_sensitivity as global_sensitivity
 from .reporting.plots import plot_inspection as inspection
 from .reporting.plots import plot_phase_portrait as phase_portrait
+from .reporting.plots import plot_posterior as posterior
+from .reporting.plots import plot_profile as profile
 from .reporting.plots import plot_ranking as ranking
 from .reporting.plots import plot_receptance as receptance
 from .reporting.plots import plot_record as record

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from scipy.stats import halfcauchy, norm
 
 from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate
-from isojax.identification.fitting._scatter_mixture import integrate_scatter
+from isojax.identification.fitting._scatter_mixture import integrate_scatter, log_likelihood
 
 UNIT = 1e-3
 """One unit of a stiffness scale's column: a tenth of a percent."""
@@ -93,6 +93,28 @@ def test_what_the_data_do_not_determine_is_named_and_spoils_nothing_else():
     assert found.determined.tolist() == [True, False, False]
     assert found.standard_error[0] == pytest.approx(fewer.standard_error[0], rel=1e-6)
     assert np.isnan(found.standard_error[1:]).all()
+
+
+@pytest.mark.parametrize("spread", [1e-5, 2e-3], ids=["steady", "loose"])
+def test_the_likelihood_of_a_mean_is_that_of_quadrature(spread):
+    readings, noise, columns = np.array([-0.4, 0.9, 0.3]), 0.2, np.full((3, 1, 1), 5.0)
+
+    def found(mean):
+        equations = reduced_of(columns, columns[..., 0], (readings - mean)[:, None] / noise, spread)
+        return log_likelihood(*equations, 1.0, True)
+
+    def expected(mean):
+        def density(logarithm):
+            scatter = np.exp(logarithm)
+            chances = norm.pdf(readings, mean, np.hypot(noise, scatter))
+            return np.prod(chances) * halfcauchy.pdf(scatter * UNIT, scale=PRIOR) * scatter
+
+        return np.log(quad(density, np.log(1e-4), np.log(300.0), limit=400)[0])
+
+    for mean in (0.0, 1.0):
+        assert found(mean)[0] - found(0.3)[0] == pytest.approx(expected(mean) - expected(0.3), abs=2e-3)
+    slope = (expected(0.7 + 1e-4) - expected(0.7 - 1e-4)) / 2e-4
+    assert found(0.7)[1][0] == pytest.approx(slope, rel=5e-3)
 
 
 @pytest.mark.parametrize("count", [2, 4])

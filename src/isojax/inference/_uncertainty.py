@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -12,6 +11,7 @@ from scipy.special import ndtri
 from .._show import Row, brief, shown
 from .._types import check_float64
 from ..models import EndsEstimated, Estimated, Isolator, coefficient_errors
+from ._evaluate import evaluate
 
 _BEND = 0.1
 """Share of an interval by which delta method and draws may differ."""
@@ -113,7 +113,7 @@ def uncertainty(
             f"{brief(value)}."
         )
     value, error = jnp.asarray(value, dtype=float), jnp.linalg.norm(change, axis=-1)
-    drawn = _quantity_at(at, errors.draw(draws, seed))
+    drawn = np.asarray(evaluate(at, errors.draw(draws, seed)), dtype=float)
     finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
     if not finite.any():
         raise ValueError(
@@ -133,12 +133,3 @@ def uncertainty(
         drawn,
         float(1.0 - finite.mean()),
     )
-
-
-def _quantity_at(
-    at: Callable[[Float[Array, " coefficient"]], Array], steps: Float[np.ndarray, "draw coefficient"]
-) -> Float[np.ndarray, "draw ..."]:
-    try:
-        return np.asarray(jax.jit(jax.vmap(at))(jnp.asarray(steps)), dtype=float)
-    except jax.errors.JAXTypeError:
-        return np.stack([np.asarray(at(jnp.asarray(step)), dtype=float) for step in steps])

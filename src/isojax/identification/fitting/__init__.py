@@ -30,9 +30,11 @@ from ._fit import complete as complete
 from ._fit import fit as fit
 from ._fit_result import Fit as Fit
 from ._fit_result import fit_report as fit_report
+from ._held_fit import fit_held as fit_held
 from ._initial_states import best_nuisances as best_nuisances
 from ._lack_of_fit import LackOfFit as LackOfFit
 from ._lack_of_fit import lack_of_fit as lack_of_fit
+from ._likelihood import Likelihood as Likelihood
 from ._multiple_shooting import fit_by_multiple_shooting as fit_by_multiple_shooting
 from ._output_units import OUTPUT_UNITS as OUTPUT_UNITS
 from ._output_units import plain_unit as plain_unit

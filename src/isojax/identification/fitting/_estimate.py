@@ -83,6 +83,16 @@ class Estimate(NamedTuple):
         return self.chi2 + float(np.sum(self.point.reduced.eliminated))
 
     @property
+    def inflation(self) -> float:
+        """Factor on the squared noise in error bars: max(1, chi2/dof)."""
+        return max(1.0, self.chi2 / self.dof)
+
+    @property
+    def shows_scatter(self) -> bool:
+        """Whether error bars allow for a scatter of the stiffness; a single record shows none."""
+        return has_stiffness_scale(self.model) and self.point.samples.size > 1
+
+    @property
     def excess(self) -> float:
         """What the model leaves unexplained beyond the noise: chi2 - dof."""
         return self.chi2 - self.dof
@@ -252,17 +262,16 @@ def estimate(
             again = search._replace(rival=None)
             found = descend(simulator, found.point.model, places, sizes, settled, again)
             steps += found.steps
-    point = found.point
-    errors = _uncertainty(point, places, scatters) if is_successful(found.result) else unknown(len(places))
-    return Estimate(point.model, places, simulator, point, errors, found.result, steps)
+    model, nothing = found.point.model, unknown(len(places))
+    whole = Estimate(model, places, simulator, found.point, nothing, found.result, steps)
+    return whole._replace(uncertainty=_uncertainty(whole)) if is_successful(found.result) else whole
 
 
-def _uncertainty(point: Point, places: tuple[int, ...], scatters: bool) -> Uncertainty:
+def _uncertainty(found: Estimate) -> Uncertainty:
     """Give the error bars; a single record shows no scatter and has none in them."""
-    inflation = max(1.0, point.chi2 / max(1.0, point.free_samples - len(places)))
-    if scatters and point.samples.size > 1:
-        return integrate_scatter(point.reduced, point.nuisances, inflation)
-    return invert_information(point.reduced.matrix[:-1, :-1], inflation)
+    if found.shows_scatter:
+        return integrate_scatter(found.point.reduced, found.point.nuisances, found.inflation)
+    return invert_information(found.point.reduced.matrix[:-1, :-1], found.inflation)
 
 
 def _start(simulator: Simulator, model: Isolator, nuisances: Nuisances | None, spread: Spread) -> Nuisances:

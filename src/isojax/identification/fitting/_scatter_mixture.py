@@ -120,23 +120,69 @@ def _with_scales(
     return _Records(turn.T @ left @ turn / inflation, row @ turn / inflation, own / inflation, deviation)
 
 
-def _at(records: _Records, scatters: Float[np.ndarray, " scatter"]) -> _Mixture:
-    """Give weight, step and covariance at each scatter."""
+class _Scattered(NamedTuple):
+    """The records' equations at each scatter, their scales eliminated.
+
+    Attributes:
+        whole: normal equations of the coefficients, residual last.
+        logarithm: of the prior of the scatter, per logarithm of it because the grid is even in that, and of
+            the volume of the scales.
+    """
+
+    whole: Float[np.ndarray, "scatter column column"]
+    logarithm: Float[np.ndarray, " scatter"]
+
+
+def _scattered(records: _Records, scatters: Float[np.ndarray, " scatter"]) -> _Scattered:
+    """Give the equations at each scatter."""
     tight = (STIFFNESS_SCALE_UNIT / scatters[:, None]) ** 2
     pivot = records.own + tight
     row = np.repeat(records.row[None], scatters.size, axis=0)
     row[..., -1] -= records.deviation * tight
     whole = records.left.sum(axis=0) - np.einsum("tr,tri,trj->tij", 1.0 / pivot, row, row)
     whole[:, -1, -1] += np.sum(records.deviation**2 * tight, axis=1)
+    prior = np.log(scatters) - np.log1p((scatters / SCATTER_PRIOR) ** 2)
+    return _Scattered(whole, prior - 0.5 * np.sum(np.log(pivot / tight), axis=1))
+
+
+def _at(records: _Records, scatters: Float[np.ndarray, " scatter"]) -> _Mixture:
+    """Give weight, step and covariance at each scatter."""
+    whole, logarithm = _scattered(records, scatters)
     score = whole[:, :-1, -1]
     covariance = np.linalg.inv(whole[:, :-1, :-1])
     step = np.einsum("tij,tj->ti", covariance, score)
     chi2 = whole[:, -1, -1] - np.sum(step * score, axis=1)
-    volume = np.sum(np.log(pivot / tight), axis=1) + np.linalg.slogdet(whole[:, :-1, :-1])[1]
-    # Per logarithm of the scatter, because the grid is even in it.
-    logarithm = np.log(scatters) - np.log1p((scatters / SCATTER_PRIOR) ** 2) - 0.5 * (chi2 + volume)
+    logarithm = logarithm - 0.5 * (chi2 + np.linalg.slogdet(whole[:, :-1, :-1])[1])
     weight = np.exp(logarithm - logarithm.max())
     return _Mixture(weight / weight.sum(), step, covariance)
+
+
+def log_likelihood(
+    reduced: Reduced, nuisances: Nuisances, inflation: float, scatters: bool
+) -> tuple[float, Float[np.ndarray, " column"]]:
+    """Give the logarithm of the likelihood of coefficients, over all scatters, with its gradient.
+
+    `log sum p(t) exp(-chi2(t) / 2)`, with p the prior of the scatter and the volume of the records' scales;
+    the gradient is J'r at each scatter, weighted alike. Where the equations stand still for another step of
+    the nuisances the gradient is exact.
+
+    Args:
+        reduced: equations at these coefficients.
+        nuisances: that the equations are about.
+        inflation: factor on the squared noise: max(1, chi2/dof) of the fit.
+        scatters: whether the records tell a scatter of the stiffness, which is then summed over.
+
+    Returns:
+        Both, up to a constant; not finite where the equations are not.
+    """
+    matrix = reduced.matrix
+    if not scatters or not np.all(np.isfinite(matrix)):
+        return -0.5 * float(matrix[-1, -1]) / inflation, matrix[:-1, -1] / inflation
+    records = _with_scales(reduced, nuisances, np.eye(matrix.shape[0] - 1), inflation)
+    whole, logarithm = _scattered(records, _SCATTERS)
+    logarithm = logarithm - 0.5 * whole[:, -1, -1]
+    weight = np.exp(logarithm - logarithm.max())
+    return float(logarithm.max() + np.log(weight.sum())), weight / weight.sum() @ whole[:, :-1, -1]
 
 
 def _half_width(

@@ -17,6 +17,8 @@ from ._classical_plots import centre_frequency as centre_frequency
 from ._classical_plots import plot_equivalent as plot_equivalent
 from ._classical_plots import plot_receptance as plot_receptance
 from ._classical_plots import visited_amplitudes as visited_amplitudes
+from ._coefficient_plots import plot_posterior as plot_posterior
+from ._coefficient_plots import plot_profile as plot_profile
 from ._dwell_stability_plots import plot_dwell_stability as plot_dwell_stability
 from ._evidence_plots import plot_errors as plot_errors
 from ._evidence_plots import plot_ranking as plot_ranking
@@ -29,6 +31,7 @@ from ._force_plots import measured_forces as measured_forces
 from ._force_plots import plot_effect as plot_effect
 from ._force_plots import plot_restoring_force as plot_restoring_force
 from ._force_plots import telling_slice as telling_slice
+from ._global_sensitivity_plot import plot_global_sensitivity as plot_global_sensitivity
 from ._inspection_plot import plot_inspection as plot_inspection
 from ._map_plots import plot_response_map as plot_response_map
 from ._map_plots import plot_stability_map as plot_stability_map

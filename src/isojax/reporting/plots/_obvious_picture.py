@@ -18,6 +18,7 @@ from ...identification import (
     Residual,
     Verdict,
 )
+from ...inference import GlobalSensitivity, Posterior, Profile
 from ...models import Simulation
 from ...records import Campaign
 from ...stability import (
@@ -37,8 +38,10 @@ from ...stability import (
 from ._attractor_plots import plot_basins, plot_bifurcation_diagram, plot_phase_portrait, plot_return
 from ._branch_plots import plot_backbone, plot_branch, plot_frequency_response, plot_transmissibility
 from ._classical_plots import plot_receptance
+from ._coefficient_plots import plot_posterior, plot_profile
 from ._evidence_plots import plot_ranking
 from ._fold_curve_plot import plot_fold_curve
+from ._global_sensitivity_plot import plot_global_sensitivity
 from ._map_plots import plot_stability_map
 from ._record_plot import plot_record
 from ._remainder_plots import plot_force_residual_map, plot_remainder_map
@@ -95,9 +98,12 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     FoldCurve: plot_fold_curve,
     ForceMap: plot_force_residual_map,
     FrequencyResponse: plot_frequency_response,
+    GlobalSensitivity: plot_global_sensitivity,
     Loop: plot_time_history,
     Orbit: _orbit,
     PhasePortrait: plot_phase_portrait,
+    Posterior: plot_posterior,
+    Profile: plot_profile,
     Remainder: _remainder,
     Residual: plot_correlation,
     ReturnToOrbit: plot_return,

@@ -130,3 +130,15 @@ def entitle(ax: Axes, title: str, handles: Sequence[Artist] | None = None) -> No
             frameon=False,
         )
     ax.set_title("\n".join(lines), fontsize=9.5, loc="left", pad=6.0 + rows * _LEGEND_ROW)
+
+
+def parameter_words(name: str) -> str:
+    """Give the name of a parameter as an axis shows it.
+
+    Args:
+        name: such as "linear_stiffness.coefficient".
+
+    Returns:
+        Such as "linear stiffness".
+    """
+    return name.removesuffix(".coefficient").replace("_", " ").replace(".", ", ")
