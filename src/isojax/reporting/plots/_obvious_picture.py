@@ -14,10 +14,12 @@ from ...identification import (
     Fit,
     ForceMap,
     Loop,
+    NextTest,
     Remainder,
     Residual,
     Verdict,
 )
+from ...inference import Design
 from ...models import Simulation
 from ...records import Campaign
 from ...stability import (
@@ -37,6 +39,7 @@ from ...stability import (
 from ._attractor_plots import plot_basins, plot_bifurcation_diagram, plot_phase_portrait, plot_return
 from ._branch_plots import plot_backbone, plot_branch, plot_frequency_response, plot_transmissibility
 from ._classical_plots import plot_receptance
+from ._design_plots import plot_design, plot_next_test
 from ._evidence_plots import plot_ranking
 from ._fold_curve_plot import plot_fold_curve
 from ._map_plots import plot_stability_map
@@ -89,6 +92,7 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     Branch: plot_branch,
     Campaign: _record,
     ClassicalGuess: plot_receptance,
+    Design: plot_design,
     Extension: plot_time_history,
     Finding: plot_ranking,
     Fit: plot_time_history,
@@ -96,6 +100,7 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     ForceMap: plot_force_residual_map,
     FrequencyResponse: plot_frequency_response,
     Loop: plot_time_history,
+    NextTest: plot_next_test,
     Orbit: _orbit,
     PhasePortrait: plot_phase_portrait,
     Remainder: _remainder,
