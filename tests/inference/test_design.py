@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.stats import norm
 
 import isojax as ij
@@ -29,23 +29,18 @@ class Uncertain(NamedTuple):
     result: ij.RESULTS = ij.RESULTS.successful
 
 
-def test_the_stiffest_spring_below_a_curve_of_transmissibility_is_that_of_the_closed_form():
+def test_the_stiffest_spring_that_keeps_the_motion_small_is_that_of_the_closed_form():
+    """Of a drive above resonance the motion F / |k - m w^2 + i c w| grows with the spring."""
     model = ij.Isolator(800.0, (ij.LinearStiffness(2e5), ij.LinearDamping(4e3)))
-    rates, limit = 2.0 * np.pi * np.array([10.0, 15.0]), np.array([0.5, 0.2])
+    rate, force, limit = 2.0 * np.pi * 10.0, 100.0, 5e-5
 
-    def passed(isolator):
-        return ij.transmissibility(isolator, 10.0, rates / (2.0 * np.pi)).magnitude
-
-    def closed(k, rate):
-        return abs((k + 4e3j * rate) / (k - 800.0 * rate**2 + 4e3j * rate))
+    def motion(isolator):
+        return ij.find_periodic_orbit(isolator, ij.Harmonic(force, 10.0)).amplitude
 
     found = ij.design(
-        model, lambda isolator: -isolator[K], at_most(passed, limit), free={K: (1e5, 1e7)}, scan=8
+        model, lambda isolator: -isolator[K], at_most(motion, limit), free={K: (1e5, 3e6)}, scan=8
     )
-    exact = min(
-        brentq(lambda k, rate=rate, most=most: closed(k, rate) - most, 1e5, 1.9e6)
-        for rate, most in zip(rates, limit, strict=True)
-    )
+    exact = 800.0 * rate**2 - np.sqrt((force / limit) ** 2 - (4e3 * rate) ** 2)
     assert found.values[0] == pytest.approx(exact, rel=1e-5)
     assert ij.is_successful(found.result)
     assert found.outcomes[0].active
@@ -75,7 +70,8 @@ def test_without_an_objective_the_design_is_the_nearest():
     found = ij.design(MODEL, subject_to=at_most(stiffness, 1e6), free={"mass": (600.0, 900.0), **WIDE})
     np.testing.assert_allclose(found.values, [800.0, 1e6], rtol=1e-5)
     assert found.objective == pytest.approx(0.25, rel=1e-5)
-    assert found.objective_before == 0.0
+    assert found.objective_before == pytest.approx(0.0, abs=1e-20)
+    assert ij.is_successful(found.result)
 
 
 def test_a_coefficient_whose_bounds_differ_in_sign_moves_evenly():
@@ -109,6 +105,20 @@ def test_where_the_objective_fails_on_the_way_the_search_goes_back():
     assert found.values[0] == pytest.approx(1.2e6, rel=1e-4)
     assert found.retreats > 0
     assert found.scan.failed > 0
+
+
+def test_a_function_that_raises_on_the_way_has_failed_there_and_one_that_raises_at_once_is_wrong():
+    found = []
+
+    def objective(model):
+        distance = jnp.log(model[K] / 1.2e6) ** 2
+        return found[0] * distance if jax.lax.stop_gradient(model[K]) < 1.15e6 else distance
+
+    reached = ij.design(MODEL, objective, free={K: (1e5, 2.1e6)}, scan=16)
+    assert reached.values[0] == pytest.approx(1.2e6, rel=1e-4)
+    assert reached.retreats > 0
+    with pytest.raises(IndexError):
+        ij.design(MODEL, lambda model: found[0], free=WIDE)
 
 
 def test_where_the_search_cannot_avoid_a_failure_it_says_so():
@@ -157,8 +167,6 @@ def test_mistakes_are_refused():
         ij.design(MODEL, lambda model: jnp.stack([model[K], model[K]]), free=WIDE)
     with pytest.raises(ValueError, match="one limit or one for each of 1"):
         ij.design(MODEL, stiffness, at_most(stiffness, [1e6, 2e6]), free=WIDE)
-    with pytest.raises(ValueError, match="must hold constraints"):
-        ij.design(MODEL, stiffness, (stiffness,), free=WIDE)
     with pytest.raises(ValueError, match="finite numbers"):
         at_most(stiffness, np.nan)
     with pytest.raises(ValueError, match=r"between 0\.5 and 1"):

@@ -1,5 +1,6 @@
 """Coefficients that meet a target, found along exact derivatives and compared with others."""
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -19,6 +20,9 @@ from ._design_space import NotFinite, Quantity, Space, space_of
 
 _RESTARTS = 3
 """Times that the search starts again from a better point of the scan."""
+
+_BESIDE = 0.1
+"""Distance from the start, as a share of the ranges, at which the objective is sized too."""
 
 
 def design(
@@ -152,10 +156,18 @@ def _task(wanted: Quantity, limits: tuple[Quantity, ...], start: np.ndarray) -> 
                 f"Argument `subject_to` must have one limit or one for each of {count} numbers of "
                 f"{one.name}, but has {constraint.limit.size}."
             )
-    slope = first.slope
-    assert slope is not None
-    size = max(abs(float(first.value[0])), float(np.max(np.abs(slope), initial=0.0)))
-    return Task(wanted, limits, size or 1.0)
+    return Task(wanted, limits, _size_of(wanted, start))
+
+
+def _size_of(wanted: Quantity, start: np.ndarray) -> float:
+    """Give the size of the objective, value and slope: at the start, and beside it, where both may vanish."""
+    sizes = [0.0]
+    for at in (start, start + np.where(start > 0.5, -_BESIDE, _BESIDE)):
+        with contextlib.suppress(NotFinite):
+            answer = wanted.at(at)
+            assert answer.slope is not None
+            sizes += [abs(float(answer.value[0])), float(np.max(np.abs(answer.slope)))]
+    return max(sizes) or 1.0
 
 
 def _searched(task: Task, start: np.ndarray, count: int, seed: int) -> tuple[Found, Scan]:

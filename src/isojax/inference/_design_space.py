@@ -19,7 +19,7 @@ _STEP = 1e-4
 
 
 class NotFinite(Exception):
-    """A quantity or its derivative is not finite at a point where a search asked for it."""
+    """A quantity or its derivative is not finite, or not to be had, where a search asked for it."""
 
     def __init__(self, at: Float[np.ndarray, " coordinate"], words: str):
         """Keep the point, and what failed in words."""
@@ -162,16 +162,27 @@ class Quantity:
             The answer.
 
         Raises:
-            NotFinite: if a number is not.
+            NotFinite: if a number is not, or if the function raises what it did not raise elsewhere.
         """
-        key = (at.tobytes(), slopes)
-        if key not in self._known:
+        place = at.tobytes()
+        known = self._known.get((place, True)) or self._known.get((place, slopes))
+        if known is None:
             self.evaluations += 1
-            answer = self._answer(at, slopes)
-            if not all(np.all(np.isfinite(one)) for one in answer if one is not None):
+            known = self._tried(at, slopes)
+            if not all(np.all(np.isfinite(one)) for one in known if one is not None):
                 raise NotFinite(at, f"{self.name} is not finite at {self.space.words(at)}")
-            self._known[key] = answer
-        return self._known[key]
+            self._known[place, slopes] = known
+        return known
+
+    def _tried(self, at: Float[np.ndarray, " coordinate"], slopes: bool) -> Answer:
+        try:
+            return self._answer(at, slopes)
+        except Exception as error:
+            if not self._known:
+                raise
+            # It worked before: a fold that is gone, for one, is no mistake in the function.
+            said = f"{type(error).__name__} {error}".strip()
+            raise NotFinite(at, f"{self.name} raised {said} at {self.space.words(at)}") from error
 
     def _answer(self, at: Float[np.ndarray, " coordinate"], slopes: bool) -> Answer:
         if slopes:
