@@ -23,10 +23,8 @@ from .identification import extend as extend
 from .identification import find_separating_experiment as find_separating_experiment
 from .identification import fit as fit
 from .identification import load_fit as load_fit
-from .identification import next_test as next_test
 from .identification import read_campaign as read_campaign
 from .identification import residual as residual
-from .inference import design as design
 from .inference import uncertainty as uncertainty
 from .models import Integrator as Integrator
 from .models import Isolator as Isolator

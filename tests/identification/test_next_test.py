@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.test_scatter_mixture import PRIOR, UNIT, mean_of, reduced_of
-from isojax import rig
+from isojax import plot, rig
 from isojax.elements import AddedMass, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.identification import fit, next_test
 from isojax.identification.fitting._scatter_mixture import expect_uncertainty
@@ -177,6 +177,17 @@ def test_a_gain_is_separated_from_a_mass_error_by_no_drive_of_a_linear_isolator(
         next_test(heavier, rivals=("coulomb_friction", "input_gain"))
     with pytest.raises(ValueError, match="a name of the catalogue"):
         next_test(heavier, rivals=("added_mass", "gain"))
+
+
+def test_the_picture_has_a_bar_for_each_record_that_could_be_simulated(found):
+    drawn = found.plot().axes[0]
+    widths = [patch.get_width() for patch in drawn.patches]
+    possible = [one.shrinkage for one in found.proposals if not one.reason]
+    np.testing.assert_allclose(widths, possible[: len(widths)])
+    assert len(widths) == min(12, len(possible))
+    assert repr(found).startswith(f"NextTest: {found.best.experiment.words}")
+    with pytest.raises(ValueError, match="could be simulated"):
+        plot.next_test(found._replace(proposals=tuple(one for one in found.proposals if one.reason)))
 
 
 def test_mistakes_are_refused(fitted):

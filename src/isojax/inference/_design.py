@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array
 
 from .._parameters import list_parameters
-from .._results import RESULTS
+from .._results import result_named
 from .._types import check_float64
 from ..models import EndsEstimated, Estimated, Isolator, Modelled, as_isolator, coefficient_errors
 from ._constraint import Constraint
@@ -112,7 +112,7 @@ def design(
             f"Argument `model` must start where all quantities are finite and stay so, but {lost}."
         ) from None
     listed = list_parameters(model)
-    result = RESULTS.successful if found.converged else RESULTS.not_converged
+    ended = "successful" if found.converged else "not_converged"
     return Design(
         space.moved(found.at),
         model,
@@ -123,7 +123,7 @@ def design(
         found.objective,
         before,
         tuple(_outcome(one, found) for one in limits),
-        result if found.feasible else RESULTS.infeasible,
+        result_named(ended if found.feasible else "infeasible"),
         compared,
         sum(one.evaluations for one in (wanted, *limits)),
         found.retreats,
@@ -172,14 +172,16 @@ def _size_of(wanted: Quantity, start: np.ndarray) -> float:
 
 def _searched(task: Task, start: np.ndarray, count: int, seed: int) -> tuple[Found, Scan]:
     """Search, compare with other points, and go on from a better one."""
-    found, retreats = search(task, start), 0
-    for turn in range(_RESTARTS + 1):
-        compared, better = scan_design(task, found, count, seed + turn)
-        if better is None or turn == _RESTARTS:
+    found = search(task, start)
+    compared, better = scan_design(task, found, count, seed)
+    retreats = found.retreats
+    for turn in range(1, _RESTARTS + 1):
+        if better is None:
             break
-        retreats += found.retreats
         found = search(task, better)
-    return found._replace(retreats=found.retreats + retreats), compared
+        compared, better = scan_design(task, found, count, seed + turn)
+        retreats += found.retreats
+    return found._replace(retreats=retreats), compared
 
 
 def _outcome(limit: Quantity, found: Found) -> Outcome:

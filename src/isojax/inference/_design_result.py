@@ -10,7 +10,7 @@ from .._show import Row, amount, number, shown
 from ..models import Isolator
 from ._constraint import Constraint
 from ._design_scan import Scan
-from ._design_search import TOLERANCE, sizes_of
+from ._design_search import ALLOWED_MISS, sizes_of
 
 _ACTIVE = 1e-4
 """Margin over the limit below which a constraint holds the design where it is."""
@@ -43,7 +43,7 @@ class Outcome(NamedTuple):
     @property
     def kept(self) -> bool:
         """Whether every number keeps to its limit."""
-        return bool(np.all(self.margins >= -TOLERANCE * sizes_of(self._limits)))
+        return bool(np.all(self.margins >= -ALLOWED_MISS * sizes_of(self._limits)))
 
     @property
     def active(self) -> bool:

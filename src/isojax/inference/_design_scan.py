@@ -7,7 +7,7 @@ from jaxtyping import Float
 from scipy.stats import qmc
 
 from .._show import shown
-from ._design_search import TOLERANCE, Found, Task, stand
+from ._design_search import ALLOWED_MISS, Found, Task, stand
 from ._design_space import NotFinite
 
 _NEAR = 0.05
@@ -72,7 +72,7 @@ def scan_design(
                 if not value < found.objective - _BETTER * task.size:
                     continue
                 smaller += 1
-                good = stand(task, at)[1] <= TOLERANCE
+                good = stand(task, at)[1] <= ALLOWED_MISS
             else:
                 value = stand(task, at)[1]
                 good = value < found.violation - _BETTER

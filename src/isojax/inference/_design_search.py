@@ -13,16 +13,16 @@ from scipy.optimize import minimize
 
 from ._design_space import Answer, NotFinite, Quantity
 
-TOLERANCE = 1e-6
+ALLOWED_MISS = 1e-6
 """Share of its limit by which a number may miss it."""
 
-_ROUNDS = 30
+_BOXES = 30
 """Boxes that are searched at most."""
 
 _SMALLEST_BOX = 1e-4
 """Half the edge of a box below which a search that keeps failing is given up."""
 
-_CONVERGED = 1e-10
+_LEAST_PROGRESS = 1e-10
 """Change of the scaled objective at which SLSQP stops."""
 
 
@@ -80,7 +80,7 @@ class Found(NamedTuple):
     @property
     def feasible(self) -> bool:
         """Whether every limit is kept."""
-        return self.violation <= TOLERANCE
+        return self.violation <= ALLOWED_MISS
 
 
 def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> Found:
@@ -114,7 +114,7 @@ def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> Found:
 def _in_boxes(task: Task, start: Float[np.ndarray, " coordinate"], elastic: bool) -> Found:
     centre, radius, retreats = start, np.inf, 0
     stand(task, start)
-    for _ in range(_ROUNDS):
+    for _ in range(_BOXES):
         low, high = np.maximum(0.0, centre - radius), np.minimum(1.0, centre + radius)
         try:
             end, converged = _minimise(task, centre, low, high, elastic)
@@ -177,10 +177,10 @@ def _minimise(
 
         constraints = [{"type": "ineq", "fun": margin, "jac": slope}]
     bounds = list(zip(low, high, strict=True))
-    options = {"ftol": _CONVERGED, "maxiter": 200}
+    options = {"ftol": _LEAST_PROGRESS, "maxiter": 200}
     if elastic:
         miss = stand(task, start)[1]
-        first, bounds = np.append(start, miss), [*bounds, (0.0, max(miss, TOLERANCE))]
+        first, bounds = np.append(start, miss), [*bounds, (0.0, max(miss, ALLOWED_MISS))]
         last = np.append(np.zeros(count), 1.0)
         done = minimize(
             lambda unknown: unknown[count],

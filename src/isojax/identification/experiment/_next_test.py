@@ -35,7 +35,7 @@ from ._trial_information import (
     trial_point,
 )
 
-_AT_ONCE = 24
+_SIDE_BY_SIDE = 24
 """Records that are simulated together; fewer are filled up, so that compiled code serves all."""
 
 _TOO_FAR = "it moves farther than argument `farthest` allows"
@@ -140,9 +140,9 @@ def next_test(
     proposals = []
     for _, group in itertools.groupby(candidates, lambda one: one.waveform):
         alike = tuple(group)
-        for first in range(0, len(alike), _AT_ONCE):
+        for first in range(0, len(alike), _SIDE_BY_SIDE):
             proposals += _proposals(
-                asked, outline, alike[first : first + _AT_ONCE], seconds, farthest * largest
+                asked, outline, alike[first : first + _SIDE_BY_SIDE], seconds, farthest * largest
             )
     listed = {entry.name: entry for entry in list_parameters(fit.model)}
     value = np.zeros(0) if quantity is None else np.ravel(np.asarray(quantity(fit.model), dtype=float))
@@ -255,7 +255,7 @@ def _proposals(
     good = np.flatnonzero(made.finite[: len(can)] & ~(reach > farthest))
     point = None
     if good.size:
-        rows = np.resize(good, _AT_ONCE)
+        rows = np.resize(good, _SIDE_BY_SIDE)
         kept = TrialRun(tuple(made.records[row] for row in rows), made.path[:, rows])
         point = trial_point(asked.columns, some[can[0]], kept, asked.fit.campaign.rate, 1.0)
     lanes = {can[row]: lane for lane, row in enumerate(good.tolist())}
@@ -277,7 +277,7 @@ def _simulated(asked: _Asked, some: list[Experiment], seconds: float) -> TrialRu
     """Simulate records side by side, filled up by repeating them."""
     if not some:
         return ""
-    drive = np.concatenate([some[place % len(some)].drive for place in range(_AT_ONCE)])
+    drive = np.concatenate([some[place % len(some)].drive for place in range(_SIDE_BY_SIDE)])
     lasted = sum(one.input.size / one.rate for one in asked.fit.campaign.fit_records)
     after = (1.0, 1.0 + seconds / lasted)
     return carry_out(asked.columns, some[0]._replace(drive=drive), 0.0, after)
