@@ -10,8 +10,9 @@ from .._show import shown
 from ._design_search import ALLOWED_MISS, Found, Task, stand
 from ._design_space import NotFinite
 
-_NEAR = 0.05
-"""Standard deviation of the points around a design, as a share of the range of each coefficient."""
+_REACH = (0.005, 0.1)
+"""Smallest and largest standard deviation of the points around a design, as a share of the range of each
+coefficient; drawn evenly in its logarithm."""
 
 _BETTER = 1e-5
 """Difference of the objective over its size, or of the largest miss, from which a point is better."""
@@ -62,7 +63,9 @@ def scan_design(
     """
     size = found.at.size
     spread = qmc.Sobol(size, rng=seed).random(1 << max(0, (count // 2 - 1).bit_length()))[: count // 2]
-    drawn = np.random.default_rng(seed).normal(found.at, _NEAR, (count - len(spread), size))
+    draw = np.random.default_rng(seed)
+    reach = np.exp(draw.uniform(*np.log(_REACH), count - len(spread)))
+    drawn = found.at + reach[:, None] * draw.standard_normal((len(reach), size))
     smaller = failed = better = 0
     best, best_point = (found.objective if found.feasible else found.violation), None
     for at in np.concatenate([spread, np.clip(drawn, 0.0, 1.0)]):

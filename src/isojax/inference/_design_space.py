@@ -193,11 +193,12 @@ class Quantity:
             return Answer(value, value, slope)
         sign = 1.0 if self.constraint.upper else -1.0
         width = sign * float(ndtri(self.constraint.chance))
-        bound = value + width * self._error(at)
+        error = self._error(at)
+        bound = value + width * error
         if slope is not None:
             moves = np.where(at > 0.5, -_STEP, _STEP)
             turned = [self._error(at + step) for step in np.diag(moves)]
-            change = (np.stack(turned, axis=1) - self._error(at)[:, None]) / moves
+            change = (np.stack(turned, axis=1) - error[:, None]) / moves
             slope = slope + width * change
         return Answer(value, bound, slope)
 
