@@ -180,7 +180,7 @@ def test_a_gain_is_separated_from_a_mass_error_by_no_drive_of_a_linear_isolator(
 
 
 def test_the_picture_has_a_bar_for_each_record_that_could_be_simulated(found):
-    drawn = found.plot().axes[0]
+    drawn = plot.next_test(found).axes[0]
     widths = [patch.get_width() for patch in drawn.patches]
     possible = [one.shrinkage for one in found.proposals if not one.reason]
     np.testing.assert_allclose(widths, possible[: len(widths)])

@@ -71,7 +71,7 @@ def test_without_an_objective_the_design_is_the_nearest():
     np.testing.assert_allclose(found.values, [800.0, 1e6], rtol=1e-5)
     assert found.objective == pytest.approx(0.25, rel=1e-5)
     assert found.objective_before == pytest.approx(0.0, abs=1e-20)
-    drawn = found.plot().axes[0]
+    drawn = ij.plot.design(found).axes[0]
     np.testing.assert_allclose([patch.get_width() for patch in drawn.patches[2:]], [0.0, -50.0], atol=1e-3)
     assert drawn.get_title(loc="left") == "stiffness ≤ 1e+06"
     assert ij.is_successful(found.result)

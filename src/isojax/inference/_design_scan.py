@@ -64,7 +64,8 @@ def scan_design(
     size = found.at.size
     spread = qmc.Sobol(size, rng=seed).random(1 << max(0, (count // 2 - 1).bit_length()))[: count // 2]
     draw = np.random.default_rng(seed)
-    reach = np.exp(draw.uniform(*np.log(_REACH), count - len(spread)))
+    lowest, highest = _REACH
+    reach = lowest * (highest / lowest) ** draw.uniform(size=count - len(spread))
     drawn = found.at + reach[:, None] * draw.standard_normal((len(reach), size))
     smaller = failed = better = 0
     best, best_point = (found.objective if found.feasible else found.violation), None

@@ -19,6 +19,9 @@ ALLOWED_MISS = 1e-6
 _BOXES = 30
 """Boxes that are searched at most."""
 
+_STEPS = 60
+"""Steps of SLSQP in a box at most."""
+
 _SMALLEST_BOX = 1e-4
 """Half the edge of a box below which a search that keeps failing is given up."""
 
@@ -86,8 +89,9 @@ class Found(NamedTuple):
 def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> Found:
     """Search for the smallest objective that keeps to the limits; where none does, for the smallest miss.
 
-    Where a quantity fails at a trial point, the search goes back to the box around the last good one that
-    reaches half as far, and on from there.
+    Where the start misses a limit, the largest miss is made small first. From then on the search goes from
+    one point that keeps the limits to the next. Where a quantity fails at a trial point, the search goes back
+    to the box around the last good one that reaches half as far, and on from there.
 
     Args:
         task: objective and constraints.
@@ -101,33 +105,37 @@ def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> Found:
 
     Source: Kraft 1988, DFVLR-FB 88-28 (SLSQP).
     """
-    found = _in_boxes(task, start, elastic=False)
-    if found.feasible:
-        return found
-    nearest = _in_boxes(task, found.at, elastic=True)
+    nearest = Found(start, *stand(task, start), True, 0)
+    if not nearest.feasible:
+        nearest = _in_boxes(task, start, elastic=True)
     if not nearest.feasible:
         return nearest
-    again = _in_boxes(task, nearest.at, elastic=False)
-    return again if again.feasible else nearest._replace(converged=False)
+    found = _in_boxes(task, nearest.at, elastic=False)
+    return found._replace(retreats=found.retreats + nearest.retreats)
 
 
 def _in_boxes(task: Task, start: Float[np.ndarray, " coordinate"], elastic: bool) -> Found:
+    """Search in boxes: `elastic` for the smallest miss, else among points that keep the limits."""
     centre, radius, retreats = start, np.inf, 0
-    stand(task, start)
     for _ in range(_BOXES):
         low, high = np.maximum(0.0, centre - radius), np.minimum(1.0, centre + radius)
         try:
             end, converged = _minimise(task, centre, low, high, elastic)
-            stand(task, end)
+            objective, violation = stand(task, end)
         except NotFinite as lost:
             retreats += 1
             radius = 0.5 * min(radius, float(np.max(np.abs(lost.at - centre))))
             if radius < _SMALLEST_BOX:
                 raise
             continue
+        if not elastic and violation > ALLOWED_MISS:
+            radius = 0.5 * min(radius, float(np.max(np.abs(end - centre))))
+            if radius < _SMALLEST_BOX:
+                break
+            continue
         cut = np.isclose(end, low) & (low > 0.0) | np.isclose(end, high) & (high < 1.0)
-        if not cut.any():
-            return Found(end, *stand(task, end), converged, retreats)
+        if not cut.any() or (elastic and violation <= ALLOWED_MISS):
+            return Found(end, objective, violation, converged, retreats)
         centre, radius = end, 2.0 * radius
     return Found(centre, *stand(task, centre), False, retreats)
 
@@ -177,7 +185,7 @@ def _minimise(
 
         constraints = [{"type": "ineq", "fun": margin, "jac": slope}]
     bounds = list(zip(low, high, strict=True))
-    options = {"ftol": _LEAST_PROGRESS, "maxiter": 200}
+    options = {"ftol": _LEAST_PROGRESS, "maxiter": _STEPS}
     if elastic:
         miss = stand(task, start)[1]
         first, bounds = np.append(start, miss), [*bounds, (0.0, max(miss, ALLOWED_MISS))]

@@ -224,7 +224,7 @@ def _rival(
     fitted = [label for label, strength in strengths.items() if strength in fit.free]
     if name not in fitted:
         raise ValueError(
-            f"Argument `rivals` must begin with an effect of the model with a fitted strength "
+            "Argument `rivals` must begin with an effect of the model with a fitted strength "
             f"({', '.join(fitted)}), but begins with {name!r}."
         )
     if isinstance(given, str):
@@ -265,6 +265,8 @@ def _proposals(
             found = _proposal(asked, outline, one, point, lanes[place], seconds)
         elif one.lacking:
             found = _left_out(asked, outline, one, one.lacking)
+        elif place in lanes:
+            found = _left_out(asked, outline, one, "its records have not what the rival follows")
         elif made.finite[can.index(place)]:
             found = _left_out(asked, outline, one, _TOO_FAR)
         else:
