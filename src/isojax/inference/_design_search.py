@@ -19,7 +19,7 @@ ALLOWED_MISS = 1e-6
 _BOXES = 30
 """Boxes that are searched at most."""
 
-_STEPS = 60
+_SLSQP_STEPS = 60
 """Steps of SLSQP in a box at most."""
 
 _SMALLEST_BOX = 1e-4
@@ -185,7 +185,7 @@ def _minimise(
 
         constraints = [{"type": "ineq", "fun": margin, "jac": slope}]
     bounds = list(zip(low, high, strict=True))
-    options = {"ftol": _LEAST_PROGRESS, "maxiter": _STEPS}
+    options = {"ftol": _LEAST_PROGRESS, "maxiter": _SLSQP_STEPS}
     if elastic:
         miss = stand(task, start)[1]
         first, bounds = np.append(start, miss), [*bounds, (0.0, max(miss, ALLOWED_MISS))]
