@@ -21,6 +21,8 @@ SCRIPTS = re.findall(r"^## ([^\n]+)\n+```python\n(.*?)^```$", README, flags=re.M
 JOURNEY = """
     read_campaign classical_guess fit load_fit uncertainty profile residual explain_remainder diagnose extend
     find_separating_experiment close_loop
+    read_campaign classical_guess fit load_fit uncertainty next_test residual explain_remainder diagnose
+    extend find_separating_experiment close_loop design
 """.split()
 """Examples that go on with what the one before has made, so that one test runs them in a row."""
 

@@ -30,6 +30,10 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "The data do not determine every free coefficient. Fix one of the coefficients that the report "
         "names, or add records that separate them."
     )
+    infeasible = (
+        "No coefficients that were found within the bounds keep to all constraints. Loosen a constraint that "
+        "is missed, or the bounds."
+    )
 
 
 _NAMES: Any = vars(RESULTS)["_name_to_item"]

@@ -11,6 +11,7 @@ from .reporting.plots import plot_bifurcation_diagram as bifurcation_diagram
 from .reporting.plots import plot_branch as branch
 from .reporting.plots import plot_correlation as correlation
 from .reporting.plots import plot_cycle_residual as cycle_residual
+from .reporting.plots import plot_design as design
 from .reporting.plots import plot_dwell_stability as dwell_stability
 from .reporting.plots import plot_effect as effect
 from .reporting.plots import plot_equivalent as equivalent
@@ -21,6 +22,7 @@ from .reporting.plots import plot_force_residual_map as force_residual_map
 from .reporting.plots import plot_frequency_response as frequency_response
 from .reporting.plots import plot_global_sensitivity as global_sensitivity
 from .reporting.plots import plot_inspection as inspection
+from .reporting.plots import plot_next_test as next_test
 from .reporting.plots import plot_phase_portrait as phase_portrait
 from .reporting.plots import plot_posterior as posterior
 from .reporting.plots import plot_profile as profile

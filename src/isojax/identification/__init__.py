@@ -2,7 +2,7 @@
 
 In: a `Campaign`. Out: a `Loop`, with the fitted models, the findings, the verdict and the next test.
 Read the rooms in the order of an analysis: `guess` (start values), `fitting` (coefficients and errors),
-`diagnosis` (which effect is missing), `experiment` (the test that separates look-alikes) and `remainder`
+`diagnosis` (which effect is missing), `experiment` (the next test) and `remainder`
 (what stays unexplained). `_close_loop.py` joins them. `jacobian` lies below all of them: simulated records
 and their exact derivatives. `_rules.py` holds the numbers by which fit and diagnosis decide.
 """
@@ -19,7 +19,10 @@ from .diagnosis import Finding as Finding
 from .diagnosis import Separation as Separation
 from .diagnosis import Verdict as Verdict
 from .diagnosis import diagnose as diagnose
+from .experiment import NextTest as NextTest
+from .experiment import Proposal as Proposal
 from .experiment import find_separating_experiment as find_separating_experiment
+from .experiment import next_test as next_test
 from .fitting import DEFAULT_SOLVER as DEFAULT_SOLVER
 from .fitting import OUTPUT_UNITS as OUTPUT_UNITS
 from .fitting import Coefficient as Coefficient

@@ -26,4 +26,5 @@ from ._separation import AGAIN as AGAIN
 from ._separation import Experiment as Experiment
 from ._separation import Prospect as Prospect
 from ._separation import Separation as Separation
+from ._separation import Waveform as Waveform
 from ._separation import rank_prospects as rank_prospects

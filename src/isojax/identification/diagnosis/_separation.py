@@ -1,6 +1,6 @@
 """Experiments ranked by how far each would separate a finding from its look-alikes."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -8,6 +8,8 @@ from jaxtyping import Float
 from ..._show import Row, number, shown
 from ...elements import CATALOGUE
 from ...models import Quantity
+
+Waveform = Literal["stepped sine", "swept sine", "multisine"]
 
 AGAIN = "again"
 """Name of the yardstick: the campaign once more."""
@@ -23,10 +25,11 @@ class Experiment(NamedTuple):
         drive: recorded drive of each record, one period of what may be repeated [N, or m/s^2 of the base].
         rate: samples a second [Hz].
         quantity: what the sensor measures.
-        stepped: whether each segment of a record is a sine.
+        waveform: what drives it; the sine of a step lasts for a segment of the record.
         extra_mass: known mass that is bolted on [kg].
         load: known static force on the mass [N].
         lacking: why the campaign's test rig cannot make it; empty if it can.
+        backward: whether the frequency falls in the first record; the next goes the other way.
     """
 
     name: str
@@ -34,10 +37,11 @@ class Experiment(NamedTuple):
     drive: Float[np.ndarray, "record time"]
     rate: float
     quantity: Quantity
-    stepped: bool
+    waveform: Waveform
     extra_mass: float = 0.0
     load: float = 0.0
     lacking: str = ""
+    backward: bool = False
 
     @property
     def seconds(self) -> float:

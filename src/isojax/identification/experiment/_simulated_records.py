@@ -8,14 +8,15 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..._kept import recall
 from ...models import RK4, Instant, Isolator, Quantity, State, add_ringing, read_record, scan_records
-from ...records import Dwell, Record
+from ...records import Dwell, ExcitationKind, Record
+from ..diagnosis import Experiment, Waveform
 from ..fitting import Problem
 from ..jacobian import carries, channel_table, drive_table
-from ._candidate_experiments import DWELLS, Experiment
+from ._test_outline import DWELLS
 
 
 class TrialRun(NamedTuple):
@@ -23,18 +24,21 @@ class TrialRun(NamedTuple):
 
     Attributes:
         records: what the test rig would record, free of noise.
-        starts: initial state of each segment, records in turn.
-        displacement: of each record [m].
+        path: displacement, velocity and internal states at each sample [SI units].
     """
 
     records: tuple[Record, ...]
-    starts: Float[np.ndarray, "state segment"]
-    displacement: Float[np.ndarray, "record time"]
+    path: Float[np.ndarray, "state record time"]
 
     @property
-    def is_finite(self) -> bool:
-        """Whether the motion stayed finite."""
-        return bool(np.all(np.isfinite(self.starts)) and np.all(np.isfinite(self.displacement)))
+    def displacement(self) -> Float[np.ndarray, "record time"]:
+        """Displacement [m]."""
+        return self.path[0]
+
+    @property
+    def finite(self) -> Bool[np.ndarray, " record"]:
+        """Whether the motion of each record stayed finite."""
+        return np.all(np.isfinite(self.path), axis=(0, 2))
 
 
 @eqx.filter_jit
@@ -49,38 +53,66 @@ def _run(
     return path, add_ringing(reading, ringing)
 
 
-def blank_records(experiment: Experiment) -> tuple[Record, ...]:
-    """Give the records of an experiment before it was made: no output yet."""
+def blank_records(experiment: Experiment, clock: tuple[float, float] | None = None) -> tuple[Record, ...]:
+    """Give the records of an experiment before it was made: no output yet.
+
+    Args:
+        experiment: the test.
+        clock: start and end of every record as shares of the campaign; one after the other through all of it
+            if omitted.
+
+    Returns:
+        The records.
+    """
     rows, total = experiment.drive.shape
-    length = total // DWELLS
-    records = []
-    for row, drive in enumerate(experiment.drive):
-        dwells = ()
-        if experiment.stepped:
-            lines = np.abs(np.fft.rfft(drive.reshape(DWELLS, length), axis=1))
-            dwells = tuple(
-                Dwell(place * length, (place + 1) * length, cycles * experiment.rate / length, float(cycles))
-                for place, cycles in enumerate(np.argmax(lines, axis=1).tolist())
-            )
-        nothing = np.zeros(total)
-        records.append(
-            Record(
-                f"{experiment.name}_{row}",
-                Path(f"{experiment.name}_{row}"),
-                np.arange(total) / experiment.rate,
-                experiment.rate,
-                drive,
-                nothing,
-                drive,
-                nothing,
-                level=float(np.std(drive)),
-                period=None if experiment.stepped else total,
-                dwells=dwells,
-                kind="stepped_sine" if experiment.stepped else "periodic",
-                clock=(row / rows, (row + 1) / rows),
-            )
+    kinds: dict[Waveform, ExcitationKind] = {
+        "stepped sine": "stepped_sine",
+        "swept sine": "swept",
+        "multisine": "periodic",
+    }
+    sines = experiment.waveform != "multisine"
+    nothing = np.zeros(total)
+    return tuple(
+        Record(
+            f"{experiment.name}_{row}",
+            Path(f"{experiment.name}_{row}"),
+            np.arange(total) / experiment.rate,
+            experiment.rate,
+            drive,
+            nothing,
+            drive,
+            nothing,
+            level=float(np.std(drive)),
+            direction="none"
+            if not sines
+            else "backward"
+            if (row % 2 == 1) != experiment.backward
+            else "forward",
+            period=None if sines else total,
+            dwells=dwells_of(drive, experiment.rate) if experiment.waveform == "stepped sine" else (),
+            kind=kinds[experiment.waveform],
+            clock=(row / rows, (row + 1) / rows) if clock is None else clock,
         )
-    return tuple(records)
+        for row, drive in enumerate(experiment.drive)
+    )
+
+
+def dwells_of(drive: Float[np.ndarray, " time"], rate: float) -> tuple[Dwell, ...]:
+    """Give the dwells of a record whose segments are sines of whole cycles.
+
+    Args:
+        drive: of the record.
+        rate: samples a second [Hz].
+
+    Returns:
+        A dwell a segment.
+    """
+    length = drive.size // DWELLS
+    cycles = np.argmax(np.abs(np.fft.rfft(drive.reshape(DWELLS, length), axis=1)), axis=1)
+    return tuple(
+        Dwell(place * length, (place + 1) * length, count * rate / length, float(count))
+        for place, count in enumerate(cycles.tolist())
+    )
 
 
 def missing_channels(model: Isolator, records: tuple[Record, ...]) -> tuple[str, ...]:
@@ -91,10 +123,7 @@ def missing_channels(model: Isolator, records: tuple[Record, ...]) -> tuple[str,
 def trial_run(
     model: Isolator, experiment: Experiment, blank: tuple[Record, ...], problem: Problem, rest: float
 ) -> TrialRun:
-    """Carry out an experiment on a model.
-
-    The simulation of each segment starts from rest one segment earlier, so that it starts as the one before
-    it ends; the first of a record follows its last.
+    """Carry out an experiment on a model: each record from rest to its end, all of them side by side.
 
     Args:
         model: the isolator, as the experiment has it.
@@ -107,22 +136,19 @@ def trial_run(
     Returns:
         The records; not finite where the motion diverges.
     """
-    rows, total = experiment.drive.shape
-    length, hold = total // DWELLS, problem.hold
+    hold = problem.hold
     clock = float(model.shift()), float(model.skew())
     substeps = problem.integrator.record_steps(model)
-    window = (np.arange(2 * length)[:, None] + (np.arange(DWELLS) - 1) * length) % total
 
     def side_by_side(tables: Iterable[Float[np.ndarray, "time stage"]]) -> Array:
-        lanes = [np.moveaxis(table[window], 2, 1) for table in tables]
-        return jnp.asarray(np.concatenate(lanes, axis=2))
+        return jnp.asarray(np.stack(list(tables), axis=2))
 
     tables = [drive_table(record, record.input, hold, substeps, *clock) for record in blank]
     channels = {
-        name: side_by_side([channel_table(name, record, hold, substeps, *clock) for record in blank])
+        name: side_by_side(channel_table(name, record, hold, substeps, *clock) for record in blank)
         for name in model.channels
     }
-    lanes = rows * DWELLS
+    lanes = len(blank)
     start = (jnp.full(lanes, rest), *(jnp.zeros(lanes),) * (1 + model.internal_states))
 
     def compute() -> tuple[np.ndarray, ...]:
@@ -136,15 +162,9 @@ def trial_run(
         return (*map(np.asarray, path), np.asarray(reading))
 
     *path, reading = recall("trial run", compute, model, experiment, problem.quantity, rest)
-
-    def in_turn(values: Float[np.ndarray, "time lanes"]) -> Float[np.ndarray, "record sample"]:
-        return values[length:].T.reshape(rows, total)
-
-    displacement = in_turn(path[0])
-    outputs = displacement if experiment.quantity != problem.quantity else in_turn(reading)
+    outputs = path[0] if experiment.quantity != problem.quantity else reading
     records = tuple(
         dataclasses.replace(record, output=output, raw_output=output)
-        for record, output in zip(blank, outputs, strict=True)
+        for record, output in zip(blank, outputs.T, strict=True)
     )
-    starts = np.stack([state[length] for state in path])
-    return TrialRun(records, starts, displacement)
+    return TrialRun(records, np.stack([state.T for state in path]))

@@ -9,6 +9,7 @@ What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter
 
 from ._as_fit import Fitted as Fitted
 from ._as_fit import as_fit as as_fit
+from ._build_problem import build_problem as build_problem
 from ._coefficients import Coefficient as Coefficient
 from ._coefficients import Coefficients as Coefficients
 from ._covariance import Uncertainty as Uncertainty
@@ -48,6 +49,7 @@ from ._residual import residual as residual
 from ._saved_fit import SavedFit as SavedFit
 from ._saved_fit import Statistics as Statistics
 from ._saved_fit import load_fit as load_fit
+from ._scatter_mixture import expect_uncertainty as expect_uncertainty
 from ._search import DEFAULT_SOLVER as DEFAULT_SOLVER
 from ._search import MOST_EVALUATIONS as MOST_EVALUATIONS
 from ._search import ROUGH as ROUGH

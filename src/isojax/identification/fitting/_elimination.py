@@ -94,6 +94,42 @@ class Reduced(NamedTuple):
         """Normal equations of all records together."""
         return self.by_record.sum(axis=0)
 
+    def of_record(self, record: int) -> "Reduced":
+        """Give the equations of one record.
+
+        Args:
+            record: its place.
+
+        Returns:
+            Equations of the coefficients and of the record's stiffness scale; those of states and segments
+            stay as they are.
+        """
+        own = slice(record, record + 1)
+        return self._replace(
+            by_record=self.by_record[own],
+            eliminated=self.eliminated[own],
+            stiffness_map=self.stiffness_map[own],
+            stiffness_variance=self.stiffness_variance[own],
+        )
+
+    def rescaled(self, sizes: Float[np.ndarray, " kept"]) -> "Reduced":
+        """Give the equations of the first coefficients in other units; maps of states stay as they are.
+
+        Args:
+            sizes: present unit of each, in the new one.
+
+        Returns:
+            The equations.
+        """
+        keep = np.r_[0 : sizes.size, self.raw.size]
+        unit = np.append(1.0 / sizes, 1.0)
+        by_record = self.by_record[:, keep[:, None], keep] * np.outer(unit, unit)
+        return self._replace(
+            by_record=by_record,
+            raw=self.raw[: sizes.size] * unit[:-1] ** 2,
+            stiffness_map=self.stiffness_map[:, keep] * unit,
+        )
+
     def without(self, columns: Int[np.ndarray, " lost"]) -> "Reduced":
         """Give the equations with nothing in some columns, as if they moved no reading.
 

@@ -8,7 +8,7 @@ from scipy.linalg import block_diag
 from scipy.special import ndtr, ndtri
 
 from ..jacobian import STIFFNESS_SCALE_UNIT
-from ._covariance import Uncertainty, find_determined, invert_information, unknown
+from ._covariance import Determined, Uncertainty, find_determined, invert_information, unknown
 from ._elimination import Nuisances, Reduced
 
 SCATTER_PRIOR = 1e-3
@@ -28,6 +28,9 @@ _WIDTH = float(ndtri(0.5 + 0.5 * _LEVEL))
 """Half-width of that interval of a normal law, in standard deviations."""
 
 _ROOT_BISECTIONS = 40
+
+_DEVIATIONS = 9
+"""Deviations of the stiffness of a planned record over which is averaged."""
 
 
 class _Records(NamedTuple):
@@ -88,12 +91,87 @@ def integrate_scatter(reduced: Reduced, nuisances: Nuisances, inflation: float) 
         return unknown(matrix.shape[0])
     known = find_determined(matrix)
     records = _with_scales(reduced, nuisances, known.vectors / known.size[:, None], inflation)
+    found = _uncertainty(known, records, nuisances.spread.records)
+    # Where a search went far astray, rounding leaves nothing of what the records say of their scales.
+    return invert_information(matrix, inflation) if found is None else found
+
+
+def expect_uncertainty(
+    reduced: Reduced, nuisances: Nuisances, planned: Reduced, repeats: float, inflation: float
+) -> Uncertainty:
+    """Give the uncertainty that the coefficients will have once a planned record is fitted beside the others.
+
+    What the record will show of its own stiffness is not known. The covariance is the mean over what it may
+    show, which the present records predict: a scatter drawn from its posterior, and a deviation drawn from
+    that. Noise changes no covariance of the linearised records.
+
+    Args:
+        reduced: equations of the present records at the solution.
+        nuisances: that they are about.
+        planned: equations of the planned record alone, about the same coefficients and priors; its residual
+            is not looked at.
+        repeats: how often the record repeats what was simulated.
+        inflation: factor on the squared noise: max(1, chi2/dof).
+
+    Returns:
+        The expected uncertainty, which holds the scatter as that of a fit does.
+    """
+    whole = reduced.matrix[:-1, :-1] + repeats * planned.matrix[:-1, :-1]
+    if not np.all(np.isfinite(whole)):
+        return unknown(whole.shape[0])
+    if not np.any(planned.stiffness_variance):
+        return invert_information(whole, inflation)
+    known = find_determined(whole)
+    basis = known.vectors / known.size[:, None]
+    records = _with_scales(reduced, nuisances, basis, inflation)
+    alone = Nuisances(nuisances.states, np.zeros(1), nuisances.segments, nuisances.spread)
+    further = _with_scales(planned, alone, basis, inflation / repeats)
+    shown = _deviations(_at(records, _SCATTERS).weight, len(records.own)) / STIFFNESS_SCALE_UNIT
+    covariance = np.zeros_like(whole)
+    for deviation in shown:
+        expected = _uncertainty(
+            known, _together(records, _as_shown(further, deviation)), nuisances.spread.records
+        )
+        if expected is None:
+            return invert_information(whole, inflation)
+        covariance += expected.covariance / shown.size
+    return known.uncertainty(covariance * np.outer(known.size, known.size))
+
+
+def _deviations(weight: Float[np.ndarray, " scatter"], count: int) -> Float[np.ndarray, " deviation"]:
+    """Give evenly likely deviations of a further record's stiffness from the mean of `count` others."""
+    level = (np.arange(_DEVIATIONS) + 0.5) / _DEVIATIONS
+    error = _SCATTERS[:, None] * np.sqrt(1.0 + 1.0 / count)
+    high = np.full(level.size, 10.0 * _SCATTERS[-1])
+    low = -high
+    for _ in range(_ROOT_BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = weight @ ndtr(middle / error) < level
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return high
+
+
+def _as_shown(record: _Records, deviation: float) -> _Records:
+    """Give the equations of a record without noise whose stiffness deviates so much, and so does the scale.
+
+    The scale stands where the record is, so that nothing of it is left in the residual.
+    """
+    left, row = record.left.copy(), record.row.copy()
+    left[:, -1, :], left[:, :, -1], row[:, -1] = 0.0, 0.0, 0.0
+    return record._replace(left=left, row=row, deviation=np.array([deviation]))
+
+
+def _together(one: _Records, other: _Records) -> _Records:
+    return _Records(*(np.concatenate(pair) for pair in zip(one, other, strict=True)))
+
+
+def _uncertainty(known: Determined, records: _Records, scatter: float) -> Uncertainty | None:
+    """Sum over all scatters about the coefficients that belong to one; None where equations are singular."""
     try:
-        own = _at(records, np.array([nuisances.spread.records]))
+        own = _at(records, np.array([scatter]))
         mixture = _at(records, _SCATTERS)
     except np.linalg.LinAlgError:
-        # Where a search went far astray, rounding leaves nothing of what the records say of their scales.
-        return invert_information(matrix, inflation)
+        return None
     # About the fitted value: what keeps it from the minimum, such as a bound, is no scatter.
     step = (mixture.step - own.step[0]) @ known.vectors.T
     covariance = known.vectors @ mixture.covariance @ known.vectors.T

@@ -19,6 +19,8 @@ from ._classical_plots import plot_receptance as plot_receptance
 from ._classical_plots import visited_amplitudes as visited_amplitudes
 from ._coefficient_plots import plot_posterior as plot_posterior
 from ._coefficient_plots import plot_profile as plot_profile
+from ._design_plots import plot_design as plot_design
+from ._design_plots import plot_next_test as plot_next_test
 from ._dwell_stability_plots import plot_dwell_stability as plot_dwell_stability
 from ._evidence_plots import plot_errors as plot_errors
 from ._evidence_plots import plot_ranking as plot_ranking

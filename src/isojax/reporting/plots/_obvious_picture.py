@@ -14,11 +14,12 @@ from ...identification import (
     Fit,
     ForceMap,
     Loop,
+    NextTest,
     Remainder,
     Residual,
     Verdict,
 )
-from ...inference import GlobalSensitivity, Posterior, Profile
+from ...inference import Design, GlobalSensitivity, Posterior, Profile
 from ...models import Simulation
 from ...records import Campaign
 from ...stability import (
@@ -39,6 +40,7 @@ from ._attractor_plots import plot_basins, plot_bifurcation_diagram, plot_phase_
 from ._branch_plots import plot_backbone, plot_branch, plot_frequency_response, plot_transmissibility
 from ._classical_plots import plot_receptance
 from ._coefficient_plots import plot_posterior, plot_profile
+from ._design_plots import plot_design, plot_next_test
 from ._evidence_plots import plot_ranking
 from ._fold_curve_plot import plot_fold_curve
 from ._global_sensitivity_plot import plot_global_sensitivity
@@ -92,6 +94,7 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     Branch: plot_branch,
     Campaign: _record,
     ClassicalGuess: plot_receptance,
+    Design: plot_design,
     Extension: plot_time_history,
     Finding: plot_ranking,
     Fit: plot_time_history,
@@ -100,6 +103,7 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     FrequencyResponse: plot_frequency_response,
     GlobalSensitivity: plot_global_sensitivity,
     Loop: plot_time_history,
+    NextTest: plot_next_test,
     Orbit: _orbit,
     PhasePortrait: plot_phase_portrait,
     Posterior: plot_posterior,

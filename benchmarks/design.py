@@ -1,0 +1,120 @@
+"""Does a design reach its target, and is nothing better to be found?
+
+Run `python benchmarks/design.py`; it takes five minutes of one core. Two problems:
+
+1. Linear: the stiffest spring of an isolator of 800 kg that keeps the transmissibility at 10 and 15 Hz below
+   0.5 and 0.2. The closed form is a quadratic equation in the stiffness.
+2. Nonlinear: the published isolator, y direction, jumps at the force of its fold at 4.3 Hz. The nearest
+   springs (linear, |x|x and cubic, each within a fifth) that push this force to 175 N. Then the same with a
+   chance of 0.99, each coefficient known to 0.3 %.
+
+Printed: target and value, objective, closed form where there is one, and the scan of other coefficients.
+"""
+
+import argparse
+import time
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+import isojax as ij
+from isojax import compile_quickly
+from isojax.inference import at_least, at_most
+
+STIFFNESS = (
+    "linear_stiffness.coefficient",
+    "abs_quadratic_stiffness.coefficient",
+    "cubic_stiffness.coefficient",
+)
+TARGET = 175.0
+
+
+class Known(NamedTuple):
+    """A model whose coefficients are known to a relative error."""
+
+    model: ij.Isolator
+    free: tuple[str, ...]
+    covariance: np.ndarray
+    result: ij.RESULTS = ij.RESULTS.successful
+
+
+def linear(scan: int) -> None:
+    """Print the linear problem."""
+    damping, rates, limits = 4e3, 2.0 * np.pi * np.array([10.0, 15.0]), np.array([0.5, 0.2])
+    model = ij.Isolator(800.0, (ij.LinearStiffness(2e5), ij.LinearDamping(damping)))
+
+    def transmissibility(isolator: ij.Isolator) -> jax.Array:
+        return ij.transmissibility(isolator, 10.0, rates / (2.0 * np.pi)).magnitude
+
+    found = ij.design(
+        model,
+        lambda isolator: -isolator[STIFFNESS[0]],
+        at_most(transmissibility, limits, name="transmissibility"),
+        free={STIFFNESS[0]: (1e5, 1e7)},
+        scan=scan,
+    )
+    # k^2 + (c w)^2 = T^2 ((k - m w^2)^2 + (c w)^2), its root below m w^2.
+    roots = [
+        np.roots(
+            [
+                1.0 - limit**2,
+                2.0 * limit**2 * 800.0 * rate**2,
+                (damping * rate) ** 2 * (1.0 - limit**2) - (limit * 800.0 * rate**2) ** 2,
+            ]
+        ).max()
+        for rate, limit in zip(rates, limits, strict=True)
+    ]
+    print(repr(found), flush=True)
+    print(f"closed form {min(roots):.7g} N/m, off by {found.values[0] / min(roots) - 1.0:+.1e}\n")
+
+
+def nonlinear(scan: int, chance: float | None) -> None:
+    """Print the nonlinear problem."""
+    model = ij.paper.y_direction()
+
+    def fold_force(isolator: ij.Isolator) -> jax.Array:
+        branch = ij.continue_branch(isolator, parameter="amplitude", frequency=4.3, start=1.0, stop=600.0)
+        folds = [point.amplitude for point in branch.special_points if point.kind == "fold"]
+        return folds[0] if folds else np.nan  # pyright: ignore[reportReturnType]
+
+    names = tuple(entry.name for entry in model.parameters if entry.name != "mass")
+    errors = np.diag([(0.003 * float(model[name])) ** 2 for name in names])
+    begin = time.perf_counter()
+    found = ij.design(
+        model,
+        subject_to=at_least(fold_force, TARGET, chance=chance),
+        free={
+            name: tuple(sorted((0.8 * float(model[name]), 1.2 * float(model[name])))) for name in STIFFNESS
+        },
+        fit=None if chance is None else Known(model, names, errors),
+        scan=scan,
+    )
+    print(f"fold force before: {float(fold_force(model)):.5g} N")
+    print(repr(found))
+    print(f"{time.perf_counter() - begin:.0f} s\n")
+
+
+PROBLEMS = {
+    "linear": linear,
+    "nonlinear": lambda scan: nonlinear(scan, None),
+    "chance": lambda scan: nonlinear(scan, 0.99),
+}
+
+
+def main() -> None:
+    """Print the problems."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scan", type=int, default=200, help="points with which a design is compared")
+    parser.add_argument("--problems", nargs="+", default=list(PROBLEMS), choices=PROBLEMS)
+    options = parser.parse_args()
+    jax.config.update("jax_enable_x64", True)
+    compile_quickly()
+    for name in options.problems:
+        PROBLEMS[name](options.scan)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,350 @@
+"""Which record to measure next, found by simulation with the fitted model."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ..._parameters import element_names, list_parameters
+from ..._results import RESULTS, is_successful
+from ..._types import check_float64
+from ...elements import CATALOGUE, AbstractElement
+from ...models import Isolator, coefficient_errors
+from ...records import Campaign
+from ..diagnosis import Experiment
+from ..fitting import Fit, Fitted, Point, Uncertainty, as_fit, expect_uncertainty, plain_unit
+from ..guess import scales as campaign_scales
+from ._candidate_experiments import repeated_campaign
+from ._proposals import NextTest, Proposal, rank_proposals
+from ._record_candidates import outline_of_record, record_candidates, usual_bands, usual_levels
+from ._simulated_records import TrialRun
+from ._test_outline import TestOutline, find_test_outline
+from ._trial_information import (
+    DIVERGES,
+    Columns,
+    absent,
+    carry_out,
+    columns_of,
+    expected_chi2,
+    full_matrix,
+    needs_every_sample,
+    old_point,
+    trial_point,
+)
+
+_SIDE_BY_SIDE = 24
+"""Records that are simulated together; fewer are filled up, so that compiled code serves all."""
+
+_TOO_FAR = "it moves farther than argument `farthest` allows"
+
+
+class _Asked(NamedTuple):
+    """What each record is asked.
+
+    Attributes:
+        fit: the present fit.
+        columns: its coefficients, and the rival of an effect.
+        gradient: of each number of the quantity by the coefficients.
+        quantity_errors: of each at present.
+        old: equations of the present records; None where no rival is asked for.
+        effect: column of the effect that has a rival.
+        inflation: factor on the squared noise.
+    """
+
+    fit: Fit
+    columns: Columns
+    gradient: Float[np.ndarray, "number coefficient"]
+    quantity_errors: Float[np.ndarray, " number"]
+    old: Point | None
+    effect: int
+    inflation: float
+
+
+def next_test(
+    fit: Fit | Fitted,
+    quantity: Callable[[Isolator], Any] | None = None,
+    *,
+    rivals: tuple[str, str | AbstractElement] | None = None,
+    seconds: float | None = None,
+    levels: Sequence[float] | None = None,
+    bands: Sequence[tuple[float, float]] | None = None,
+    farthest: float = 1.2,
+) -> NextTest:
+    """Find the record that shrinks the intervals most, or that separates two effects best.
+
+    Each candidate is simulated with the fitted model, and its information is added to that of the records.
+    The covariance is the one that a fit to all of them is expected to report, with the noise and sampling
+    rate of the campaign, free initial states, and the scatter of the stiffness known from one record
+    more. Without `quantity` the best candidate has the smallest determinant of it (D-optimal), with one the
+    smallest variance `g' C g` of the quantity, g its gradient (c-optimal). With `rivals` it is the one with
+    the largest expected chi2 between the two, as in `find_separating_experiment`.
+
+    Args:
+        fit: a fit, or what ends with one; a saved one has no records to add to.
+        quantity: function of an isolator that gives real numbers, as in `uncertainty`; of several numbers,
+            the geometric mean of their standard errors counts.
+        rivals: catalogue name of an effect of the model with a fitted strength, and name or element of the
+            one that may stand in its place.
+        seconds: length of the record [s]; the mean of the fitted ones if omitted.
+        levels: rms of the drive [N, or m/s^2 of the base]; those of the campaign and a third of the lowest if
+            omitted.
+        bands: lowest and highest frequency of each [Hz]; the campaign's, parts of it, and to half the lowest
+            and twice the highest frequency if omitted.
+        farthest: largest displacement over that of the campaign; records that go beyond it are left out,
+            because neither the model nor the room for motion was tested there.
+
+    Returns:
+        The candidates, best first: stepped and swept sines upwards and downwards, and multisines.
+
+    Raises:
+        ValueError: if the fit failed or nothing drove its records on and on; if the data do not determine a
+            coefficient and a quantity is asked for; if the quantity is not finite, `rivals` are not such
+            effects, or a number is not positive.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Fedorov 1972, Theory of Optimal Experiments, ch. 2 (D- and c-optimality); Hunter & Reiner 1965,
+    Technometrics 7:307 (rivals).
+
+    Example:
+        With the fit of `fit`'s example:
+
+        >>> test = ij.next_test(fitted, levels=[60.0], bands=[(4.0, 7.0), (5.0, 6.0)])
+        >>> bool(0.3 < test.best.shrinkage < 1.0), len(test.proposals)
+        (True, 10)
+        >>> print(test.best.declaration.splitlines()[0])
+        [[record]]
+    """
+    check_float64()
+    fit = as_fit(fit)
+    if not is_successful(fit.result):
+        raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[fit.result]}")
+    _check_plan(seconds, levels, bands, farthest)
+    asked = _ask(fit, quantity, rivals)
+    campaign, problem = fit.campaign, fit.estimate.problem
+    steps = problem.integrator.record_steps(fit.model)
+    outline = find_test_outline(campaign, steps, every_sample=needs_every_sample(asked.columns))
+    if outline is None:
+        raise ValueError("Argument `fit` must be of records that are driven on and on, but none is.")
+    if seconds is None:
+        seconds = float(np.mean([one.input.size / one.rate for one in campaign.fit_records]))
+    candidates = record_candidates(
+        campaign,
+        outline_of_record(outline, seconds, steps),
+        usual_levels(outline) if levels is None else levels,
+        usual_bands(outline) if bands is None else bands,
+    )
+    largest = _largest_motion(asked.columns, campaign, outline)
+    proposals = []
+    for _, group in itertools.groupby(candidates, lambda one: one.waveform):
+        alike = tuple(group)
+        for first in range(0, len(alike), _SIDE_BY_SIDE):
+            proposals += _proposals(
+                asked, outline, alike[first : first + _SIDE_BY_SIDE], seconds, farthest * largest
+            )
+    listed = {entry.name: entry for entry in list_parameters(fit.model)}
+    value = np.zeros(0) if quantity is None else np.ravel(np.asarray(quantity(fit.model), dtype=float))
+    return NextTest(
+        fit.free,
+        tuple(plain_unit(listed[name].spec.unit, campaign) for name in fit.free),
+        np.array([float(listed[name].value) for name in fit.free]),
+        fit.estimate.uncertainty.standard_error,
+        value,
+        asked.quantity_errors,
+        () if rivals is None else (rivals[0], asked.columns.probes[0].name),
+        seconds,
+        rank_proposals(proposals),
+    )
+
+
+def _check_plan(
+    seconds: float | None,
+    levels: Sequence[float] | None,
+    bands: Sequence[tuple[float, float]] | None,
+    farthest: float,
+) -> None:
+    if not farthest > 0.0:
+        raise ValueError(f"Argument `farthest` must be positive, but is {farthest}.")
+    if seconds is not None and not 0.0 < seconds < np.inf:
+        raise ValueError(f"Argument `seconds` must be positive and finite, but is {seconds}.")
+    if levels is not None and not (len(levels) and all(0.0 < level < np.inf for level in levels)):
+        raise ValueError(f"Argument `levels` must hold positive numbers, but is {levels}.")
+    if bands is not None and not (len(bands) and all(0.0 < low < high < np.inf for low, high in bands)):
+        raise ValueError(f"Argument `bands` must hold pairs 0 < lowest < highest, but is {bands}.")
+
+
+def _ask(
+    fit: Fit,
+    quantity: Callable[[Isolator], Any] | None,
+    rivals: tuple[str, str | AbstractElement] | None,
+) -> _Asked:
+    """Collect what each record is asked."""
+    known = fit.estimate.uncertainty
+    gradient, errors = np.zeros((0, len(fit.free))), np.zeros(0)
+    if quantity is not None:
+        carrying = coefficient_errors(fit)
+        sizes = known.standard_error
+        value, change = carrying._replace(root=np.diag(sizes)).carry(
+            lambda model: jnp.asarray(quantity(model))
+        )
+        gradient = np.reshape(np.asarray(change), (-1, sizes.size)) / sizes
+        if jnp.iscomplexobj(value) or not (np.all(np.isfinite(value)) and np.all(np.isfinite(gradient))):
+            raise ValueError(
+                "Argument `quantity` must give finite real numbers with finite derivatives at the fitted "
+                f"coefficients, but gave {np.asarray(value)}."
+            )
+        errors = _errors_of(gradient, fit.covariance)
+    probes, effect = _rival(fit, rivals)
+    scales = campaign_scales(fit.campaign)
+    columns = columns_of(fit.estimate, probes, tuple(probe.typical_strength(scales) for probe in probes))
+    old = old_point(columns) if probes else None
+    return _Asked(fit, columns, gradient, errors, old, effect, max(1.0, fit.estimate.chi2 / fit.estimate.dof))
+
+
+def _errors_of(
+    gradient: Float[np.ndarray, "number coefficient"],
+    covariance: Float[np.ndarray, "coefficient coefficient"],
+) -> Float[np.ndarray, " number"]:
+    return np.sqrt(np.einsum("ni,ij,nj->n", gradient, covariance, gradient))
+
+
+def _rival(
+    fit: Fit, rivals: tuple[str, str | AbstractElement] | None
+) -> tuple[tuple[AbstractElement, ...], int]:
+    """Give what may stand in place of an effect, at zero strength, and the column of the effect."""
+    if rivals is None:
+        return (), -1
+    name, given = rivals
+    labels = element_names(fit.model)
+    strengths = {
+        label: f"{label}.{one.strength}" for label, one in zip(labels, fit.model.elements, strict=True)
+    }
+    fitted = [label for label, strength in strengths.items() if strength in fit.free]
+    if name not in fitted:
+        raise ValueError(
+            "Argument `rivals` must begin with an effect of the model with a fitted strength "
+            f"({', '.join(fitted)}), but begins with {name!r}."
+        )
+    if isinstance(given, str):
+        if given not in CATALOGUE:
+            raise ValueError(
+                "Argument `rivals` must end with an element or a name of the catalogue, but ends with "
+                f"{given!r}."
+            )
+        given = CATALOGUE[given].guess(campaign_scales(fit.campaign))
+    return (absent(given),), fit.free.index(strengths[name])
+
+
+def _largest_motion(columns: Columns, campaign: Campaign, outline: TestOutline) -> float:
+    """Give the largest displacement that the campaign went through [m]; NaN where it diverges."""
+    made = carry_out(columns, repeated_campaign(campaign, outline), 0.0)
+    return float(np.max(np.abs(made.displacement))) if isinstance(made, TrialRun) else float("nan")
+
+
+def _proposals(
+    asked: _Asked, outline: TestOutline, some: tuple[Experiment, ...], seconds: float, farthest: float
+) -> list[Proposal]:
+    """Simulate some records of one waveform side by side, and give what each is expected to say."""
+    can = [place for place, one in enumerate(some) if not one.lacking]
+    made = _simulated(asked, [some[place] for place in can], seconds)
+    if isinstance(made, str):
+        return [_left_out(asked, outline, one, one.lacking or made) for one in some]
+    reach = np.max(np.abs(made.displacement), axis=1)[: len(can)]
+    good = np.flatnonzero(made.finite[: len(can)] & ~(reach > farthest))
+    point = None
+    if good.size:
+        rows = np.resize(good, _SIDE_BY_SIDE)
+        kept = TrialRun(tuple(made.records[row] for row in rows), made.path[:, rows])
+        point = trial_point(asked.columns, some[can[0]], kept, asked.fit.campaign.rate, 1.0)
+    lanes = {can[row]: lane for lane, row in enumerate(good.tolist())}
+    proposals = []
+    for place, one in enumerate(some):
+        if point is not None and place in lanes:
+            found = _proposal(asked, outline, one, point, lanes[place], seconds)
+        elif one.lacking:
+            found = _left_out(asked, outline, one, one.lacking)
+        elif place in lanes:
+            found = _left_out(asked, outline, one, "its records have not what the rival follows")
+        elif made.finite[can.index(place)]:
+            found = _left_out(asked, outline, one, _TOO_FAR)
+        else:
+            found = _left_out(asked, outline, one, DIVERGES)
+        proposals.append(found)
+    return proposals
+
+
+def _simulated(asked: _Asked, some: list[Experiment], seconds: float) -> TrialRun | str:
+    """Simulate records side by side, filled up by repeating them."""
+    if not some:
+        return ""
+    drive = np.concatenate([some[place % len(some)].drive for place in range(_SIDE_BY_SIDE)])
+    lasted = sum(one.input.size / one.rate for one in asked.fit.campaign.fit_records)
+    after = (1.0, 1.0 + seconds / lasted)
+    return carry_out(asked.columns, some[0]._replace(drive=drive), 0.0, after)
+
+
+def _level(outline: TestOutline, experiment: Experiment) -> float:
+    return outline.nominal * float(np.std(experiment.drive))
+
+
+def _left_out(asked: _Asked, outline: TestOutline, experiment: Experiment, reason: str) -> Proposal:
+    nothing = np.full(len(asked.fit.free), np.nan)
+    lost = np.full(len(asked.gradient), np.nan)
+    return Proposal(experiment, _level(outline, experiment), nothing, lost, np.nan, np.nan, reason)
+
+
+def _proposal(
+    asked: _Asked,
+    outline: TestOutline,
+    experiment: Experiment,
+    point: Point,
+    row: int,
+    seconds: float,
+) -> Proposal:
+    """Give what one of the simulated records is expected to say."""
+    fit, columns = asked.fit, asked.columns
+    repeats = seconds / experiment.seconds
+    own = point.reduced.of_record(row)
+    if not np.all(np.isfinite(own.matrix)):
+        return _left_out(asked, outline, experiment, DIVERGES)
+    chi2 = float("nan")
+    count = len(fit.free)
+    if asked.old is not None:
+        total = full_matrix(columns, asked.old) + repeats * full_matrix(columns, point._replace(reduced=own))
+        strength = float(fit.model[fit.free[asked.effect]]) / columns.sizes[asked.effect]
+        known = tuple(place for place in range(count) if place != asked.effect)
+        chi2 = expected_chi2(total, known, asked.effect, count, strength) / asked.inflation
+    planned = own.rescaled(np.array(columns.sizes[:count]))
+    estimate = fit.estimate
+    after = expect_uncertainty(
+        estimate.point.reduced, estimate.point.nuisances, planned, repeats, asked.inflation
+    )
+    quantity_errors = _errors_of(asked.gradient, after.covariance)
+    shrinkage = (
+        float(np.exp(np.mean(np.log(quantity_errors / asked.quantity_errors))))
+        if len(asked.gradient)
+        else _shrinkage(estimate.uncertainty, after)
+    )
+    return Proposal(
+        experiment,
+        _level(outline, experiment),
+        after.standard_error,
+        quantity_errors,
+        shrinkage,
+        chi2,
+    )
+
+
+def _shrinkage(now: Uncertainty, after: Uncertainty) -> float:
+    """Give the geometric mean factor on the axes of the ellipsoid of what is determined now."""
+    known = now.determined & after.determined
+    if not known.any():
+        return float("nan")
+    volumes = []
+    for one in (now, after):
+        # Correlation and errors apart: stiffness in N/m and in N/m^3 must not spoil each other.
+        _, logarithm = np.linalg.slogdet(one.correlation[np.ix_(known, known)])
+        volumes.append(0.5 * logarithm + np.sum(np.log(one.standard_error[known])))
+    return float(np.exp((volumes[1] - volumes[0]) / np.count_nonzero(known)))

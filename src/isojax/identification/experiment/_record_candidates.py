@@ -1,0 +1,95 @@
+"""Records that the test rig of a campaign could measure next: level, band, waveform and direction."""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...records import Campaign
+from ..diagnosis import Experiment, Waveform
+from ._candidate_experiments import HIGHEST, WAVEFORM_WORDS
+from ._test_outline import DWELLS, MOST_STEPS, TestOutline
+from ._trial_drive import drive_of
+
+_HOW: tuple[tuple[Waveform, bool], ...] = (
+    ("stepped sine", False),
+    ("stepped sine", True),
+    ("swept sine", False),
+    ("swept sine", True),
+    ("multisine", False),
+)
+
+
+def outline_of_record(outline: TestOutline, seconds: float, substeps: int) -> TestOutline:
+    """Give the outline with segments as long as a record of so many seconds has them.
+
+    Args:
+        outline: what the campaign did.
+        seconds: length of the record [s].
+        substeps: integration steps a sample.
+
+    Returns:
+        The outline; a long record is simulated in part.
+    """
+    samples = min(seconds * outline.rate / DWELLS, max(MOST_STEPS / substeps, outline.samples))
+    return outline._replace(samples=int(np.ceil(samples)))
+
+
+def usual_levels(outline: TestOutline) -> tuple[float, ...]:
+    """Give the levels of the campaign and a third of the lowest: no farther than the model was tested."""
+    return (outline.levels[0] / 3.0, *outline.levels)
+
+
+def usual_bands(outline: TestOutline) -> tuple[tuple[float, float], ...]:
+    """Give the band of the campaign, its halves, its middle, and the band carried on either way [Hz]."""
+    low, high = outline.lowest, outline.highest
+    middle, quarter = 0.5 * (low + high), 0.25 * (high - low)
+    upper = min(2.0 * high, HIGHEST * outline.rate)
+    bands = (
+        (low, high),
+        (low, middle),
+        (middle, high),
+        (low + quarter, high - quarter),
+        (0.5 * low, high),
+        (low, upper),
+    )
+    return tuple(band for band in bands if band[1] > band[0])
+
+
+def record_candidates(
+    campaign: Campaign,
+    outline: TestOutline,
+    levels: Sequence[float],
+    bands: Sequence[tuple[float, float]],
+) -> tuple[Experiment, ...]:
+    """Give the records, in the order of their waveforms.
+
+    Args:
+        campaign: the measurements.
+        outline: length and sampling rate.
+        levels: rms of the drive [its SI unit].
+        bands: lowest and highest frequency of each [Hz].
+
+    Returns:
+        Experiments of one record each.
+    """
+    unit = "m/s²" if campaign.input.quantity == "base_acceleration" else "N"
+    found = []
+    for (waveform, backward), level, (low, high) in itertools.product(_HOW, levels, bands):
+        way = "" if waveform == "multisine" else ", downwards" if backward else ", upwards"
+        words = f"{WAVEFORM_WORDS[waveform]} of {level:.3g} {unit} rms, {low:.3g} to {high:.3g} Hz{way}"
+        name = f"{waveform}_{level:.3g}_{low:.3g}_{high:.3g}{way}".replace(", ", "_").replace(" ", "_")
+        drive = drive_of(outline, (level,), low, high, waveform, backward)
+        found.append(
+            Experiment(
+                name,
+                words,
+                drive,
+                outline.rate,
+                campaign.output.quantity,
+                waveform,
+                lacking="" if high <= HIGHEST * outline.rate else "the sampling rate is too low for its band",
+                backward=backward,
+            )
+        )
+    return tuple(found)
