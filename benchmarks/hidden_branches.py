@@ -131,8 +131,10 @@ def judge_isola(response: ij.FrequencyResponse) -> None:
 
 def judge_third(response: ij.FrequencyResponse) -> None:
     """Compare with Nayfeh & Mook 1979, eqs. (4.2.12) to (4.2.18), and with SciPy."""
-    found = [one for one in response.others if one.branch.periods == 3]
-    mark("curves of three drive periods, less one", abs(len(found) - 1), 0)
+    tripled = [one for one in response.others if one.branch.periods == 3]
+    # Others of three periods are resonances of higher order, such as 2/3.
+    found = [one for one in tripled if np.min(np.abs(np.asarray(one.frequency) - 0.6)) < 0.01]
+    mark("curves of three drive periods through 0.6 Hz, less one", abs(len(found) - 1), 0)
     third = found[0]
     cubic, half_damping, force = 0.01, 0.002, 8.0
 
@@ -150,7 +152,8 @@ def judge_third(response: ij.FrequencyResponse) -> None:
     def rates(omega, t, y):
         return [y[1], force * math.sin(omega * t) - y[0] - cubic * y[0] ** 3 - 2.0 * half_damping * y[1]]
 
-    mark("its motions return after three periods under SciPy", largest_miss(third, rates), 1e-5)
+    misses = [largest_miss(one, rates) for one in tripled]
+    mark("all motions of three periods return after them under SciPy", max(misses), 1e-5)
 
 
 def judge_half(response: ij.FrequencyResponse) -> None:

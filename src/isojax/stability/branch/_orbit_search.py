@@ -155,8 +155,8 @@ class OrbitSearch(NamedTuple):
         for begin in range(0, max(starts.shares.size, 1), _LANES):
             rows = [values[begin : begin + _LANES] for values in starts]
             count = rows[0].shape[0]
-            filled = [np.resize(row, (_LANES, *row.shape[1:])) for row in rows]
+            shares, states, sizes = (jnp.asarray(np.resize(row, (_LANES, *row.shape[1:]))) for row in rows)
             counts = jnp.asarray(self.periods), jnp.asarray(steps)
-            out = _improved(self.family, self.integrator, self.odd, *counts, tuple(map(jnp.asarray, filled)))
+            out = _improved(self.family, self.integrator, self.odd, *counts, (shares, states, sizes))
             parts.append([np.asarray(values)[:count] for values in out])
         return tuple(np.concatenate(own) for own in zip(*parts, strict=True))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Array, Bool, Float
 
 from ...models import Integrator
 from ..orbit import ShootingMethod, is_odd
@@ -20,8 +20,8 @@ _COARSE = Integrator(steps_per_period=64)
 """Steps with which orbits are sought."""
 
 _NEAR, _ON = 2e-2, 1e-3
-"""Distance from a branch, in scaled unknowns, below which an orbit lies on it: found by coarse steps, and by the
-steps of the branch."""
+"""Distance from a branch, in scaled unknowns, below which an orbit lies on it: found by coarse steps, and by
+the steps of the branch."""
 
 _AMONG = 33
 """Points between two of a branch at which the distance from it is taken, and again between two of these."""
@@ -87,7 +87,7 @@ class BranchSearch(NamedTuple):
 def find_other_branches(
     live: ParameterFamily,
     method: ShootingMethod,
-    scale: Float[np.ndarray, "branch state"],
+    scale: Float[Array, "branch state"],
     followed: Followed,
     search: BranchSearch,
 ) -> tuple[tuple[Branch, ...], Searched]:
@@ -208,7 +208,8 @@ def _branch(live: ParameterFamily, curve: Curve, stride: Stride) -> Branch:
     """Give a curve as a branch."""
     count = len(curve.unknowns)
     room = ((0, max(2 * stride.most - count, 0)), (0, 0))
-    rows = (np.pad(values, room, mode="edge") for values in (curve.unknowns, curve.tangents))
-    rows = (jnp.asarray(values)[None] for values in rows)
-    followed = Followed(*rows, jnp.asarray([count]), jnp.asarray([curve.ending]))
+    unknowns, tangents = (
+        jnp.asarray(np.pad(values, room, mode="edge"))[None] for values in (curve.unknowns, curve.tangents)
+    )
+    followed = Followed(unknowns, tangents, jnp.asarray([count]), jnp.asarray([curve.ending]))
     return assemble(live, curve.method, jnp.asarray(curve.scale)[None], followed, False, stride.longest)
