@@ -34,7 +34,7 @@ def test_an_isola_is_found_unasked_where_the_balance_of_one_harmonic_has_it(besi
     isola = beside_isola.others[0]
     assert len(beside_isola.others) == 1
     assert bool(isola.branch.closed)
-    assert isola.branch.detached
+    assert isola.branch.connection == "none"
 
     # F^2 = a^2 (1 - w^2)^2 + D(w a)^2: at w near 1 the isola lies between the two larger roots of D = F.
     def left(speed):

@@ -271,8 +271,8 @@ def _level(branch: Branch, place: int) -> str:
 
 def _beside_words(branch: Branch) -> str:
     """Say what a branch beside another is, for the legend."""
-    how = "detached" if branch.detached else "from a bifurcation"
-    return how + (f", {branch.periods} drive periods" if branch.periods > 1 else "")
+    how = {"none": "detached", "bifurcation": "from a bifurcation", "unknown": "not reached by the curve"}
+    return how[branch.connection] + (f", {branch.periods} drive periods" if branch.periods > 1 else "")
 
 
 def _nearest_point(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:

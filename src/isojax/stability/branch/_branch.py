@@ -1,6 +1,7 @@
 """A branch of periodic orbits: its points, its bifurcations, and what following another one needs."""
 
 import math
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -181,12 +182,16 @@ class Branch(eqx.Module):
     searched: Searched | None = None
 
     @property
-    def detached(self) -> bool:
-        """Whether it meets no branch of half the period, or of symmetric orbits."""
+    def connection(self) -> Literal["none", "bifurcation", "unknown"]:
+        """How it meets other branches: at a "bifurcation", where its orbits lose a doubled period or regain a
+        symmetry; "none" if it closes on itself without one; "unknown" if it goes on outside the range.
+        """
         points = self.special_points
         doubled = [point.kind == "period_doubling" and point.periods < self.periods for point in points]
         broken = [point.kind == "symmetry_breaking" and not self.symmetric for point in points]
-        return not any(doubled + broken)
+        if any(doubled + broken):
+            return "bifurcation"
+        return "none" if np.all(np.asarray(self.closed)) else "unknown"
 
     def _headline(self) -> str:
         kinds = [point.kind.replace("_", " ") for point in self.special_points]
@@ -208,14 +213,17 @@ class Branch(eqx.Module):
 
     def _in_words(self) -> str:
         """Say what kind of curve this is beside another, where it lies and how large its motions are."""
-        points, start = self.points, "a closed curve" if bool(np.all(np.asarray(self.closed))) else "a curve"
-        after = "" if self.periods == 1 else f" of {self.periods} drive periods"
-        value, stable = np.asarray(points.value), np.asarray(points.stable)
+        how = {
+            "none": "detached, a closed curve",
+            "bifurcation": "from a bifurcation, a curve",
+            "unknown": "not reached in this range, a curve",
+        }
+        points, after = self.points, "" if self.periods == 1 else f" of {self.periods} drive periods"
+        value, stable = np.asarray(points.value), np.abs(np.asarray(points.multipliers)[..., 0]) < 1.0
         span = f"{self.parameter} {number(np.nanmin(value))} to {number(np.nanmax(value))}"
         size = amount(np.nanmax(np.asarray(points.response)), "m")
         held = f"{int(stable.sum())} of {value.size} points stable"
-        how = "detached, " if self.detached else "from a bifurcation, "
-        return f"{how}{start}{after}: {span}, up to {size}, {held}"
+        return f"{how[self.connection]}{after}: {span}, up to {size}, {held}"
 
 
 def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float[Array, ""]:
