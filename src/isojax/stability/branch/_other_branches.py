@@ -152,8 +152,12 @@ def _other_curves(
             if sum(len(curve.unknowns) for curve in known[1:]) > search.stride.most:
                 left += orbits.shares.size
                 break
-            known.append(_followed_both_ways(family, main.method, odd, periods, orbits, search.stride))
+            curve = _followed_both_ways(family, main.method, odd, periods, orbits, search.stride)
             orbits = orbits.where(np.arange(orbits.shares.size) > 0)
+            if len(curve.unknowns) > 1:
+                known.append(curve)
+            else:
+                left += 1
     return known[1:], reach, left
 
 
