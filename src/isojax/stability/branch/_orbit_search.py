@@ -17,7 +17,7 @@ from ._parameter_family import ParameterFamily
 _LANES = 352
 """Starts that are improved at once: one compiled batch serves any number."""
 
-_NEWTON_STEPS = 10
+_STEPS_TO_CLOSE = 10
 """Steps of Newton's method from each start."""
 
 _LARGEST_STEP = 0.3
@@ -26,7 +26,7 @@ _LARGEST_STEP = 0.3
 _CLOSED_TO = 1e-6
 """Gap of a closed orbit, over its size: at a kink Newton's method may stall below."""
 
-_ALIKE = 1e-3
+_SAME_TO = 1e-3
 """Distance, over the size, below which two orbits at one value of the parameter are one."""
 
 
@@ -64,7 +64,7 @@ def _improved(
         setting = family.at(share[None])
         drive = setting.drive
         speed = size * 2.0 * math.pi * drive.frequency / periods
-        inner = jnp.maximum(jnp.abs(state[2:]), _ALIKE * size)
+        inner = jnp.maximum(jnp.abs(state[2:]), _SAME_TO * size)
         scale = jnp.concatenate([jnp.stack([size, speed]), inner])
 
         def turn(here: Array, part: float) -> Array:
@@ -110,7 +110,7 @@ class OrbitSearch(NamedTuple):
         Returns:
             Those that closed, each once at each value of the parameter.
         """
-        states, gap, _ = self._improved(starts, _NEWTON_STEPS)
+        states, gap, _ = self._improved(starts, _STEPS_TO_CLOSE)
         good = np.flatnonzero((gap < _CLOSED_TO) & np.all(np.isfinite(states), axis=1))
         kept: list[int] = []
         for share in np.unique(starts.shares[good]):
@@ -119,7 +119,7 @@ class OrbitSearch(NamedTuple):
             while own.size:
                 kept.append(int(own[0]))
                 apart = np.max(np.abs(states[own] - states[own[0]]) / size, axis=1)
-                own = own[apart > _ALIKE]
+                own = own[apart > _SAME_TO]
         return OrbitStarts(starts.shares[kept], states[kept], starts.sizes[kept])
 
     def orbits(self, closed: OrbitStarts) -> FoundOrbits:
@@ -147,7 +147,7 @@ class OrbitSearch(NamedTuple):
         for earlier in range(1, self.periods):
             if self.periods % earlier == 0:
                 apart = np.abs(along[:, each * earlier] - along[:, 0]) / sizes
-                repeats |= apart.max(axis=1) <= _ALIKE
+                repeats |= apart.max(axis=1) <= _SAME_TO
         return FoundOrbits(closed.shares, along, sizes).where(~repeats)
 
     def _improved(self, starts: OrbitStarts, steps: int) -> tuple[np.ndarray, ...]:

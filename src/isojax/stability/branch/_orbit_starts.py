@@ -15,16 +15,16 @@ from ._parameter_family import ParameterFamily
 PLACES = 12
 """Values of the parameter at which states are spread around the branch."""
 
-_SHARES, _SIZES = 48, 160
+_SHARE_COUNT, _SIZE_COUNT = 48, 160
 """Values of the parameter and displacement amplitudes of the tables of the one-harmonic balance."""
 
 _DECADES = (-6.0, 4.0)
 """Powers of ten of these amplitudes, over the largest linear answer at rest's stiffness."""
 
-_RADII, _PHASES = 8, 6
+_RADII, _DIRECTIONS = 8, 6
 """Distances from the branch's own motion, and directions, of the states spread at one value."""
 
-_INSIDE, _BEYOND = 0.3, 1.5
+_NEAREST, _FARTHEST = 0.3, 1.5
 """Least and largest of these distances, over the least and largest displacement of the balance."""
 
 _ALONG_RESONANCE = 16
@@ -119,11 +119,11 @@ def one_harmonic(family: ParameterFamily, periods: int = 1) -> OneHarmonic:
     Returns:
         The tables.
     """
-    shares = (np.arange(_SHARES) + 0.5) / _SHARES
+    shares = (np.arange(_SHARE_COUNT) + 0.5) / _SHARE_COUNT
     tiny = 1e-9
-    force, _, drive, _ = _tables(family, jnp.asarray(shares), jnp.full(_SIZES, tiny), jnp.asarray(1.0))
+    force, _, drive, _ = _tables(family, jnp.asarray(shares), jnp.full(_SIZE_COUNT, tiny), jnp.asarray(1.0))
     linear = np.asarray(drive) * tiny / np.asarray(force)[:, 0]
-    sizes = float(np.nanmax(linear)) * np.logspace(*_DECADES, _SIZES)
+    sizes = float(np.nanmax(linear)) * np.logspace(*_DECADES, _SIZE_COUNT)
     tables = _tables(family, jnp.asarray(shares), jnp.asarray(sizes), jnp.asarray(float(periods)))
     return OneHarmonic(sizes, shares, *(np.asarray(table) for table in tables))
 
@@ -197,8 +197,8 @@ def orbit_starts(
     def beside(share: np.ndarray, size: np.ndarray) -> OrbitStarts:
         """Spread states around the branch."""
         frequency = np.interp(share, own.shares, own.frequency)
-        phase = np.tile(2.0 * np.pi / _PHASES * np.arange(_PHASES), share.size)
-        share, size, frequency = (np.repeat(values, _PHASES) for values in (share, size, frequency))
+        phase = np.tile(2.0 * np.pi / _DIRECTIONS * np.arange(_DIRECTIONS), share.size)
+        share, size, frequency = (np.repeat(values, _DIRECTIONS) for values in (share, size, frequency))
         apart = np.abs(unknowns[:, -1] - share[:, None])
         near = apart <= apart.min(axis=1, keepdims=True) + _NEARBY
         states = unknowns[np.argmin(np.where(near, small, np.inf), axis=1), :-1] * scale
@@ -215,10 +215,10 @@ def orbit_starts(
     for share in (np.arange(PLACES) + 0.5) / PLACES:
         near = allowed[np.abs(allowed[:, 0] - share) <= 1.0 / PLACES, 1]
         near = near if near.size else np.array([largest])
-        radii = np.geomspace(_INSIDE * near.min(), _BEYOND * near.max(), _RADII)
+        radii = np.geomspace(_NEAREST * near.min(), _FARTHEST * near.max(), _RADII)
         parts.append(beside(np.full(_RADII, share), radii))
     if periods == 1:
-        shares = own.shares[:: _SHARES // PLACES]
+        shares = own.shares[:: _SHARE_COUNT // PLACES]
         balanced = held[np.isin(held[:, 0], shares)]
         share, size = np.concatenate([balanced, _resonance_peaks(own)]).T
         if share.size:

@@ -19,7 +19,7 @@ from ._tracing import assemble, trace
 _COARSE = Integrator(steps_per_period=64)
 """Steps with which orbits are sought."""
 
-_NEAR, _ON = 2e-2, 1e-3
+_NEAR_A_BRANCH, _ON_A_BRANCH = 2e-2, 1e-3
 """Distance from a branch, in scaled unknowns, below which an orbit lies on it: found by coarse steps, and by
 the steps of the branch."""
 
@@ -164,7 +164,7 @@ def _other_curves(
 def _off(closed: OrbitStarts, known: list[Curve]) -> OrbitStarts:
     """Give the motions that are not near a branch."""
     places = zip(closed.shares, closed.states, strict=True)
-    far = [min(curve.distance(share, state) for curve in known) > _NEAR for share, state in places]
+    far = [min(curve.distance(share, state) for curve in known) > _NEAR_A_BRANCH for share, state in places]
     return OrbitStarts(*(values[np.array(far, bool)] for values in closed))
 
 
@@ -174,7 +174,7 @@ def _beside(orbits: FoundOrbits, known: list[Curve]) -> Bool[np.ndarray, " orbit
         min(curve.distance(share, image) for curve in known for image in images)
         for share, images in zip(orbits.shares, orbits.images, strict=True)
     ]
-    return np.array(apart) > _ON
+    return np.array(apart) > _ON_A_BRANCH
 
 
 def _followed_both_ways(
@@ -187,7 +187,7 @@ def _followed_both_ways(
 ) -> Curve:
     """Follow the branch of the first of some orbits."""
     share, images, scale = (values[0] for values in orbits)
-    mirrored = odd and periods == 1 and np.max(np.abs(images[1] - images[0]) / scale) <= _ON
+    mirrored = odd and periods == 1 and np.max(np.abs(images[1] - images[0]) / scale) <= _ON_A_BRANCH
     method = ShootingMethod(main.integrator, periods, bool(mirrored))
     first = np.append(images[0] / scale, share)
     fixed = np.append(np.zeros(scale.size), 1.0)
