@@ -52,6 +52,8 @@ class Curve(NamedTuple):
         nearest = int(np.argmin(np.linalg.norm(self.unknowns - place, axis=1)))
         best = float(np.linalg.norm(self.unknowns[nearest] - place))
         for first in range(max(nearest - 1, 0), min(nearest + 1, len(self.unknowns) - 1)):
+            if best > 2.0 * np.linalg.norm(self.unknowns[first + 1] - self.unknowns[first]):
+                continue
             low, high = 0.0, 1.0
             for _ in range(2):
                 parts = np.linspace(low, high, _AMONG)
@@ -147,7 +149,8 @@ def _other_curves(
             continue
         exact = OrbitSearch(family, main.method.integrator, odd, periods)
         orbits = exact.orbits(exact.closed(closed))
-        while (orbits := orbits.where(_beside(orbits, known))).shares.size:
+        orbits = orbits.where(_beside(orbits, known))
+        while orbits.shares.size:
             # Where motions are chaotic there are orbits without end.
             if sum(len(curve.unknowns) for curve in known[1:]) > search.stride.most:
                 left += orbits.shares.size
@@ -156,6 +159,7 @@ def _other_curves(
             orbits = orbits.where(np.arange(orbits.shares.size) > 0)
             if len(curve.unknowns) > 1:
                 known.append(curve)
+                orbits = orbits.where(_beside(orbits, [curve]))
             else:
                 left += 1
     return known[1:], reach, left
