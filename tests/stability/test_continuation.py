@@ -23,8 +23,9 @@ DUFFING = ij.Isolator(1.0, (ij.LinearDamping(0.02), ij.LinearStiffness(1.0), ij.
 
 
 def along_force(model, frequency, start=1.0, stop=400.0, **options):
+    asked = {"other_periods": (), **options}
     return ij.continue_branch(
-        model, parameter="amplitude", frequency=frequency, start=start, stop=stop, **options
+        model, parameter="amplitude", frequency=frequency, start=start, stop=stop, **asked
     )
 
 
@@ -83,7 +84,9 @@ def test_one_branch_is_that_of_the_batch(paper_branches):
 
 
 def test_a_linear_isolator_answers_in_closed_form():
-    branch = ij.continue_branch(LINEAR, parameter="frequency", amplitude=5.0, start=1.0, stop=8.0)
+    branch = ij.continue_branch(
+        LINEAR, parameter="frequency", amplitude=5.0, start=1.0, stop=8.0, other_periods=()
+    )
     assert ij.is_successful(branch.result)
     assert branch.special_points == ()
     omega = 2 * np.pi * np.asarray(branch.points.value)
@@ -97,7 +100,14 @@ def test_a_linear_isolator_answers_in_closed_form():
 
 def test_a_linear_isolator_answers_a_changing_mass_in_closed_form():
     branch = ij.continue_branch(
-        LINEAR, parameter="mass", amplitude=5.0, frequency=3.0, start=1.0, stop=4.0, step=0.05
+        LINEAR,
+        parameter="mass",
+        amplitude=5.0,
+        frequency=3.0,
+        start=1.0,
+        stop=4.0,
+        step=0.05,
+        other_periods=(),
     )
     assert ij.is_successful(branch.result)
     omega = 6.0 * np.pi

@@ -149,7 +149,9 @@ def test_derivatives_of_a_map_are_those_of_its_orbits(paper: ij.Isolator, at_jum
 @pytest.mark.slow
 def test_fold_force_moves_as_the_fold_that_differences_find(paper: ij.Isolator):
     def fold(model: ij.Isolator) -> ij.SpecialPoint:
-        found = ij.continue_branch(model, parameter="amplitude", frequency=4.3, start=120.0, stop=200.0)
+        found = ij.continue_branch(
+            model, parameter="amplitude", frequency=4.3, start=120.0, stop=200.0, other_periods=()
+        )
         return found.special_points[0]
 
     point = fold(paper)

@@ -35,7 +35,7 @@ def only(points, kind):
 def symmetric():
     fine = ij.Integrator(steps_per_period=512)
     return ij.continue_branch(
-        UEDA, parameter="amplitude", frequency=ONE, start=0.05, stop=15.0, integrator=fine
+        UEDA, parameter="amplitude", frequency=ONE, start=0.05, stop=15.0, integrator=fine, other_periods=()
     )
 
 
@@ -151,7 +151,13 @@ def test_forced_van_der_pol_loses_its_lock_where_averaging_says():
     force = 2.0 * strength * omega * np.sqrt(0.5) * np.hypot(0.5, detuned)
     model = van_der_pol(strength)
     branch = ij.continue_branch(
-        model, parameter="amplitude", frequency=omega * ONE, start=0.005, stop=0.3, step=0.01
+        model,
+        parameter="amplitude",
+        frequency=omega * ONE,
+        start=0.005,
+        stop=0.3,
+        step=0.01,
+        other_periods=(),
     )
     point = only(branch.special_points, "neimark_sacker")
     assert float(point.amplitude) == pytest.approx(force, rel=5e-3)
@@ -171,7 +177,12 @@ def test_forced_van_der_pol_loses_its_lock_where_averaging_says():
 @pytest.mark.slow
 def test_a_saddle_with_reciprocal_multipliers_is_no_torus():
     branch = ij.continue_branch(
-        van_der_pol(0.1), parameter="frequency", amplitude=0.1, start=0.8 * ONE, stop=1.2 * ONE
+        van_der_pol(0.1),
+        parameter="frequency",
+        amplitude=0.1,
+        start=0.8 * ONE,
+        stop=1.2 * ONE,
+        other_periods=(),
     )
     values = np.asarray(branch.points.multipliers)
     product = np.real(values[:, 0] * values[:, 1])
@@ -188,7 +199,12 @@ def test_a_saddle_with_reciprocal_multipliers_is_no_torus():
 def test_an_asymmetric_spring_doubles_without_breaking_a_symmetry():
     spring = (ij.LinearDamping(0.1), ij.LinearStiffness(1.0), ij.QuadraticStiffness(1.0))
     branch = ij.continue_branch(
-        ij.Isolator(1.0, spring), parameter="amplitude", frequency=0.85 * ONE, start=0.001, stop=0.15
+        ij.Isolator(1.0, spring),
+        parameter="amplitude",
+        frequency=0.85 * ONE,
+        start=0.001,
+        stop=0.15,
+        other_periods=(),
     )
     assert not branch.symmetric
     assert [point.kind for point in branch.special_points] == ["fold", "fold", "period_doubling"]
@@ -206,7 +222,7 @@ def test_an_asymmetric_spring_doubles_without_breaking_a_symmetry():
 def test_a_broken_branch_that_comes_back_meets_no_fold_where_it_crosses(monkeypatch):
     # There the search for the point is singular; badly located, it must still be told for what it is.
     branch = ij.continue_branch(
-        UEDA, parameter="amplitude", frequency=0.3 * ONE, start=0.05, stop=1.0, step=0.05
+        UEDA, parameter="amplitude", frequency=0.3 * ONE, start=0.05, stop=1.0, step=0.05, other_periods=()
     )
     breaks = [point for point in branch.special_points if point.kind == "symmetry_breaking"][:2]
     monkeypatch.setattr("isojax.stability.branch._special_points._BISECTIONS", 3)

@@ -24,6 +24,7 @@ from .branch import Cusp as Cusp
 from .branch import FoldCurve as FoldCurve
 from .branch import NearestFolds as NearestFolds
 from .branch import PeriodDoublingCurve as PeriodDoublingCurve
+from .branch import Searched as Searched
 from .branch import SpecialPoint as SpecialPoint
 from .branch import continue_branch as continue_branch
 from .branch import find_nearest_folds as find_nearest_folds

@@ -102,6 +102,7 @@ def folds_around(smap: StabilityMap) -> FoldCurve | None:
         frequency=float(frequencies[column]),
         start=window[0],
         stop=window[1],
+        other_periods=(),
     )
     folds = [point for point in branch.special_points if point.kind == "fold" and is_successful(point.result)]
     if not folds:

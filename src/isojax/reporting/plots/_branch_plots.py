@@ -28,6 +28,8 @@ from ._style import MEASURED, NEUTRAL, axes_for, entitle
 def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | None = None) -> Figure:
     """Draw the response along a branch, solid where stable, with its bifurcations.
 
+    The branches that were found beside it (`branch.others`) are drawn with it, each in a colour of its own.
+
     Args:
         branch: one or a batch.
         others: more of the same parameter, such as those that `switch_branch` gives.
@@ -46,7 +48,8 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
             )
     figure, ax = axes_for(ax, 6.4, 3.8)
     kinds: set[str] = set()
-    curves = [(one, place) for one in (branch, *others) for place in range(_motion_count(one))]
+    beside = [other for one in (branch, *others) for other in one.others]
+    curves = [(one, place) for one in (branch, *others, *beside) for place in range(_motion_count(one))]
     unstable = False
     for (one, place), colour in zip(curves, level_colours(len(curves)), strict=True):
         points = one.points
@@ -54,8 +57,9 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
             _row(np.asarray(values), place) for values in (points.value, points.response, points.stable)
         )
         unstable |= _any_unstable(y, stable)
-        draw_curve(ax, x, MILLIMETRES * y, stable, colour, _level(one, place) if len(curves) > 1 else "")
-    for one in (branch, *others):
+        label = _beside_words(one) if any(one is other for other in beside) else _level(one, place)
+        draw_curve(ax, x, MILLIMETRES * y, stable, colour, label if len(curves) > 1 else "")
+    for one in (branch, *others, *beside):
         kinds |= set(draw_special_points(ax, [_placed(one, point) for point in one.special_points]))
     ax.set_xlabel(parameter_label(branch.model, branch.parameter))
     ax.set_ylabel("response, half peak to peak [mm]")
@@ -73,6 +77,9 @@ def plot_frequency_response(
 ) -> Figure:
     """Draw the response over frequency, past its folds, solid where stable.
 
+    Responses beside the curve (`response.others`) are drawn with it, each in a colour of its own; the legend
+    says what they are.
+
     Args:
         response: at one drive amplitude or several.
         backbone: drawn through the peaks of the displacement.
@@ -88,27 +95,29 @@ def plot_frequency_response(
     if what not in ("displacement", "phase"):
         raise ValueError(f'Argument `what` must be "displacement" or "phase", but is {what!r}.')
     figure, ax = axes_for(ax, 6.4, 3.8)
-    branch = response.branch
-    shift = np.asarray(response.amplitude) * MILLIMETRES
-    values = shift if what == "displacement" else np.degrees(np.asarray(response.phase))
-    count, unstable = _motion_count(branch), False
-    places = []
-    for place, colour in zip(range(count), level_colours(count), strict=True):
-        x, y, stable = (_row(np.asarray(v), place) for v in (response.frequency, values, response.stable))
+    drives, unstable, places = _motion_count(response.branch), False, []
+    curves = [(response, place) for place in range(drives)] + [(other, 0) for other in response.others]
+    for number, ((one, place), colour) in enumerate(zip(curves, level_colours(len(curves)), strict=True)):
+        heights = MILLIMETRES * np.asarray(one.amplitude)
+        heights = heights if what == "displacement" else np.degrees(np.asarray(one.phase))
+        x, y, stable = (_row(np.asarray(v), place) for v in (one.frequency, heights, one.stable))
         unstable |= _any_unstable(y, stable)
-        draw_curve(ax, x, y, stable, colour, _level(branch, place))
-        if response.band is not None and what == "displacement":
+        words = _level(one.branch, place)
+        if number >= drives:
+            words = _beside_words(one.branch) + (f", {words}" if drives > 1 else "")
+        draw_curve(ax, x, y, stable, colour, words)
+        if one.band is not None and what == "displacement":
             lower, upper = (
                 (
                     _row(np.asarray(end["frequency"]), place),
                     MILLIMETRES * _row(np.asarray(end["amplitude"]), place),
                 )
-                for end in (response.band.lower, response.band.upper)
+                for end in (one.band.lower, one.band.upper)
             )
             draw_band(ax, lower, upper, colour)
-        for point in response.special_points:
+        for point in one.special_points:
             if point.branch == place:
-                nearest = _nearest_point(branch, place, point)
+                nearest = _nearest_point(one.branch, place, point)
                 height = MILLIMETRES * nearest[1] if what == "displacement" else y[nearest[0]]
                 places.append((point, float(point.frequency), float(height)))
     kinds = draw_special_points(ax, places)
@@ -258,6 +267,12 @@ def _level(branch: Branch, place: int) -> str:
     held.pop(branch.parameter, None)
     words = [quantity(float(_row(np.asarray(values), place)[0]), own) for values, own in held.values()]
     return ", ".join(words) + (f", period {branch.periods}" if branch.periods > 1 else "")
+
+
+def _beside_words(branch: Branch) -> str:
+    """Say what a branch beside another is, for the legend."""
+    how = {"none": "detached", "bifurcation": "from a bifurcation", "unknown": "not reached by the curve"}
+    return how[branch.connection] + (f", {branch.periods} drive periods" if branch.periods > 1 else "")
 
 
 def _nearest_point(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:

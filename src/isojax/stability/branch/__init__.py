@@ -2,7 +2,8 @@
 
 In: an isolator, the parameter and its range. Out: `Branch` with its `SpecialPoint`s, fold and period-
 doubling curves, nearest folds. Read _parameter_family, _arc_length (how a curve is followed), _branch,
-_continuation; then _special_points (what is located along a branch) and _extended_system (its exact
+_continuation with _tracing; then _other_branches (what the branch does not reach) with _orbit_search and
+_orbit_starts; _special_points (what is located along a branch) and _extended_system (its exact
 equations); then _branch_switching, _codimension_two with _bifurcation_curves, and _nearest_folds.
 """
 
@@ -11,6 +12,7 @@ from ._bifurcation_curves import FoldCurve as FoldCurve
 from ._bifurcation_curves import PeriodDoublingCurve as PeriodDoublingCurve
 from ._branch import Branch as Branch
 from ._branch import BranchPoints as BranchPoints
+from ._branch import Searched as Searched
 from ._branch import SpecialPoint as SpecialPoint
 from ._branch_switching import switch_branch as switch_branch
 from ._codimension_two import fold_curve as fold_curve

@@ -1,6 +1,7 @@
 """A branch of periodic orbits: its points, its bifurcations, and what following another one needs."""
 
 import math
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -9,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._results import RESULTS
-from ..._show import Row, brief, number, shown
+from ..._show import Row, amount, brief, number, shown
 from ...models import Integrator, Isolator, State
 from ..orbit import ShootingMethod, Sine, modulus, multipliers, trajectory
 from ._extended_system import BifurcationKind
@@ -114,6 +115,34 @@ class SpecialPoint(eqx.Module):
 
 
 @shown
+class Searched(eqx.Module):
+    """Where branches beside one were sought.
+
+    Attributes:
+        parameter: what varies.
+        values: of the parameter, at which states were spread around the branch [its SI unit].
+        periods: drive periods of the orbits that were sought.
+        displacement: largest displacement amplitude of the motions that were tried [m].
+        left: orbits that lie on branches that were not followed any more.
+    """
+
+    parameter: str = eqx.field(static=True)
+    values: Float[Array, " value"]
+    periods: tuple[int, ...] = eqx.field(static=True)
+    displacement: float
+    left: int
+
+    def _headline(self) -> str:
+        *more, last = map(str, self.periods)
+        periods = f"{', '.join(more)} and {last}" if more else last
+        values = np.asarray(self.values)
+        span = f"{number(values.min())} to {number(values.max())}"
+        where = f"{values.size} values of {self.parameter} from {span}"
+        left = f"; {self.left} orbits lie on branches that were not followed" if self.left else ""
+        return f"orbits of {periods} drive periods, up to {amount(self.displacement, 'm')}, at {where}{left}"
+
+
+@shown
 class Branch(eqx.Module):
     """Periodic orbits along one parameter, or a batch of such branches.
 
@@ -131,6 +160,10 @@ class Branch(eqx.Module):
         integrator: steps and solver.
         scale: size of each state.
         longest: largest step.
+        others: branches that this one does not reach within the range, each followed both ways: closed curves
+            (isolas), curves that leave the range, subharmonics. Of mirror images one is given, and of the
+            orbits that are one motion counted from another drive period.
+        searched: where they were sought; None if they were not.
     """
 
     model: Isolator
@@ -145,6 +178,20 @@ class Branch(eqx.Module):
     integrator: Integrator
     scale: Float[Array, "*branch state"]
     longest: float = eqx.field(static=True)
+    others: tuple["Branch", ...] = ()
+    searched: Searched | None = None
+
+    @property
+    def connection(self) -> Literal["none", "bifurcation", "unknown"]:
+        """How it meets other branches: at a "bifurcation", where its orbits lose a doubled period or regain a
+        symmetry; "none" if it closes on itself without one; "unknown" if it goes on outside the range.
+        """
+        points = self.special_points
+        doubled = [point.kind == "period_doubling" and point.periods < self.periods for point in points]
+        broken = [point.kind == "symmetry_breaking" and not self.symmetric for point in points]
+        if any(doubled + broken):
+            return "bifurcation"
+        return "none" if np.all(np.asarray(self.closed)) else "unknown"
 
     def _headline(self) -> str:
         kinds = [point.kind.replace("_", " ") for point in self.special_points]
@@ -158,7 +205,25 @@ class Branch(eqx.Module):
         return [*own, *span]
 
     def _lines(self) -> list[str]:
-        return [f"  {point._headline()}" for point in self.special_points]
+        lines = [f"  {point._headline()}" for point in self.special_points]
+        if self.searched is None:
+            return lines
+        beside = [f"  beside it {other._in_words()}" for other in self.others]
+        return [*lines, *beside, f"  looked for beside it: {self.searched._headline()}"]
+
+    def _in_words(self) -> str:
+        """Say what kind of curve this is beside another, where it lies and how large its motions are."""
+        how = {
+            "none": "detached, a closed curve",
+            "bifurcation": "from a bifurcation, a curve",
+            "unknown": "not reached in this range, a curve",
+        }
+        points, after = self.points, "" if self.periods == 1 else f" of {self.periods} drive periods"
+        value, stable = np.asarray(points.value), np.abs(np.asarray(points.multipliers)[..., 0]) < 1.0
+        span = f"{self.parameter} {number(np.nanmin(value))} to {number(np.nanmax(value))}"
+        size = amount(np.nanmax(np.asarray(points.response)), "m")
+        held = f"{int(stable.sum())} of {value.size} points stable"
+        return f"{how[self.connection]}{after}: {span}, up to {size}, {held}"
 
 
 def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float[Array, ""]:

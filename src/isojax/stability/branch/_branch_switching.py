@@ -8,7 +8,8 @@ from ..._types import check_float64
 from ..orbit import ShootingMethod
 from ._arc_length import Departure, Stride
 from ._branch import Branch, SpecialPoint
-from ._continuation import assemble, refuse_traced, trace
+from ._continuation import refuse_traced
+from ._tracing import assemble, trace
 
 _ASIDE = 0.25
 """Distance from the bifurcation at which the new branch is looked for, over the largest step."""

@@ -208,6 +208,7 @@ def _meet(model: Isolator, search: _Search, integrator: Integrator) -> SpecialPo
         frequency=jnp.linspace(*frequency_range, search.frequencies),
         start=low,
         stop=high,
+        other_periods=(),
         step=search.stride.longest,
         integrator=integrator,
     )

@@ -1,9 +1,9 @@
 """Branches of periodic orbits along one parameter, past their folds."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,14 +12,14 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
-from ..._results import RESULTS
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import ShootingMethod, is_odd, response_start
-from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
-from ._branch import Branch, BranchPoints, branch_point
+from ._arc_length import Departure, Stride
+from ._branch import Branch
+from ._other_branches import BranchSearch, find_other_branches
 from ._parameter_family import ParameterFamily
-from ._special_points import find_special_points
+from ._tracing import assemble, trace
 
 _SIZED_AT = 33
 """Parameters at which the size of the motion is estimated beforehand."""
@@ -62,11 +62,15 @@ def continue_branch(
     start_state: Sequence[Scalar | float] | Float[Array, " state"] | None = None,
     periods: int = 1,
     symmetric: bool | None = None,
+    other_periods: Sequence[int] | None = None,
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
 ) -> Branch:
     """Follow a branch of periodic orbits along the drive's amplitude, its frequency or any coefficient.
+
+    Orbits that the branch does not reach within the range are sought too, and followed as branches of their
+    own: see `others` of the result, and `searched` for where they were sought.
 
     Pseudo-arc-length continuation of the period map's fixed point; of symmetric orbits of odd models, of the
     half-period map's. Bifurcations are located on the way and then found anew with the motion split at its
@@ -87,6 +91,8 @@ def continue_branch(
         periods: drive periods after which the orbits repeat.
         symmetric: whether to follow symmetric orbits with the half-period map; if omitted, so for an odd
             model without a `start_state`.
+        other_periods: drive periods of the orbits that are sought beside the branch, () for none; if omitted
+            1, 2 and 3, or none where `start_state` says which branch is meant.
         step: largest step, over the size of the motion and the range of the parameter.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
@@ -97,7 +103,8 @@ def continue_branch(
     Raises:
         ValueError: if `parameter` is none of the model's, the drive is incomplete or said twice, the range is
             empty or not finite, a frequency is not positive, `start_state` has the wrong length, `symmetric`
-            is asked of a model that is not odd, or `step`, `most` or `periods` is not positive.
+            is asked of a model that is not odd, or `step`, `most`, `periods` or one of `other_periods` is not
+            positive.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Nayfeh & Balachandran 1995, sec. 6.1.
@@ -119,6 +126,12 @@ def continue_branch(
     for name, value in (("periods", periods), ("step", step), ("most", most)):
         if not value > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
+    if other_periods is None:
+        other_periods = (1, 2, 3) if start_state is None else ()
+    if any(count < 1 for count in other_periods):
+        raise ValueError(
+            f"Argument `other_periods` must hold positive counts, but is {tuple(other_periods)}."
+        )
     wanted = periods == 1 and (bool(symmetric) or (symmetric is None and start_state is None))
     half = wanted and is_odd(jax.lax.stop_gradient(model))
     if symmetric and not half:
@@ -132,7 +145,12 @@ def continue_branch(
     fixed = jnp.zeros((*scale.shape[:1], states + 1)).at[:, -1].set(1.0)
     method, stride = ShootingMethod(integrator, periods, half), Stride(step, most)
     followed = trace(frozen, method, scale, Departure(first, fixed, fixed), stride)
-    return assemble(family, method, scale, followed, batched, step)
+    branch = assemble(family, method, scale, followed, batched, step)
+    if not other_periods:
+        return branch
+    search = BranchSearch(tuple(other_periods), stride)
+    found, searched = find_other_branches(family, method, scale, followed, search)
+    return dataclasses.replace(branch, others=found, searched=searched)
 
 
 def _family(
@@ -202,103 +220,3 @@ def _starts(
         return jnp.concatenate([first / scale, jnp.zeros(1)]), scale
 
     return jax.vmap(lane)(family.amplitude, family.frequency)
-
-
-@eqx.filter_jit
-def trace(
-    family: ParameterFamily,
-    method: ShootingMethod,
-    scale: Float[Array, "branch state"],
-    departure: Departure,
-    stride: Stride,
-) -> Followed:
-    """Follow a batch of branches.
-
-    Args:
-        family: isolators and drives, drive with a leading axis.
-        method: how the orbits are closed.
-        scale: size of each state.
-        departure: where each starts: scaled state and share.
-        stride: steps along the branches.
-
-    Returns:
-        The curves.
-    """
-    states = scale.shape[1]
-
-    def lane(amplitude: Array, frequency: Array, scale: Array, departure: Departure) -> Followed:
-        here = family.driven(amplitude, frequency)
-        return follow(lambda u: here.open_end(method, scale, u), departure, states, stride)
-
-    return jax.vmap(lane)(family.amplitude, family.frequency, scale, departure)
-
-
-@eqx.filter_jit
-def _branch_points(
-    family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
-) -> BranchPoints:
-    def lane(
-        amplitude: Array, frequency: Array, scale: Array, unknown: Array, tangent: Array
-    ) -> BranchPoints:
-        here = family.driven(amplitude, frequency)
-        return jax.vmap(lambda u, t: branch_point(here, method, scale, u, t))(unknown, tangent)
-
-    return jax.vmap(lane)(family.amplitude, family.frequency, scale, unknowns, tangents)
-
-
-def assemble(
-    family: ParameterFamily,
-    method: ShootingMethod,
-    scale: Float[Array, "branch state"],
-    followed: Followed,
-    batched: bool,
-    step: float,
-) -> Branch:
-    """Give the branch of traced points: what is known of each, and the bifurcations between them.
-
-    Args:
-        family: isolators and drives, drive with a leading axis.
-        method: how the orbits are closed.
-        scale: size of each state.
-        followed: the traced points.
-        batched: whether to keep the leading axis.
-        step: largest step.
-
-    Returns:
-        The branch.
-    """
-    counts = np.asarray(followed.found)
-    # Rounded up, so that few shapes are compiled.
-    room = min(-(-max(int(counts.max()), 2) // 128) * 128, followed.unknowns.shape[1])
-    unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
-    points = _branch_points(family, method, scale, unknowns, tangents)
-    special = find_special_points(family, method, scale, unknowns, tangents, counts)
-    longest = int(counts.max())
-
-    def crop(values: Array) -> Array:
-        used = jnp.asarray(np.arange(longest) < counts[:, None])
-        used = used.reshape(used.shape + (1,) * (values.ndim - 2))
-        kept = jnp.where(used, values[:, :longest], jnp.nan)
-        return kept if batched else kept[0]
-
-    def single(values: Array) -> Array:
-        return values if batched else values[0]
-
-    ended = (followed.ending == REACHED_BOUND) | (followed.ending == RETURNED)
-    good = RESULTS.promote(diffrax.RESULTS.successful)
-    result = jax.vmap(lambda well: RESULTS.where(well, good, RESULTS.not_converged))(ended)
-    kept = family.driven(single(family.amplitude), single(family.frequency))
-    return Branch(
-        family.model,
-        family.names[0],
-        method.periods,
-        method.half,
-        single(followed.ending == RETURNED),
-        jax.tree.map(crop, points),
-        special,
-        result if batched else jax.tree.map(lambda value: value[0], result),
-        kept,
-        method.integrator,
-        single(scale),
-        step,
-    )

@@ -1,5 +1,7 @@
 """Response over frequency at one drive amplitude, past its folds, with its unstable segments."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -11,7 +13,17 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._results import RESULTS
 from ..._show import amount, number, shown
 from ..._types import check_float64
-from ...models import Band, EndsEstimated, Estimated, Integrator, Isolator, Modelled, as_isolator, find_band
+from ...models import (
+    Band,
+    EndsEstimated,
+    Estimated,
+    Integrator,
+    Isolator,
+    Modelled,
+    State,
+    as_isolator,
+    find_band,
+)
 from ..branch import Branch, SpecialPoint, continue_branch
 from ..orbit import Sine, recorded_sine, trajectory
 
@@ -27,11 +39,15 @@ class FrequencyResponse(eqx.Module):
         receptance: complex amplitude of the fundamental of the displacement over that of the recorded drive
             [m/N, or s^2 for base excitation].
         band: of frequency and amplitude, across the curve, where a fit was given.
+        others: responses that the curve does not reach within the band of frequencies, each a curve of its
+            own: isolas, subharmonics, and what leaves the curve at a bifurcation; `branch.searched` says
+            where they were sought.
     """
 
     branch: Branch
     receptance: Complex[Array, "*branch point"]
     band: Band | None = None
+    others: tuple["FrequencyResponse", ...] = ()
 
     @property
     def frequency(self) -> Float[Array, "*branch point"]:
@@ -72,7 +88,7 @@ class FrequencyResponse(eqx.Module):
         return f"largest response {peak} under a drive of {drive}; {self.branch._headline()}"
 
     def _rows(self) -> list[str]:
-        return ["branch", "receptance", *(["band"] if self.band is not None else [])]
+        return ["branch", "receptance", *(["band"] if self.band is not None else []), "others"]
 
     def _lines(self) -> list[str]:
         return self.branch._lines()
@@ -83,35 +99,40 @@ def frequency_response(
     amplitude: Any,
     frequencies: Any,
     *,
+    periods: Sequence[int] = (1, 2, 3),
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
     fit: Estimated | EndsEstimated | None = None,
 ) -> FrequencyResponse:
-    """Follow the periodic response over frequency.
+    """Follow the periodic response over frequency, and look for responses beside it.
 
-    The curve that starts with the smallest motion at the first frequency; one that closes on itself apart
-    from it is not met.
+    The curve itself starts with the smallest motion at the first frequency. Orbits that it does not reach are
+    sought over the whole band and followed as curves of their own, in `others`: detached response curves
+    (isolas), and subharmonics of order 1/n, which repeat after n drive periods. Superharmonics have the
+    period of the drive: they are peaks of the curve, or in `others` where they are detached.
 
     Args:
         model: the isolator.
         amplitude: of the drive, a number or a list of them [N, or m/s^2 for base excitation].
         frequencies: of which the first and the last bound the curve; either may be the larger [Hz]. The curve
             chooses its own points between them.
+        periods: drive periods after which the motions beside the curve repeat; () to look for none.
         step: largest step, over the size of the motion and the range of frequency.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
-        fit: with whose errors the curve is given a band; `model` is its model. None for no band.
+        fit: with whose errors the curve, not those beside it, is given a band; `model` is its model. None for
+            no band.
 
     Returns:
         The response. Where it ends early `result` says so, and the points found so far stand.
 
     Raises:
         ValueError: if an amplitude is not positive, there are not two different positive frequencies, or
-            `step` or `most` is not positive.
+            `periods`, `step` or `most` is not positive.
         RuntimeError: if JAX is not in 64-bit mode.
 
-    Source: Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 4.1.
+    Source: Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 4.1 (the curve) and 4.2 (subharmonics).
 
     Example:
         >>> response = ij.frequency_response(ij.paper.y_direction(), 50.0, (4.0, 7.0))
@@ -133,13 +154,17 @@ def frequency_response(
             f"is {frequencies}."
         )
 
-    def branch_of(isolator: Isolator) -> Branch:
+    if any(count < 1 for count in periods):
+        raise ValueError(f"Argument `periods` must hold positive counts, but is {tuple(periods)}.")
+
+    def branch_of(isolator: Isolator, other_periods: Sequence[int] = ()) -> Branch:
         return continue_branch(
             isolator,
             parameter="frequency",
             amplitude=jnp.asarray(forces),
             start=float(ends[0]),
             stop=float(ends[-1]),
+            other_periods=other_periods,
             step=step,
             most=most,
             integrator=integrator,
@@ -149,35 +174,51 @@ def frequency_response(
         points = branch_of(isolator).points
         return jnp.stack([points.frequency, points.response])
 
-    branch = branch_of(model)
+    branch = branch_of(model, periods)
     names = ("frequency", "amplitude")
     band = None if fit is None else find_band(fit, model, names, curve, across=True)
-    return FrequencyResponse(branch, _receptance(model, branch), band)
+    others = tuple(FrequencyResponse(one, _receptance(model, one)) for one in branch.others)
+    return FrequencyResponse(branch, _receptance(model, branch), band, others)
+
+
+def _receptance(model: Isolator, branch: Branch) -> Complex[Array, "*branch point"]:
+    points = branch.points
+    shape, states = points.frequency.shape, points.y0.shape[-1]
+    count = math.prod(shape)
+    lanes = [
+        points.amplitude.reshape(count),
+        points.frequency.reshape(count),
+        *points.y0.reshape(count, states).T,
+    ]
+    # Rounded up, so that few shapes are compiled.
+    room = -count % 128
+    amplitude, frequency, *state = (jnp.pad(lane, (0, room), constant_values=jnp.nan) for lane in lanes)
+    found = _receptances(model, branch.integrator, branch.periods, amplitude, frequency, tuple(state))
+    return found[:count].reshape(shape)
 
 
 @eqx.filter_jit
-def _receptance(model: Isolator, branch: Branch) -> Complex[Array, "*branch point"]:
-    points = branch.points
-    shape = points.frequency.shape
-    drive = recorded_sine(model, points.amplitude.ravel(), points.frequency.ravel())
-    state = tuple(jnp.moveaxis(points.y0.reshape(-1, points.y0.shape[-1]), -1, 0))
-    path = trajectory(model, branch.integrator, drive, state)
+def _receptances(
+    model: Isolator, integrator: Integrator, periods: int, amplitude: Array, frequency: Array, state: State
+) -> Complex[Array, " point"]:
+    drive = recorded_sine(model, amplitude, frequency)
+    path = trajectory(model, integrator, drive, state, turns=float(periods))
     # The recorded drive is a sine: -i of its amplitude times exp(i omega t).
-    recorded = jax.lax.complex(0.0 * drive.frequency, -points.amplitude.ravel())
-    return (fundamental(path[0]) / recorded).reshape(shape)
+    return fundamental(path[0], periods) / jax.lax.complex(0.0 * frequency, -amplitude)
 
 
-def fundamental(path: Float[Array, "time ..."]) -> Complex[Array, "..."]:
-    """Give the complex amplitude X of the fundamental `X exp(i omega t)`.
+def fundamental(path: Float[Array, "time ..."], periods: int = 1) -> Complex[Array, "..."]:
+    """Give the complex amplitude X of the fundamental `X exp(i omega t)`, omega that of the drive.
 
     Args:
-        path: a signal at equidistant instants of one drive period, both ends included.
+        path: a signal at equidistant instants of some drive periods, both ends included.
+        periods: how many.
 
     Returns:
         X, with the modulus of the amplitude.
     """
     steps = path.shape[0] - 1
-    turn = 2.0 * np.pi / steps * np.arange(steps)
+    turn = 2.0 * np.pi * periods / steps * np.arange(steps)
     real = jnp.tensordot(np.cos(turn), path[:-1], axes=1)
     imaginary = jnp.tensordot(np.sin(turn), path[:-1], axes=1)
     return jax.lax.complex(real, -imaginary) * (2.0 / steps)

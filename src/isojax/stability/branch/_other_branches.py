@@ -1,0 +1,223 @@
+"""Branches beside the one that was followed: sought over the whole range, each followed both ways."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from ...models import Integrator
+from ..orbit import ShootingMethod, is_odd
+from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride
+from ._branch import Branch, Searched
+from ._orbit_search import FoundOrbits, OrbitSearch
+from ._orbit_starts import PLACES, OrbitStarts, one_harmonic, orbit_starts
+from ._parameter_family import ParameterFamily
+from ._tracing import assemble, trace
+
+_COARSE = Integrator(steps_per_period=64)
+"""Steps with which orbits are sought."""
+
+_NEAR_A_BRANCH, _ON_A_BRANCH = 2e-2, 1e-3
+"""Distance from a branch, in scaled unknowns, below which an orbit lies on it: found by coarse steps, and by
+the steps of the branch."""
+
+_AMONG = 33
+"""Points between two of a branch at which the distance from it is taken, and again between two of these."""
+
+
+class Curve(NamedTuple):
+    """One branch that was followed.
+
+    Attributes:
+        method: how its orbits are closed.
+        scale: size of each state.
+        unknowns: scaled states and shares.
+        tangents: unit vectors along it.
+        ending: why it ends.
+    """
+
+    method: ShootingMethod
+    scale: Float[np.ndarray, " state"]
+    unknowns: Float[np.ndarray, "point unknown"]
+    tangents: Float[np.ndarray, "point unknown"]
+    ending: int
+
+    def distance(self, share: float, state: Float[np.ndarray, " state"]) -> float:
+        """Give the distance of an orbit from the branch, in its scaled unknowns."""
+        if not len(self.unknowns):
+            return np.inf
+        place = np.append(state / self.scale, share)
+        nearest = int(np.argmin(np.linalg.norm(self.unknowns - place, axis=1)))
+        best = float(np.linalg.norm(self.unknowns[nearest] - place))
+        for first in range(max(nearest - 1, 0), min(nearest + 1, len(self.unknowns) - 1)):
+            if best > 2.0 * np.linalg.norm(self.unknowns[first + 1] - self.unknowns[first]):
+                continue
+            low, high = 0.0, 1.0
+            for _ in range(2):
+                parts = np.linspace(low, high, _AMONG)
+                apart = np.linalg.norm(self._between(first, parts) - place, axis=1)
+                best, at = min(best, float(apart.min())), parts[int(apart.argmin())]
+                low, high = at - (high - low) / _AMONG, at + (high - low) / _AMONG
+        return best
+
+    def _between(self, first: int, part: np.ndarray) -> np.ndarray:
+        """Give the cubic through two neighbours along their tangents."""
+        begin, end = self.unknowns[first : first + 2]
+        length = np.linalg.norm(end - begin)
+        leave, arrive = length * self.tangents[first : first + 2]
+        t = part[:, None]
+        ahead = end - begin
+        return begin + t * (
+            leave + t * (3.0 * ahead - 2.0 * leave - arrive + t * (leave + arrive - 2.0 * ahead))
+        )
+
+
+class BranchSearch(NamedTuple):
+    """What is sought beside a batch of branches.
+
+    Attributes:
+        periods: drive periods of the orbits that are sought.
+        stride: steps along the branches that are found.
+    """
+
+    periods: tuple[int, ...]
+    stride: Stride
+
+
+def find_other_branches(
+    live: ParameterFamily,
+    method: ShootingMethod,
+    scale: Float[Array, "branch state"],
+    followed: Followed,
+    search: BranchSearch,
+) -> tuple[tuple[Branch, ...], Searched]:
+    """Find branches that the followed ones do not reach within the range.
+
+    At many values of the parameter Newton's method closes orbits from many states. Those that lie on no
+    branch yet are followed both ways, one after the other, until they have as many points as one branch may.
+
+    Args:
+        live: isolators and drives, drive with a leading axis; its derivatives reach the branches.
+        method: how the orbits of the followed branches are closed.
+        scale: size of each state of these.
+        followed: the branches.
+        search: what is sought.
+
+    Returns:
+        The other branches, by drive and then by periods, and where they were sought.
+    """
+    frozen = jax.lax.stop_gradient(live)
+    odd = is_odd(frozen.model)
+    found: list[Branch] = []
+    reach, left = 0.0, 0
+    for lane in range(scale.shape[0]):
+        own = frozen.driven(frozen.amplitude[lane], frozen.frequency[lane])
+        count = int(followed.found[lane])
+        main = Curve(
+            method,
+            np.asarray(scale[lane]),
+            np.asarray(followed.unknowns[lane, :count]),
+            np.asarray(followed.tangents[lane, :count]),
+            int(followed.ending[lane]),
+        )
+        curves, largest, more = _other_curves(own, odd, main, search)
+        reach, left = max(reach, largest), left + more
+        lanes = live.driven(live.amplitude[lane : lane + 1], live.frequency[lane : lane + 1])
+        found += [_branch(lanes, curve, search.stride) for curve in curves]
+    shares = (np.arange(PLACES) + 0.5) / PLACES
+    values = np.asarray(jax.vmap(frozen.values)(jnp.asarray(shares)[:, None]))[:, 0]
+    return tuple(found), Searched(frozen.names[0], jnp.asarray(values), search.periods, reach, left)
+
+
+def _other_curves(
+    family: ParameterFamily, odd: bool, main: Curve, search: BranchSearch
+) -> tuple[list[Curve], float, int]:
+    """Give the other branches under one drive, the largest displacement tried, and how many orbits lie on
+    branches that were not followed any more.
+    """
+    known, reach, left = [main], 0.0, 0
+    forced = one_harmonic(family)
+    unknowns = main.unknowns if len(main.unknowns) else np.zeros((1, main.scale.size + 1))
+    for periods in search.periods:
+        starts = orbit_starts(family, forced, periods, unknowns, main.scale)
+        reach = max(reach, float(starts.sizes.max()))
+        closed = OrbitSearch(family, _COARSE, odd, periods).closed(starts)
+        closed = _off(closed, known)
+        if not closed.shares.size:
+            continue
+        exact = OrbitSearch(family, main.method.integrator, odd, periods)
+        orbits = exact.orbits(exact.closed(closed))
+        orbits = orbits.where(_beside(orbits, known))
+        while orbits.shares.size:
+            # Where motions are chaotic there are orbits without end.
+            if sum(len(curve.unknowns) for curve in known[1:]) > search.stride.most:
+                left += orbits.shares.size
+                break
+            curve = _followed_both_ways(family, main.method, odd, periods, orbits, search.stride)
+            orbits = orbits.where(np.arange(orbits.shares.size) > 0)
+            if len(curve.unknowns) > 1:
+                known.append(curve)
+                orbits = orbits.where(_beside(orbits, [curve]))
+            else:
+                left += 1
+    return known[1:], reach, left
+
+
+def _off(closed: OrbitStarts, known: list[Curve]) -> OrbitStarts:
+    """Give the motions that are not near a branch."""
+    places = zip(closed.shares, closed.states, strict=True)
+    far = [min(curve.distance(share, state) for curve in known) > _NEAR_A_BRANCH for share, state in places]
+    return OrbitStarts(*(values[np.array(far, bool)] for values in closed))
+
+
+def _beside(orbits: FoundOrbits, known: list[Curve]) -> Bool[np.ndarray, " orbit"]:
+    """Say which orbits lie on no branch, nor any of their images."""
+    apart = [
+        min(curve.distance(share, image) for curve in known for image in images)
+        for share, images in zip(orbits.shares, orbits.images, strict=True)
+    ]
+    return np.array(apart) > _ON_A_BRANCH
+
+
+def _followed_both_ways(
+    family: ParameterFamily,
+    main: ShootingMethod,
+    odd: bool,
+    periods: int,
+    orbits: FoundOrbits,
+    stride: Stride,
+) -> Curve:
+    """Follow the branch of the first of some orbits."""
+    share, images, scale = (values[0] for values in orbits)
+    mirrored = odd and periods == 1 and np.max(np.abs(images[1] - images[0]) / scale) <= _ON_A_BRANCH
+    method = ShootingMethod(main.integrator, periods, bool(mirrored))
+    first = np.append(images[0] / scale, share)
+    fixed = np.append(np.zeros(scale.size), 1.0)
+    lanes = family.driven(family.amplitude[None], family.frequency[None])
+    ways = []
+    for sign in (1.0, -1.0):
+        departure = Departure(*(jnp.asarray(row)[None] for row in (first, fixed, sign * fixed)))
+        way = trace(lanes, method, jnp.asarray(scale)[None], departure, stride)
+        count = int(way.found[0])
+        unknowns, tangents = np.asarray(way.unknowns[0, :count]), np.asarray(way.tangents[0, :count])
+        ways.append(Curve(method, scale, unknowns, tangents, int(way.ending[0])))
+        if ways[0].ending == RETURNED:
+            return ways[0]
+    forth, back = ways
+    unknowns = np.concatenate([back.unknowns[:0:-1], forth.unknowns])
+    tangents = np.concatenate([-back.tangents[:0:-1], forth.tangents])
+    ending = forth.ending if forth.ending != REACHED_BOUND else back.ending
+    return Curve(method, scale, unknowns, tangents, ending)
+
+
+def _branch(live: ParameterFamily, curve: Curve, stride: Stride) -> Branch:
+    """Give a curve as a branch."""
+    count = len(curve.unknowns)
+    room = ((0, max(2 * stride.most - count, 0)), (0, 0))
+    unknowns, tangents = (
+        jnp.asarray(np.pad(values, room, mode="edge"))[None] for values in (curve.unknowns, curve.tangents)
+    )
+    followed = Followed(unknowns, tangents, jnp.asarray([count]), jnp.asarray([curve.ending]))
+    return assemble(live, curve.method, jnp.asarray(curve.scale)[None], followed, False, stride.longest)

@@ -1,0 +1,115 @@
+"""From starts to branches: many curves traced at once, and what is known of each point of them."""
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..._results import RESULTS
+from ..orbit import ShootingMethod
+from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
+from ._branch import Branch, BranchPoints, branch_point
+from ._parameter_family import ParameterFamily
+from ._special_points import find_special_points
+
+
+@eqx.filter_jit
+def trace(
+    family: ParameterFamily,
+    method: ShootingMethod,
+    scale: Float[Array, "branch state"],
+    departure: Departure,
+    stride: Stride,
+) -> Followed:
+    """Follow a batch of branches.
+
+    Args:
+        family: isolators and drives, drive with a leading axis.
+        method: how the orbits are closed.
+        scale: size of each state.
+        departure: where each starts: scaled state and share.
+        stride: steps along the branches.
+
+    Returns:
+        The curves.
+    """
+    states = scale.shape[1]
+
+    def lane(amplitude: Array, frequency: Array, scale: Array, departure: Departure) -> Followed:
+        here = family.driven(amplitude, frequency)
+        return follow(lambda u: here.open_end(method, scale, u), departure, states, stride)
+
+    return jax.vmap(lane)(family.amplitude, family.frequency, scale, departure)
+
+
+@eqx.filter_jit
+def _branch_points(
+    family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
+) -> BranchPoints:
+    def lane(
+        amplitude: Array, frequency: Array, scale: Array, unknown: Array, tangent: Array
+    ) -> BranchPoints:
+        here = family.driven(amplitude, frequency)
+        return jax.vmap(lambda u, t: branch_point(here, method, scale, u, t))(unknown, tangent)
+
+    return jax.vmap(lane)(family.amplitude, family.frequency, scale, unknowns, tangents)
+
+
+def assemble(
+    family: ParameterFamily,
+    method: ShootingMethod,
+    scale: Float[Array, "branch state"],
+    followed: Followed,
+    batched: bool,
+    step: float,
+) -> Branch:
+    """Give the branch of traced points: what is known of each, and the bifurcations between them.
+
+    Args:
+        family: isolators and drives, drive with a leading axis.
+        method: how the orbits are closed.
+        scale: size of each state.
+        followed: the traced points.
+        batched: whether to keep the leading axis.
+        step: largest step.
+
+    Returns:
+        The branch.
+    """
+    counts = np.asarray(followed.found)
+    # Rounded up, so that few shapes are compiled.
+    room = min(-(-max(int(counts.max()), 2) // 128) * 128, followed.unknowns.shape[1])
+    unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
+    points = _branch_points(family, method, scale, unknowns, tangents)
+    special = find_special_points(family, method, scale, unknowns, tangents, counts)
+    longest = int(counts.max())
+
+    def crop(values: Array) -> Array:
+        used = jnp.asarray(np.arange(longest) < counts[:, None])
+        used = used.reshape(used.shape + (1,) * (values.ndim - 2))
+        kept = jnp.where(used, values[:, :longest], jnp.nan)
+        return kept if batched else kept[0]
+
+    def single(values: Array) -> Array:
+        return values if batched else values[0]
+
+    ended = (followed.ending == REACHED_BOUND) | (followed.ending == RETURNED)
+    good = RESULTS.promote(diffrax.RESULTS.successful)
+    result = jax.vmap(lambda well: RESULTS.where(well, good, RESULTS.not_converged))(ended)
+    kept = family.driven(single(family.amplitude), single(family.frequency))
+    return Branch(
+        family.model,
+        family.names[0],
+        method.periods,
+        method.half,
+        single(followed.ending == RETURNED),
+        jax.tree.map(crop, points),
+        special,
+        result if batched else jax.tree.map(lambda value: value[0], result),
+        kept,
+        method.integrator,
+        single(scale),
+        step,
+    )

@@ -1,0 +1,123 @@
+"""Branches beside the one that is followed, against closed forms, perturbation theory and SciPy."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import isojax as ij
+
+TURN = 2.0 * math.pi
+
+
+def after(rates, state, seconds: float) -> np.ndarray:
+    """The state some time later, by DOP853."""
+    run = solve_ivp(rates, (0.0, seconds), np.asarray(state), method="DOP853", rtol=1e-11, atol=1e-13)
+    return run.y[:, -1]
+
+
+@pytest.fixture(scope="module")
+def beside_isola():
+    """A damper that rises, falls and rises again: 0.105 N holds three amplitudes at resonance."""
+    damper = (
+        ij.elements.LinearDamping(0.25),
+        ij.elements.AbsQuadraticDamping(-0.2),
+        ij.elements.CubicDamping(0.045),
+    )
+    model = ij.Isolator(1.0, (ij.elements.LinearStiffness(1.0), *damper))
+    return ij.frequency_response(model, 0.105, (0.12, 0.2))
+
+
+def test_an_isola_is_found_unasked_where_the_balance_of_one_harmonic_has_it(beside_isola):
+    isola = beside_isola.others[0]
+    assert len(beside_isola.others) == 1
+    assert beside_isola.branch.searched.periods == (1, 2, 3)
+    assert bool(isola.branch.closed)
+    assert isola.branch.connection == "none"
+
+    # F^2 = a^2 (1 - w^2)^2 + D(w a)^2: at w near 1 the isola lies between the two larger roots of D = F.
+    def left(speed):
+        return 0.25 * speed - 0.2 * 8.0 / (3.0 * math.pi) * speed**2 + 0.75 * 0.045 * speed**3 - 0.105
+
+    small, inner, outer = (brentq(left, *ends) for ends in ((0.0, 1.09), (1.09, 2.26), (2.26, 4.0)))
+    sizes = np.asarray(isola.amplitude)
+    assert float(np.max(np.asarray(beside_isola.amplitude))) == pytest.approx(small, rel=0.02)
+    assert sizes.max() == pytest.approx(outer, rel=0.02)
+    assert sizes.min() == pytest.approx(inner, rel=0.02)
+    assert [point.kind for point in isola.special_points] == ["fold", "fold"]
+
+
+def test_the_motions_of_an_isola_return_under_scipy(beside_isola):
+    points = beside_isola.others[0].branch.points
+    for place in np.linspace(0, points.frequency.size - 1, 4).astype(int):
+        omega, state = TURN * float(points.frequency[place]), np.asarray(points.y0[place])
+
+        def rates(t, y, omega=omega):
+            v = y[1]
+            return [v, 0.105 * math.sin(omega * t) - y[0] - 0.25 * v + 0.2 * abs(v) * v - 0.045 * v**3]
+
+        np.testing.assert_allclose(after(rates, state, TURN / omega), state, atol=2e-5)
+
+
+def test_print_and_picture_show_the_isola(beside_isola):
+    assert "beside it detached, a closed curve: frequency 0.157" in repr(beside_isola)
+    axes = ij.plot.frequency_response(beside_isola).axes[0]
+    assert "detached" in [text.get_text() for text in axes.get_legend().get_texts()]
+    drawn = max(np.nanmax(line.get_ydata()) for line in axes.lines if line.get_label() == "detached")
+    assert drawn == pytest.approx(1e3 * np.asarray(beside_isola.others[0].amplitude).max())
+
+
+def test_a_subharmonic_of_order_one_third_is_found_where_perturbation_has_it():
+    cubic, half_damping, force = 0.01, 0.002, 8.0
+    duffing = (
+        ij.elements.LinearStiffness(1.0),
+        ij.elements.CubicStiffness(cubic),
+        ij.elements.LinearDamping(2.0 * half_damping),
+    )
+    response = ij.frequency_response(ij.Isolator(1.0, duffing), force, (0.49, 0.51), periods=(3,))
+    curves = [one for one in response.others if one.branch.periods == 3]
+    # Of the two, stable and unstable, each passes through this band.
+    assert len(curves) == 2
+
+    def squares(omega):
+        """Squared amplitudes a^2 of the subharmonic, by Nayfeh & Mook's first-order expansion."""
+        pushed, detuning = force / (2.0 * (1.0 - omega**2)), omega - 3.0
+        p = 8.0 * detuning / (9.0 * cubic) - 6.0 * pushed**2
+        q = (64.0 / (81.0 * cubic**2)) * (9.0 * half_damping**2 + (detuning - 9.0 * cubic * pushed**2) ** 2)
+        return p - math.sqrt(p * p - q), p + math.sqrt(p * p - q)
+
+    found = []
+    for curve in curves:
+        points = curve.branch.points
+        place = int(np.argmin(np.abs(np.asarray(points.frequency) - 0.5)))
+        own = TURN * float(points.frequency[place])
+
+        def rates(t, y, own=own):
+            return [
+                y[1],
+                force * math.sin(own * t) - y[0] - cubic * y[0] ** 3 - 2.0 * half_damping * y[1],
+            ]
+
+        times = 3.0 * TURN / own * np.arange(384) / 384
+        run = solve_ivp(rates, (0.0, 3.0 * TURN / own), np.asarray(points.y0[place]), method="DOP853",
+                        t_eval=[*times, 3.0 * TURN / own], rtol=1e-11, atol=1e-13)  # fmt: skip
+        size = np.abs(run.y[0]).max()
+        np.testing.assert_allclose(run.y[:, -1], run.y[:, 0], atol=1e-5 * size)
+        assert np.max(np.abs(run.y[:, 128] - run.y[:, 0])) > 0.1 * size
+        amplitude = 2.0 * abs(np.mean(run.y[0, :-1] * np.exp(-1j * own / 3.0 * times)))
+        found.append([amplitude / math.sqrt(square) - 1.0 for square in squares(own)])
+    # One curve has the smaller amplitude of the expansion, the other the larger.
+    assert np.abs(found).argmin(axis=1).tolist() in ([0, 1], [1, 0])
+    np.testing.assert_array_less(np.abs(found).min(axis=1), 0.02)
+
+
+def test_periods_that_are_no_counts_are_refused():
+    model = ij.Isolator(1.0, (ij.elements.LinearStiffness(1.0), ij.elements.LinearDamping(0.1)))
+    with pytest.raises(ValueError, match="`periods` must hold positive counts"):
+        ij.frequency_response(model, 1.0, (0.1, 0.2), periods=(0,))
+    with pytest.raises(ValueError, match="`other_periods` must hold positive counts"):
+        ij.continue_branch(
+            model, parameter="amplitude", frequency=1.0, start=1.0, stop=2.0, other_periods=(-1,)
+        )
