@@ -140,5 +140,6 @@ def _quantity_at(
 ) -> Float[np.ndarray, "draw ..."]:
     try:
         return np.asarray(jax.jit(jax.vmap(at))(jnp.asarray(steps)), dtype=float)
-    except jax.errors.JAXTypeError:
+    except (jax.errors.JAXTypeError, ValueError):
+        # A curve or a map refuses numbers that are traced; anything else that is wrong shows here as well.
         return np.stack([np.asarray(at(jnp.asarray(step)), dtype=float) for step in steps])
