@@ -45,6 +45,16 @@ def jacobian(record):
     return jax.jit(jax.jacfwd(record))(jnp.asarray([entry.value for entry in ENTRIES]))
 
 
+def test_reverse_mode_gives_the_derivatives_that_forward_mode_gives(record, jacobian):
+    values = jnp.asarray([entry.value for entry in ENTRIES])
+    weights = jnp.sin(jnp.arange(jacobian.shape[0]))
+    backwards = jax.grad(lambda numbers: jnp.vdot(weights, record(numbers)))(values)
+    expected = weights @ jacobian
+    size = np.abs(np.asarray(values))
+    top = np.abs(size * expected).max()
+    np.testing.assert_allclose(size * backwards, size * expected, atol=1e-12 * top, rtol=1e-10)
+
+
 @pytest.mark.parametrize("place", range(len(ENTRIES)), ids=[entry.name for entry in ENTRIES])
 def test_the_derivative_in_each_coefficient_is_the_central_difference(place, record, jacobian):
     values = np.array([float(entry.value) for entry in ENTRIES])

@@ -1,5 +1,6 @@
 """Derivatives against closed forms of the linear isolator, and against differences of the paper's model."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -137,6 +138,21 @@ def test_derivatives_near_the_jump_are_those_of_differences(paper, at_jump: ij.O
         assert float(sens.derivatives[quantity][place]) == pytest.approx(slope, rel=1e-6)
 
 
+def reverse(model: ij.Isolator, quantity) -> np.ndarray:
+    """Give the derivatives of a number of a model by its coefficients, in reverse mode."""
+    slopes = jax.grad(quantity)(model)
+    return np.array([float(slopes[name]) for name in COEFFICIENTS])
+
+
+@pytest.mark.slow
+def test_reverse_mode_gives_the_derivatives_of_an_orbit_that_forward_mode_gives(paper, at_jump: ij.Orbit):
+    sens = ij.sensitivity(at_jump, parameters=COEFFICIENTS)
+    found = reverse(paper, lambda model: ij.find_again(at_jump, model).floquet.spectral_radius)
+    size = np.array([float(paper[name]) for name in COEFFICIENTS])
+    expected = size * np.asarray(sens.derivatives["spectral_radius"])
+    np.testing.assert_allclose(size * found, expected, atol=1e-10 * np.abs(expected).max(), rtol=0.0)
+
+
 @pytest.mark.slow
 def test_derivatives_of_a_map_are_those_of_its_orbits(paper: ij.Isolator, at_jump: ij.Orbit):
     smap = ij.stability_map(paper, np.array([100.0, 150.0]), np.array([4.3, 5.0]), coexisting=True)
@@ -144,6 +160,10 @@ def test_derivatives_of_a_map_are_those_of_its_orbits(paper: ij.Isolator, at_jum
     single = ij.sensitivity(at_jump, parameters=COEFFICIENTS)
     found = np.asarray(sens.derivatives["spectral_radius"])[:, 0, 1, 0]
     np.testing.assert_allclose(found, single.derivatives["spectral_radius"], rtol=1e-4)
+    backwards = reverse(paper, lambda model: ij.find_again(smap, model).spectral_radius[0, 1, 0])
+    np.testing.assert_allclose(backwards, found, rtol=1e-10)
+    with pytest.raises(ValueError, match=r"find_again\(smap, model\)"):
+        jax.grad(lambda model: ij.stability_map(model, [100.0], [5.0]).response[0, 0])(paper)
 
 
 @pytest.mark.slow
@@ -163,6 +183,9 @@ def test_fold_force_moves_as_the_fold_that_differences_find(paper: ij.Isolator):
         changed = [paper.replace(**{name.replace(".", "__"): value * (1 + s * step)}) for s in (1, -1)]
         above, below = (float(fold(model).amplitude) for model in changed)
         assert float(sens.by("value", name)) == pytest.approx((above - below) / (2 * step * value), rel=1e-6)
+    backwards = jax.grad(lambda model: ij.find_again(point, model).value)(paper)
+    for name in names[:2]:
+        assert float(backwards[name]) == pytest.approx(float(sens.by("value", name)), rel=1e-10)
     # The amplitude is what the fold solves for.
     with pytest.raises(ValueError, match=r"names 'drive\.amplitude'"):
         ij.sensitivity(point, parameters=("drive.amplitude",))

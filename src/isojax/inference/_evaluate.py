@@ -38,7 +38,8 @@ def evaluate(
         filled = jnp.asarray(np.pad(some, ((0, lanes - len(some)), (0, 0)), mode="edge"))
         try:
             part = mapped(filled)
-        except jax.errors.JAXTypeError:
+        except (jax.errors.JAXTypeError, ValueError):
+            # A curve or a map refuses numbers that are traced; what else is wrong shows here as well.
             mapped = _one_by_one(function)
             part = mapped(filled)
         # As NumPy arrays, so that no chunk begins, and no line is said, before the one before is done.

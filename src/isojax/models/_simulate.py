@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._implicit import frozen, with_derivatives
 from .._results import RESULTS
 from .._show import amount, brief, number, shown
 from .._types import Lanes, as_float64, check_float64
@@ -65,6 +66,24 @@ def _solve_ode(
     quantity: Quantity,
     rate: float,
 ) -> tuple[State, diffrax.RESULTS]:
+    live = model, excitation, state
+    held: Held = time, integrator, quantity, rate
+    states, ended = _states(frozen(live), held)
+    # The loop of diffrax is left when the record ends: forwards JAX goes through it, backwards it cannot.
+    return with_derivatives(states, _motion, jnp.zeros(0), live, held), ended
+
+
+Held = tuple[Float[Array, " time"], Integrator, Quantity, float]
+
+
+def _motion(
+    root: Float[Array, "0"], live: tuple[Isolator, AbstractExcitation, State], held: Held
+) -> tuple[Float[Array, "0"], State]:
+    return root, _states(live, held)[0]
+
+
+def _states(live: tuple[Isolator, AbstractExcitation, State], held: Held) -> tuple[State, diffrax.RESULTS]:
+    (model, excitation, state), (time, integrator, quantity, rate) = live, held
     substeps = integrator.steps_per_sample(model)
     # Counted, not summed up: the steps of a zero-order hold must not drift against its samples.
     steps = jnp.arange((time.size - 1) * substeps + 1, dtype=float) / (rate * substeps)

@@ -32,6 +32,7 @@ from .branch import fold_curve as fold_curve
 from .branch import period_doubling_curve as period_doubling_curve
 from .branch import switch_branch as switch_branch
 from .derivatives import Sensitivity as Sensitivity
+from .derivatives import find_again as find_again
 from .derivatives import sensitivity as sensitivity
 from .map import StabilityMap as StabilityMap
 from .map import stability_map as stability_map
@@ -42,7 +43,9 @@ from .orbit import find_periodic_orbit as find_periodic_orbit
 from .orbit import harmonic_balance as harmonic_balance
 from .response import BackboneCurve as BackboneCurve
 from .response import FrequencyResponse as FrequencyResponse
+from .response import Resonance as Resonance
 from .response import Transmissibility as Transmissibility
 from .response import backbone_curve as backbone_curve
+from .response import find_resonance as find_resonance
 from .response import frequency_response as frequency_response
 from .response import transmissibility as transmissibility

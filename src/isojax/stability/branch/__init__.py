@@ -14,10 +14,12 @@ from ._branch import Branch as Branch
 from ._branch import BranchPoints as BranchPoints
 from ._branch import Searched as Searched
 from ._branch import SpecialPoint as SpecialPoint
+from ._branch import half_range as half_range
 from ._branch_switching import switch_branch as switch_branch
 from ._codimension_two import fold_curve as fold_curve
 from ._codimension_two import period_doubling_curve as period_doubling_curve
 from ._continuation import continue_branch as continue_branch
+from ._continuation import tracing_steps as tracing_steps
 from ._extended_system import PointGuess as PointGuess
 from ._nearest_folds import NearestFolds as NearestFolds
 from ._nearest_folds import find_nearest_folds as find_nearest_folds

@@ -9,10 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS
 from ..._show import Row, amount, brief, number, shown
 from ...models import Integrator, Isolator, State
-from ..orbit import ShootingMethod, Sine, modulus, multipliers, trajectory
+from ..orbit import ShootingMethod, Sine, modulus, multipliers, trajectory, value_and_jacobian
 from ._extended_system import BifurcationKind
 from ._parameter_family import ParameterFamily
 
@@ -270,11 +271,10 @@ def branch_point(
         The point. Its derivatives by the model are those of the branch moving across itself.
     """
     states = scale.shape[0]
-    frozen = jax.lax.stop_gradient(family)
-
-    slope = jax.jacfwd(lambda here: frozen.open_end(method, scale, here))(unknown)
-    left = jnp.concatenate([family.open_end(method, scale, unknown), jnp.zeros(1)])
-    unknown = unknown - jnp.linalg.solve(jnp.concatenate([slope, tangent[None]]), left)
+    held = method, scale, tangent, unknown
+    left, slope = value_and_jacobian(lambda here: _across(here, frozen(family), held)[0], unknown)
+    closed = unknown - jnp.linalg.solve(slope, left)
+    unknown = with_derivatives(closed, _across, closed, family, held)
     scaled, shares = unknown[:states], unknown[states:]
     setting = family.at(shares)
     matrix = jax.jacfwd(lambda z: family.image(method, scale, z, shares))(scaled)
@@ -291,3 +291,14 @@ def branch_point(
         roots if method.half else jnp.full(states, jnp.nan + 0j),
         tangent,
     )
+
+
+def _across(
+    unknown: Float[Array, " unknown"],
+    family: ParameterFamily,
+    held: tuple[ShootingMethod, Float[Array, " state"], Float[Array, " unknown"], Float[Array, " unknown"]],
+) -> tuple[Float[Array, " unknown"], Float[Array, " unknown"]]:
+    """Give what vanishes at a point that moves across the branch: the equations of its derivatives."""
+    method, scale, tangent, origin = held
+    left = family.open_end(method, scale, unknown)
+    return jnp.concatenate([left, jnp.dot(tangent, unknown - origin)[None]]), unknown

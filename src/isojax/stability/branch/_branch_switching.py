@@ -1,14 +1,13 @@
 """Onto the branch that leaves another: orbits of doubled period, and orbits that have lost their symmetry."""
 
-import jax
 import jax.numpy as jnp
 
+from ..._implicit import frozen
 from ..._results import is_successful
 from ..._types import check_float64
-from ..orbit import ShootingMethod
+from ..orbit import ShootingMethod, refuse_traced
 from ._arc_length import Departure, Stride
 from ._branch import Branch, SpecialPoint
-from ._continuation import refuse_traced
 from ._tracing import assemble, trace
 
 _ASIDE = 0.25
@@ -64,11 +63,11 @@ def switch_branch(
     drives = (jnp.atleast_1d(one)[lane] for one in (branch.family.amplitude, branch.family.frequency))
     family = branch.family.driven(*drives)
     periods = special_point.periods * (2 if special_point.kind == "period_doubling" else 1)
-    frozen, point = jax.lax.stop_gradient((family, special_point))
+    still, point = frozen((family, special_point))
     direction = point.direction / scale[0]
     tangent = jnp.concatenate([direction / jnp.linalg.norm(direction), jnp.zeros(1)])
-    origin = jnp.concatenate([point.y0 / scale[0], frozen.shares(point.value[None])])
+    origin = jnp.concatenate([point.y0 / scale[0], still.shares(point.value[None])])
     departure = Departure((origin + _ASIDE * step * tangent)[None], tangent[None], tangent[None])
     method = ShootingMethod(branch.integrator, periods, False)
-    followed = trace(frozen, method, scale, departure, Stride(step, most))
+    followed = trace(still, method, scale, departure, Stride(step, most))
     return assemble(family, method, scale, followed, batched=False, step=step)

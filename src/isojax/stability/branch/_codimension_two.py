@@ -10,15 +10,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._implicit import frozen
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
 from ...models import EndsEstimated, Estimated, Integrator, Isolator, Modelled, as_isolator, find_band
-from ..orbit import ShootingMethod, multipliers, state_scale, trajectory
+from ..orbit import ShootingMethod, multipliers, refuse_traced, state_scale, trajectory
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._bifurcation_curves import Cusp, FoldCurve, PeriodDoublingCurve
 from ._branch import SpecialPoint
 from ._branch_switching import switch_branch
-from ._continuation import continue_branch, refuse_traced, tracing_steps
+from ._continuation import continue_branch, tracing_steps
 from ._extended_system import (
     CRITICAL,
     MOST_PLACES,
@@ -57,7 +58,8 @@ def fold_curve(
 
     The map's fixed point, its critical direction and both parameters are followed together; each point is
     then found anew with the motion split at its kinks. Where the quadratic coefficient `w D^2 P [v, v]`
-    changes sign the curve has a cusp. `jax.jacfwd` over the model works: points move across the curve.
+    changes sign the curve has a cusp. `jax.jacfwd` and `jax.grad` over the model work: points move across the
+    curve.
 
     Args:
         model: the isolator.
@@ -94,8 +96,9 @@ def fold_curve(
     found = curve.polished(followed.unknowns, followed.tangents)
     cusps = []
     for point in curve.cusps(followed.unknowns, found):
-        amplitude, frequency = curve.family.values(point.shares)
-        cusps.append(Cusp(amplitude, frequency, point.state))
+        cusp = point.moving(curve.family)
+        amplitude, frequency = curve.family.values(cusp.shares)
+        cusps.append(Cusp(amplitude, frequency, cusp.state))
     numbers, good = curve.numbers(found)
     method, closed = curve.method, jnp.array(followed.closed)
     result = followed.result(good)
@@ -203,7 +206,7 @@ def _meet(model: Isolator, search: _Search, integrator: Integrator) -> SpecialPo
     """Give the first bifurcation of a kind that branches along the amplitude meet."""
     (low, high), frequency_range = search.window
     branch = continue_branch(
-        jax.lax.stop_gradient(model),
+        frozen(model),
         parameter="amplitude",
         frequency=jnp.linspace(*frequency_range, search.frequencies),
         start=low,
@@ -238,13 +241,13 @@ class _Curve(eqx.Module):
     stride: Stride = eqx.field(static=True)
 
     @property
-    def frozen(self) -> ParameterFamily:
+    def still(self) -> ParameterFamily:
         """The isolators and drives without derivatives."""
-        return jax.lax.stop_gradient(self.family)
+        return frozen(self.family)
 
     def begin(self) -> tuple[Float[Array, " state"], Float[Array, " unknown"]]:
         """Give the size of the states, and the first point: scaled state, direction, shares."""
-        family, start = self.frozen, jax.lax.stop_gradient(self.start)
+        family, start = self.still, frozen(self.start)
         shares = family.shares(jnp.stack([start.amplitude, start.frequency]))
         there, turns = family.at(shares), float(self.method.periods)
         path = trajectory(there.model, self.method.integrator, there.drive, tuple(start.y0), turns=turns)
@@ -275,7 +278,7 @@ class _Curve(eqx.Module):
         while True:
             parts = [_polish_points(self, room, scale, unknowns[part], normals[part]) for part in places]
             whole = jax.tree.map(lambda *values: jnp.concatenate(values)[:count], *parts)
-            if bool(jnp.all(jax.lax.stop_gradient(whole.complete))) or room > MOST_PLACES:
+            if bool(jnp.all(whole.complete)) or room > MOST_PLACES:
                 return whole
             room *= 2
 
@@ -303,7 +306,8 @@ class _Curve(eqx.Module):
 
     def numbers(self, found: Polished) -> tuple[tuple[Array, Array, Array, Array], Array]:
         """Give amplitude, frequency, state and multipliers, and which points were found."""
-        good = jax.lax.stop_gradient(found.found & found.complete)
+        good = found.found & found.complete
+        found = _moving_points(self.family, found)
         blank = jnp.where(good, 1.0, jnp.nan)
         values = jax.vmap(self.family.values)(found.shares) * blank[:, None]
         roots = multipliers(found.matrix * blank[:, None, None])
@@ -318,7 +322,7 @@ def _begin(curve: _Curve) -> tuple[Array, Array]:
 
 @eqx.filter_jit
 def _walk(curve: _Curve, scale: Array, first: Array, sign: float) -> Followed:
-    family, states = curve.frozen, scale.shape[0]
+    family, states = curve.still, scale.shape[0]
     critical = CRITICAL[curve.kind]
 
     def equations(u: Array) -> Array:
@@ -342,6 +346,11 @@ def _polish_points(curve: _Curve, places: int, scale: Array, unknowns: Array, no
     def lane(unknown: Array, normal: Array) -> Polished:
         plane = (normal, scale, unknown[states : 2 * states])
         guess = PointGuess(unknown[:states] * scale, unknown[2 * states :], plane)
-        return polish(curve.family, curve.method, curve.kind, guess, places, _ERROR)
+        return polish(curve.still, curve.method, curve.kind, guess, places, _ERROR)
 
     return jax.vmap(lane)(unknowns, normals)
+
+
+@eqx.filter_jit
+def _moving_points(family: ParameterFamily, found: Polished) -> Polished:
+    return jax.vmap(lambda point: point.moving(family))(found)

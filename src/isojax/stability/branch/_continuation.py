@@ -8,13 +8,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from ..._implicit import frozen
 from ..._parameters import list_parameters
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator
-from ..orbit import ShootingMethod, is_odd, response_start
+from ..orbit import ShootingMethod, is_odd, refuse_traced, response_start
 from ._arc_length import Departure, Stride
 from ._branch import Branch
 from ._other_branches import BranchSearch, find_other_branches
@@ -32,23 +32,6 @@ def tracing_steps() -> Integrator:
         256 steps a period: what is located along a curve starts the search for the exact point.
     """
     return Integrator(steps_per_period=256)
-
-
-def refuse_traced(*values: object) -> None:
-    """Refuse to work under a transformation that hides the numbers.
-
-    Args:
-        *values: pytrees whose numbers must be known.
-
-    Raises:
-        ValueError: if a number is known to no one yet, as under `jax.jit` or `jax.vmap`.
-    """
-    for leaf in jax.tree.leaves(jax.lax.stop_gradient(values)):
-        if isinstance(leaf, Tracer):
-            raise ValueError(
-                "Argument `model` must hold known numbers, because how many points a curve has depends on "
-                "them, but it is being traced; call outside jax.jit and jax.vmap (jax.jacfwd works)."
-            )
 
 
 def continue_branch(
@@ -74,8 +57,8 @@ def continue_branch(
 
     Pseudo-arc-length continuation of the period map's fixed point; of symmetric orbits of odd models, of the
     half-period map's. Bifurcations are located on the way and then found anew with the motion split at its
-    kinks. `jax.jacfwd` over the model works: the special points move as they do when found anew, the points
-    of the branch across it.
+    kinks. `jax.jacfwd` and `jax.grad` over the model work: the special points move as they do when found
+    anew, the points of the branch across it.
 
     Args:
         model: the isolator.
@@ -133,18 +116,18 @@ def continue_branch(
             f"Argument `other_periods` must hold positive counts, but is {tuple(other_periods)}."
         )
     wanted = periods == 1 and (bool(symmetric) or (symmetric is None and start_state is None))
-    half = wanted and is_odd(jax.lax.stop_gradient(model))
+    half = wanted and is_odd(frozen(model))
     if symmetric and not half:
         raise ValueError(
             "Argument `symmetric` must be False for a model that is not odd and for orbits of several "
             "periods, but is True."
         )
     begin = None if start_state is None else jnp.stack([as_float64(value) for value in start_state])
-    frozen = jax.lax.stop_gradient(family)
-    first, scale = _starts(frozen, begin)
+    still = frozen(family)
+    first, scale = _starts(still, frozen(begin))
     fixed = jnp.zeros((*scale.shape[:1], states + 1)).at[:, -1].set(1.0)
     method, stride = ShootingMethod(integrator, periods, half), Stride(step, most)
-    followed = trace(frozen, method, scale, Departure(first, fixed, fixed), stride)
+    followed = trace(still, method, scale, Departure(first, fixed, fixed), stride)
     branch = assemble(family, method, scale, followed, batched, step)
     if not other_periods:
         return branch
@@ -175,17 +158,13 @@ def _family(
             wanted = "omitted where it is the parameter" if name == parameter else "given"
             raise ValueError(f"Argument `{name}` must be {wanted}, but is {value}.")
     start, stop = as_float64(start), as_float64(stop)
-    ends = [float(jax.lax.stop_gradient(end)) for end in (start, stop)]
+    ends = [float(frozen(end)) for end in (start, stop)]
     if not all(map(math.isfinite, ends)) or ends[0] == ends[1]:
         raise ValueError(
             f"Argument `stop` must be finite and differ from `start`, but they are {ends[1]} and {ends[0]}."
         )
     drive = {name: as_float64(0.0 if value is None else value) for name, value in held.items()}
-    swept = (
-        np.asarray(ends)
-        if parameter == "frequency"
-        else np.asarray(jax.lax.stop_gradient(drive["frequency"]))
-    )
+    swept = np.asarray(ends) if parameter == "frequency" else np.asarray(frozen(drive["frequency"]))
     if not np.all((swept > 0.0) & np.isfinite(swept)):
         name = "start" if parameter == "frequency" else "frequency"
         raise ValueError(f"Argument `{name}` must be a positive frequency, but is {swept} Hz.")

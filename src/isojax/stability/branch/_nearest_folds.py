@@ -20,6 +20,7 @@ from ..orbit import (
     multipliers,
     period_map,
     recorded_sine,
+    refuse_transformed,
     state_scale,
     trajectory,
     value_and_jacobian,
@@ -120,14 +121,19 @@ def find_nearest_folds(
         Orbits and folds.
 
     Raises:
-        ValueError: if the lists differ in length, a drive is not positive, a start has the wrong number of
-            states, or a reach is not between 0 and 1.
+        ValueError: if JAX traces or differentiates the model, the lists differ in length, a drive is not
+            positive, a start has the wrong number of states, or a reach is not between 0 and 1.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359 (arc length); Nayfeh & Balachandran 1995,
     sec. 3.2 (multipliers) and 6.1.
     """
     check_float64()
+    refuse_transformed(
+        model,
+        "Folds to differentiate are special points of `isojax.continue_branch`, and "
+        "`isojax.find_again(point, model)` finds one again under jax.jit, jax.vmap, jax.jacfwd and jax.grad.",
+    )
     drive = np.stack(np.broadcast_arrays(np.atleast_1d(amplitude), np.atleast_1d(frequency))).astype(float)
     begin = np.asarray(starts, dtype=float)
     count, size = drive.shape[1], 2 + model.internal_states

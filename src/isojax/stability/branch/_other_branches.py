@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..._implicit import frozen
 from ...models import Integrator
 from ..orbit import ShootingMethod, is_odd
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride
@@ -108,12 +109,12 @@ def find_other_branches(
     Returns:
         The other branches, by drive and then by periods, and where they were sought.
     """
-    frozen = jax.lax.stop_gradient(live)
-    odd = is_odd(frozen.model)
+    still = frozen(live)
+    odd = is_odd(still.model)
     found: list[Branch] = []
     reach, left = 0.0, 0
     for lane in range(scale.shape[0]):
-        own = frozen.driven(frozen.amplitude[lane], frozen.frequency[lane])
+        own = still.driven(still.amplitude[lane], still.frequency[lane])
         count = int(followed.found[lane])
         main = Curve(
             method,
@@ -127,8 +128,8 @@ def find_other_branches(
         lanes = live.driven(live.amplitude[lane : lane + 1], live.frequency[lane : lane + 1])
         found += [_branch(lanes, curve, search.stride) for curve in curves]
     shares = (np.arange(PLACES) + 0.5) / PLACES
-    values = np.asarray(jax.vmap(frozen.values)(jnp.asarray(shares)[:, None]))[:, 0]
-    return tuple(found), Searched(frozen.names[0], jnp.asarray(values), search.periods, reach, left)
+    values = np.asarray(jax.vmap(still.values)(jnp.asarray(shares)[:, None]))[:, 0]
+    return tuple(found), Searched(still.names[0], jnp.asarray(values), search.periods, reach, left)
 
 
 def _other_curves(

@@ -7,12 +7,22 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float, Int
 
+from ..._implicit import frozen
 from ..._results import RESULTS, is_successful
 from ..orbit import ShootingMethod, is_odd, multipliers, period_map, value_and_jacobian
 from ._branch import SpecialPoint
-from ._extended_system import MOST_PLACES, BifurcationKind, PointGuess, first_places, polish_jitted
+from ._extended_system import (
+    LOCATED_WITHIN,
+    MOST_PLACES,
+    BifurcationKind,
+    PointGuess,
+    Polished,
+    first_places,
+    polish_jitted,
+)
 from ._parameter_family import ParameterFamily
 
 _BISECTIONS, _CORRECTIONS = 14, 4
@@ -185,7 +195,7 @@ def find_special_points(
     Returns:
         The points, branch after branch.
     """
-    family = jax.lax.stop_gradient(live)
+    family = frozen(live)
     tests = np.asarray(critical_values_along(family, method, scale, unknowns, tangents))
     changes = (np.sign(tests[:, :-1]) != np.sign(tests[:, 1:])) & np.isfinite(tests[:, :-1] * tests[:, 1:])
     changes &= (np.arange(tests.shape[1] - 1) < counts[:, None] - 1)[..., None]
@@ -238,7 +248,7 @@ def _is_fold(family: ParameterFamily, scale: Array, point: SpecialPoint, crossin
     """
     if not is_successful(point.result):
         return False
-    family, point = jax.lax.stop_gradient((family, point))
+    family, point = frozen((family, point))
     shares = family.shares(point.value[None])
     repeats = _repeats_jitted(family, point.method, scale, point.y0 / scale, shares)
     return _distance(crossing, repeats) >= _SAME_MOTION
@@ -259,7 +269,12 @@ def _kind_of_sign_change(
 
 
 def special_point(
-    family: ParameterFamily, method: ShootingMethod, kind: BifurcationKind, branch: int, guess: PointGuess
+    family: ParameterFamily,
+    method: ShootingMethod,
+    kind: BifurcationKind,
+    branch: int,
+    guess: PointGuess,
+    within: float = LOCATED_WITHIN,
 ) -> SpecialPoint:
     """Give a bifurcation found from a start, the motion split at its kinks.
 
@@ -269,16 +284,27 @@ def special_point(
         kind: which bifurcation.
         branch: which branch of a batch it lies on.
         guess: start of the search.
+        within: distance from the start, as a share of the parameter's range, up to which the point counts.
 
     Returns:
         The point.
     """
     places = first_places(family, guess.state.shape[0], method.turns)
-    found = polish_jitted(family, method, kind, guess, places)
-    while not bool(jax.lax.stop_gradient(found.complete)) and places < MOST_PLACES:
+    # A number on the device, so that what is compiled serves for all.
+    still, guess, reach = *frozen((family, guess)), jnp.asarray(within)
+    found = polish_jitted(still, method, kind, guess, places, within=reach)
+    while not isinstance(found.complete, Tracer) and not found.complete and places < MOST_PLACES:
         places *= 2
-        found = polish_jitted(family, method, kind, guess, places)
-    good = jax.lax.stop_gradient(found.found & found.complete)
+        found = polish_jitted(still, method, kind, guess, places, within=reach)
+    return _found_point(family, method, kind, branch, found)
+
+
+@eqx.filter_jit
+def _found_point(
+    family: ParameterFamily, method: ShootingMethod, kind: BifurcationKind, branch: int, found: Polished
+) -> SpecialPoint:
+    good = found.found & found.complete
+    found = found.moving(family)
     blank = jnp.where(good, 1.0, jnp.nan)
     setting = family.at(found.shares)
     roots = multipliers(found.matrix * blank)

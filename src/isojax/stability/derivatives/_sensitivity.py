@@ -14,6 +14,7 @@ from ...models import Isolator
 from ..branch import SpecialPoint
 from ..map import StabilityMap
 from ..orbit import Orbit
+from ..response import Resonance
 from ._parameter_values import DRIVE
 from ._subjects import as_subject
 
@@ -95,7 +96,11 @@ class Sensitivity(eqx.Module):
 
 
 def sensitivity(
-    subject: Orbit | StabilityMap | SpecialPoint | Callable[[Isolator], Mapping[str, Array] | Array],
+    subject: Orbit
+    | StabilityMap
+    | SpecialPoint
+    | Resonance
+    | Callable[[Isolator], Mapping[str, Array] | Array],
     model: Isolator | None = None,
     *,
     parameters: Sequence[str] | None = None,
@@ -109,7 +114,8 @@ def sensitivity(
     Args:
         subject: an orbit (`y0`, `amplitude`, `multipliers`, `spectral_radius`); a map (`response`,
             `multipliers`, `spectral_radius` in every cell); a special point of a branch, such as a fold
-            (`value` of the branch's parameter, `y0`); or a function of a model that gives one array or
+            (`value` of the branch's parameter, `y0`); a resonance (`amplitude`, `frequency`,
+            `spectral_radius`); or a function of a model that gives one array or
             several by name, such as `lambda m: ij.transmissibility(m, ...).force`.
         model: the isolator, where `subject` is a function.
         parameters: names of the parameters to differentiate by; all of the model and, but for a

@@ -3,18 +3,16 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, cast
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from ...excitations import Harmonic
 from ...models import Isolator
-from ..branch import ParameterFamily, PointGuess, SpecialPoint, special_point
-from ..map import StabilityMap
-from ..orbit import Orbit, find_periodic_orbit
-from ._map_derivatives import map_slopes
-from ._parameter_values import differentiate, drive_values, with_values
+from ..branch import SpecialPoint
+from ..map import StabilityMap, found_again
+from ..orbit import Orbit
+from ..response import Resonance
+from ._find_again import find_again
+from ._parameter_values import DRIVE, differentiate, drive_values, with_values
 
 Derivatives = tuple[Mapping[str, Array], Mapping[str, Array]]
 """Quantities by name, and their derivatives, parameter first."""
@@ -38,56 +36,70 @@ class Subject(NamedTuple):
 
 def _of_orbit(orbit: Orbit) -> Subject:
     drive = (jnp.asarray(orbit.excitation.amplitude), jnp.asarray(orbit.excitation.frequency))
-    symmetric = bool(jnp.all(jnp.isfinite(orbit.floquet.half_period_multipliers)))
-    return Subject(
-        orbit.model, drive, (), lambda names, at: _orbit_slopes(orbit, drive, symmetric, names, at)
-    )
+    return _of_answer(orbit, orbit.model, drive, ())
 
 
-@eqx.filter_jit
-def _orbit_slopes(
-    orbit: Orbit, drive: tuple[Array, Array], symmetric: bool, names: tuple[str, ...], at: Array
-) -> Derivatives:
-    def quantities(numbers: Array) -> dict[str, Array]:
-        found = find_periodic_orbit(
-            with_values(orbit.model, names, numbers),
-            Harmonic(*drive_values(names, numbers, drive)),
-            start=orbit.y0,
-            periods=orbit.periods,
-            symmetric=symmetric,
-        )
-        return {
-            "y0": found.y0,
-            "amplitude": found.amplitude,
-            "multipliers": found.floquet.multipliers,
-            "spectral_radius": found.floquet.spectral_radius,
-        }
-
-    return differentiate(quantities, at)
-
-
-def _of_map(smap: StabilityMap) -> Subject:
-    # Differentiated cell by cell, at each cell's own drive.
-    drive = (jnp.asarray(jnp.nan), jnp.asarray(jnp.nan))
-    return Subject(smap.model, drive, (), lambda names, at: map_slopes(smap, names))
+def _of_resonance(resonance: Resonance) -> Subject:
+    orbit = resonance.orbit
+    drive = (jnp.asarray(orbit.excitation.amplitude), jnp.asarray(resonance.frequency))
+    return _of_answer(resonance, orbit.model, drive, (DRIVE[1],))
 
 
 def _of_point(point: SpecialPoint) -> Subject:
     family = point.family
-    fixed = (jnp.asarray(family.amplitude), jnp.asarray(family.frequency))
-    guess = PointGuess(jax.lax.stop_gradient(point.y0), family.shares(point.value[None]))
     solved = tuple(f"drive.{own}" if own in ("amplitude", "frequency") else own for own in family.names)
+    drive = (jnp.asarray(point.amplitude), jnp.asarray(point.frequency))
+    return _of_answer(point, family.model, drive, solved)
 
+
+def _of_answer(answer: Any, model: Isolator, drive: tuple[Array, Array], solved: tuple[str, ...]) -> Subject:
     def slopes(names: tuple[str, ...], at: Array) -> Derivatives:
         def quantities(numbers: Array) -> dict[str, Array]:
-            model, drive = with_values(family.model, names, numbers), drive_values(names, numbers, fixed)
-            there = ParameterFamily(model, *drive, family.start, family.stop, family.names)
-            found = special_point(there, point.method, point.kind, point.branch, guess)
-            return {"value": found.value, "y0": found.y0}
+            pushes = zip(DRIVE, drive_values(names, numbers, drive), strict=True)
+            given = {name.removeprefix("drive."): value for name, value in pushes if name not in solved}
+            found = find_again(answer, with_values(model, names, numbers), **given)
+            return {name: quantity(found) for name, quantity in _QUANTITIES[type(answer)].items()}
 
         return differentiate(quantities, at)
 
-    return Subject(family.model, (point.amplitude, point.frequency), solved, slopes)
+    return Subject(model, drive, solved, slopes)
+
+
+def _of_map(smap: StabilityMap) -> Subject:
+    def slopes(names: tuple[str, ...], at: Array) -> Derivatives:
+        def quantities(numbers: Array) -> dict[str, Array]:
+            # Each cell has a drive of its own, which a parameter changes by as much in all.
+            more = (jnp.zeros(()), jnp.zeros(()))
+            found = found_again(
+                smap, with_values(smap.model, names, numbers), *drive_values(names, numbers, more)
+            )
+            return {name: quantity(found) for name, quantity in _QUANTITIES[StabilityMap].items()}
+
+        return differentiate(quantities, jnp.where(jnp.isnan(at), 0.0, at))
+
+    return Subject(smap.model, (jnp.asarray(jnp.nan), jnp.asarray(jnp.nan)), (), slopes)
+
+
+_QUANTITIES: dict[type, dict[str, Callable[[Any], Array]]] = {
+    Orbit: {
+        "y0": lambda orbit: orbit.y0,
+        "amplitude": lambda orbit: orbit.amplitude,
+        "multipliers": lambda orbit: orbit.floquet.multipliers,
+        "spectral_radius": lambda orbit: orbit.floquet.spectral_radius,
+    },
+    StabilityMap: {
+        "response": lambda smap: smap.response,
+        "multipliers": lambda smap: smap.multipliers,
+        "spectral_radius": lambda smap: smap.spectral_radius,
+    },
+    SpecialPoint: {"value": lambda point: point.value, "y0": lambda point: point.y0},
+    Resonance: {
+        "amplitude": lambda resonance: resonance.amplitude,
+        "frequency": lambda resonance: resonance.frequency,
+        "spectral_radius": lambda resonance: resonance.orbit.floquet.spectral_radius,
+    },
+}
+"""What is differentiated of each result."""
 
 
 def _of_function(function: Callable[[Isolator], Mapping[str, Array] | Array], model: Isolator) -> Subject:
@@ -105,6 +117,7 @@ _ADAPTERS: dict[type, Callable[..., Subject]] = {
     Orbit: _of_orbit,
     StabilityMap: _of_map,
     SpecialPoint: _of_point,
+    Resonance: _of_resonance,
 }
 """How each result of the package is seen as a subject; all else is a function of a model."""
 

@@ -24,7 +24,7 @@ from ...models import (
     as_isolator,
     coefficient_errors,
 )
-from ..orbit import Sine, ascending, is_odd
+from ..orbit import Sine, ascending, is_odd, refuse_transformed
 from ._batched_newton import FOUND, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
@@ -36,6 +36,12 @@ from ._surface import MapWindow
 
 _READING_SHARE = 0.2
 """Of the error that a map may have, where its orbits are read off: there steps cost little."""
+
+_INSTEAD = (
+    "Make the map outside: `isojax.find_again(smap, model)` finds its cells again under jax.jit, jax.vmap, "
+    "jax.jacfwd and jax.grad, and `isojax.sensitivity(smap)` differentiates them."
+)
+"""What to use where JAX transforms the model of a map."""
 
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
@@ -190,9 +196,10 @@ def stability_map(
         The map. Where nothing converged the numbers are NaN and `result` says why.
 
     Raises:
-        ValueError: if a grid is empty, not positive or not ascending, `reach` is below one, `chunk` is no
-            positive count, the checkpoint belongs to another map, or the fit failed, leaves a coefficient
-            undetermined or is of another model.
+        ValueError: if JAX traces or differentiates the model (see `find_again`), a grid is empty, not
+            positive or not ascending, `reach` is below one, `chunk` is no positive count, the checkpoint
+            belongs to another map, or the fit failed, leaves a coefficient undetermined or is of another
+            model.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
@@ -205,6 +212,7 @@ def stability_map(
     """
     model = as_isolator(model)
     check_float64()
+    refuse_transformed(model, _INSTEAD)
     carried = None if fit is None else coefficient_errors(fit, model)
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:

@@ -183,13 +183,17 @@ def closed_nodes(
     Returns:
         The orbits.
     """
-    sides = np.asarray(method.sides)
-    kinks = np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
+    kinks = kinks_between(np.asarray(method.sides))
 
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
         return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *map(jnp.asarray, rows))
 
     return NodeOrbits(*_in_blocks(work, amplitude, frequency, start))
+
+
+def kinks_between(sides: Float[np.ndarray, "piece kink"]) -> Int[np.ndarray, " crossing"]:
+    """Give which kink is passed between one piece and the next, from the signs of all kinks on each."""
+    return np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
 
 
 @eqx.filter_jit
@@ -307,9 +311,21 @@ def _responses(
     state = (rest + amplitude, 0.0 * amplitude, *internal)
     drive = Sine(push[0], push[1], frequency)
     path = trajectory(model, integrator, drive, state, turns=0.5 if half else 1.0)[0]
+    return half_peak_to_peak(path, half) / amplitude
+
+
+def half_peak_to_peak(path: Float[Array, "time ..."], half: bool) -> Lanes:
+    """Give half the peak-to-peak displacement of motions, each peak by the parabola through its neighbours.
+
+    Args:
+        path: displacement at equidistant instants, time first.
+        half: whether it lasts half a period of a motion whose other half is minus the first.
+
+    Returns:
+        The sizes [m].
+    """
 
     def peak(values: Array) -> Array:
-        """Give the largest value, by the parabola through it and its neighbours."""
         place = jnp.clip(jnp.argmax(values, axis=0), 1, values.shape[0] - 2)[None]
         before, here, after = (jnp.take_along_axis(values, place + shift, axis=0)[0] for shift in (-1, 0, 1))
         bend = 2.0 * here - before - after
@@ -317,4 +333,4 @@ def _responses(
         return jnp.where((here >= before) & (here >= after), vertex, jnp.max(values, axis=0))
 
     high, low = peak(path), -peak(-path)
-    return (jnp.maximum(high, -low) if half else 0.5 * (high - low)) / amplitude
+    return jnp.maximum(high, -low) if half else 0.5 * (high - low)

@@ -22,6 +22,8 @@ from ._jacobian import value_and_jacobian as value_and_jacobian
 from ._kink_crossings import Crossings as Crossings
 from ._kink_crossings import advance_across_kinks as advance_across_kinks
 from ._kink_crossings import find_crossings as find_crossings
+from ._known_numbers import refuse_traced as refuse_traced
+from ._known_numbers import refuse_transformed as refuse_transformed
 from ._orbit import Orbit as Orbit
 from ._orbit import find_periodic_orbit as find_periodic_orbit
 from ._period_map import period_map as period_map
@@ -29,6 +31,7 @@ from ._period_map import trajectory as trajectory
 from ._shooting_method import ShootingMethod as ShootingMethod
 from ._sine import Sine as Sine
 from ._sine import recorded_sine as recorded_sine
+from ._smoothness import has_continuous_slopes as has_continuous_slopes
 from ._split_period_map import Split as Split
 from ._split_period_map import find_split as find_split
 from ._split_period_map import split_image as split_image

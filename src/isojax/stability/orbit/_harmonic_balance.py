@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 import diffrax
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
+from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import Lanes, as_float64, check_float64
@@ -107,7 +107,8 @@ def harmonic_balance(
     The sums give displacement, velocity and internal states at samples of one period; the laws give there
     what the rates should be; a Fourier transform gives the harmonics of the defect, which Newton's method
     brings to zero. What the law makes beyond the last harmonic is left out, so the error falls with
-    `harmonics`; `find_periodic_orbit` has none of it. Works under `jax.jit`, `jax.vmap` and `jax.jacfwd`.
+    `harmonics`; `find_periodic_orbit` has none of it. Works under `jax.jit`, `jax.vmap`, `jax.jacfwd` and
+    `jax.grad`.
 
     Args:
         model: the isolator.
@@ -147,7 +148,7 @@ def harmonic_balance(
         raise ValueError(
             f"Argument `samples` must be more than twice the harmonics ({harmonics}), but is {samples}."
         )
-    frequency = jax.lax.stop_gradient(excitation.frequency)
+    frequency = frozen(excitation.frequency)
     if not isinstance(frequency, Tracer) and not 0.0 < float(frequency) < math.inf:
         raise ValueError(f"Argument `excitation` must have a positive frequency, but it is {frequency} Hz.")
     begin = None if start is None else jnp.stack([as_float64(value) for value in start])
@@ -164,57 +165,61 @@ def _balance(
     solver: optx.AbstractRootFinder,
     tolerance: float,
 ) -> HarmonicBalance:
-    frozen, held = jax.lax.stop_gradient((model, excitation))
-    state = response_start(frozen, held.amplitude, held.frequency) if start is None else start
-    first = jax.lax.stop_gradient(_one_harmonic(frozen, held, state, samples))
-    count, omega = 1 + model.internal_states, 2.0 * math.pi * held.frequency
+    still, held = frozen((model, excitation))
+    state = response_start(still, held.amplitude, held.frequency) if start is None else frozen(start)
+    first = _one_harmonic(still, held, state, samples)
+    count = 1 + model.internal_states
     scale = jnp.max(jnp.abs(first), axis=1)
     scale = jnp.where(jnp.isfinite(scale) & (scale > 0.0), scale, 1.0)
-    order, kept = jnp.arange(harmonics + 1)[None], min(harmonics + 1, first.shape[1])
-    phase = jnp.asarray(2.0 * np.pi / samples * np.arange(samples))
-
-    def rows(unknown: Array) -> Array:
-        real, imaginary = unknown[:, : harmonics + 1], unknown[:, harmonics + 1 :]
-        return scale[:, None] * (real + 1j * jnp.pad(imaginary, ((0, 0), (1, 0))))
-
-    def wave(row: Array) -> Array:
-        spectrum = jnp.concatenate([row[:, :1], 0.5 * row[:, 1:]], axis=1) * samples
-        return jnp.fft.irfft(jnp.pad(spectrum, ((0, 0), (0, samples // 2 - harmonics))), n=samples)
-
-    def defect(flat: Array, args: tuple[Isolator, Harmonic]) -> Array:
-        there, push = args
-        row, w = rows(flat.reshape(count, -1)), 2.0 * math.pi * push.frequency
-        values, slopes = wave(row), wave(1j * order * (w * row))
-        drive = recorded_sine(there, push.amplitude, push.frequency)
-        at = drive.at(jnp.sin(phase), jnp.cos(phase))
-        rates = there.rates((values[0], slopes[0], *values[1:]), at)
-        bend = wave(-(order**2) * (w**2 * row))[0]
-        inner = [slope - rate for slope, rate in zip(slopes[1:], rates[2:], strict=True)]
-        gaps = jnp.stack([(bend - rates[1]) / omega, *inner])
-        spectrum = jnp.fft.rfft(gaps)[:, : harmonics + 1] * (2.0 / samples)
-        parts = jnp.concatenate([jnp.real(spectrum), jnp.imag(spectrum)[:, 1:]], axis=1)
-        return (parts / (scale[:, None] * omega)).ravel()
-
+    kept = min(harmonics + 1, first.shape[1])
     guess = jnp.zeros((count, 2 * harmonics + 1))
     scaled = first[:, :kept] / scale[:, None]
     guess = guess.at[:, :kept].set(jnp.real(scaled))
     guess = guess.at[:, harmonics + 1 : harmonics + kept].set(jnp.imag(scaled[:, 1:]))
-    root = optx.root_find(defect, solver, guess.ravel(), (frozen, held), max_steps=100, throw=False).value
-    root = jax.lax.stop_gradient(root)
-    jacobian = jax.jacfwd(defect)(root, (frozen, held))
-    # Two steps with a frozen Jacobian change nothing but the derivatives, which they make those of the
-    # implicit function up to the second order.
-    for _ in range(2):
-        root = root - jnp.linalg.solve(jacobian, defect(root, (model, excitation)))
-    left = jax.lax.stop_gradient(defect(root, (model, excitation)))
+
+    def defect(flat: Array, live: tuple[Isolator, Harmonic]) -> Array:
+        return _defect(flat, live, (scale, samples))[0]
+
+    live = still, held
+    root = optx.root_find(defect, solver, guess.ravel(), live, max_steps=100, throw=False).value
+    left, row = _defect(root, live, (scale, samples))
+    row = with_derivatives(row, _defect, root, (model, excitation), (scale, samples))
     closed = jnp.all(jnp.isfinite(left)) & (jnp.max(jnp.abs(left)) < 1e3 * tolerance)
     result = RESULTS.where(
         closed,
         RESULTS.promote(diffrax.RESULTS.successful),
         RESULTS.where(jnp.all(jnp.isfinite(left)), RESULTS.not_converged, RESULTS.not_finite),
     )
-    row = rows(root.reshape(count, -1))
     return HarmonicBalance(model, excitation, jnp.where(closed, row, jnp.nan + 0j), result)
+
+
+def _defect(
+    flat: Float[Array, " unknown"],
+    live: tuple[Isolator, Harmonic],
+    held: tuple[Float[Array, " function"], int],
+) -> tuple[Float[Array, " unknown"], Complex[Array, "function harmonic"]]:
+    """Give the harmonics of what the balance lacks, scaled; and the complex amplitudes of the motion."""
+    (model, excitation), (scale, samples) = live, held
+    unknown = flat.reshape(scale.size, -1)
+    harmonics = unknown.shape[1] // 2
+    order, phase = jnp.arange(harmonics + 1)[None], jnp.asarray(2.0 * np.pi / samples * np.arange(samples))
+    real, imaginary = unknown[:, : harmonics + 1], unknown[:, harmonics + 1 :]
+    row = scale[:, None] * (real + 1j * jnp.pad(imaginary, ((0, 0), (1, 0))))
+
+    def wave(row: Array) -> Array:
+        spectrum = jnp.concatenate([row[:, :1], 0.5 * row[:, 1:]], axis=1) * samples
+        return jnp.fft.irfft(jnp.pad(spectrum, ((0, 0), (0, samples // 2 - harmonics))), n=samples)
+
+    omega = 2.0 * math.pi * excitation.frequency
+    values, slopes = wave(row), wave(1j * order * (omega * row))
+    drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
+    rates = model.rates((values[0], slopes[0], *values[1:]), drive.at(jnp.sin(phase), jnp.cos(phase)))
+    bend = wave(-(order**2) * (omega**2 * row))[0]
+    inner = [slope - rate for slope, rate in zip(slopes[1:], rates[2:], strict=True)]
+    gaps = jnp.stack([(bend - rates[1]) / omega, *inner])
+    spectrum = jnp.fft.rfft(gaps)[:, : harmonics + 1] * (2.0 / samples)
+    parts = jnp.concatenate([jnp.real(spectrum), jnp.imag(spectrum)[:, 1:]], axis=1)
+    return (parts / (scale[:, None] * omega)).ravel(), row
 
 
 def _one_harmonic(

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 import diffrax
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
+from ..._implicit import frozen, with_derivatives
 from ..._parameters import list_parameters
 from ..._results import RESULTS, is_successful
 from ..._show import amount, brief, declared_numbers, number, shown
@@ -22,7 +22,7 @@ from ._describing_function import response_start
 from ._floquet import Floquet, multipliers, stable_words
 from ._harmonic_balance import harmonic_balance
 from ._period_map import trajectory
-from ._shooting import ShootingSolution, shoot
+from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
 from ._sine import recorded_sine
 from ._state_path import AbstractStatePath
@@ -118,7 +118,7 @@ def find_periodic_orbit(
 
     Newton's method on the period map, with its derivative by forward mode; the motion is split at the kinks
     of |x| and |v|, and the steps are refined until the multipliers are good to 1e-9 or better. Works
-    under `jax.jit`, `jax.vmap` and `jax.jacfwd` (by the implicit function theorem).
+    under `jax.jit`, `jax.vmap`, `jax.jacfwd` and `jax.grad` (by the implicit function theorem).
 
     Args:
         model: the isolator.
@@ -157,31 +157,33 @@ def find_periodic_orbit(
         raise ValueError(f"Argument `start` must hold {size} states, but holds {len(start)}.")
     if periods < 1:
         raise ValueError(f"Argument `periods` must be a positive count, but is {periods}.")
-    frequency = jax.lax.stop_gradient(excitation.frequency)
+    still, drive = frozen((model, excitation))
+    frequency = drive.frequency
     if not isinstance(frequency, Tracer) and not 0.0 < float(frequency) < math.inf:
         raise ValueError(f"Argument `excitation` must have a positive frequency, but it is {frequency} Hz.")
     odd = periods == 1 and (symmetric or (symmetric is None and start is None))
-    frozen = jax.lax.stop_gradient(model)
     # Of a model that is being traced nothing can be said; whoever asks for symmetric orbits then knows.
-    traced = any(isinstance(entry.value, Tracer) for entry in list_parameters(frozen))
-    half = odd and (bool(symmetric) if traced else is_odd(frozen))
+    traced = any(isinstance(entry.value, Tracer) for entry in list_parameters(still))
+    half = odd and (bool(symmetric) if traced else is_odd(still))
     if symmetric and not half:
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
-    begin = None if start is None else jnp.stack([as_float64(value) for value in start])
+    begin = None if start is None else frozen(jnp.stack([as_float64(value) for value in start]))
     method = ShootingMethod(integrator, periods, half)
     kinks = len(model.kinks((jnp.zeros(()),) * size))
     places = math.ceil(_CROSSINGS * kinks * method.turns)
-    solution, path = _solve(model, excitation, method, solver, begin, places)
-    while (
-        not isinstance(solution.split, Tracer) and not solution.split and places < _CROSSINGS_AT_MOST * kinks
-    ):
+    solution = _solve(still, drive, method, solver, begin, places)
+
+    def all_split() -> Bool[Array, ""]:
+        return solution.split.complete
+
+    while not isinstance(all_split(), Tracer) and not all_split() and places < _CROSSINGS_AT_MOST * kinks:
         places *= 2
-        solution, path = _solve(model, excitation, method, solver, begin, places)
+        solution = _solve(still, drive, method, solver, begin, places)
     if begin is None and not isinstance(solution.found, Tracer) and not solution.found:
-        balance = harmonic_balance(*jax.lax.stop_gradient((model, excitation)), integrator=integrator)
+        balance = harmonic_balance(still, drive, integrator=integrator)
         if is_successful(balance.result):
-            solution, path = _solve(model, excitation, method, solver, balance.y0, places)
-    return _orbit(model, excitation, method, solution, path)
+            solution = _solve(still, drive, method, solver, balance.y0, places)
+    return _orbit(model, excitation, method, solution)
 
 
 @eqx.filter_jit
@@ -192,28 +194,30 @@ def _solve(
     solver: optx.AbstractRootFinder,
     start: Float[Array, " state"] | None,
     places: int,
-) -> tuple[ShootingSolution, Float[Array, "time state"]]:
+) -> ShootingSolution:
     if start is None:
-        frozen, held = jax.lax.stop_gradient((model, excitation))
-        start = response_start(frozen, held.amplitude, held.frequency)
+        start = response_start(model, excitation.amplitude, excitation.frequency)
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
-    solution = shoot(model, method, solver, drive, jax.lax.stop_gradient(start), places)
-    lasting = float(method.periods)
-    path = trajectory(model, method.integrator, drive, tuple(solution.state), turns=lasting)
-    return solution, jnp.stack(path, axis=-1)
+    return shoot(model, method, solver, drive, start, places)
 
 
 @eqx.filter_jit
 def _orbit(
-    model: Isolator,
-    excitation: Harmonic,
-    method: ShootingMethod,
-    solution: ShootingSolution,
-    path: Float[Array, "time state"],
+    model: Isolator, excitation: Harmonic, method: ShootingMethod, solution: ShootingSolution
 ) -> Orbit:
     found = solution.found & jnp.all(jnp.isfinite(solution.matrix))
     blank = jnp.where(found, 1.0, jnp.nan)
-    matrix = solution.matrix * blank
+    state, matrix = with_derivatives(
+        (solution.state, solution.matrix),
+        closing,
+        solution.root,
+        (model, excitation),
+        (method, solution.split),
+    )
+    drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
+    lasting = float(method.periods)
+    path = jnp.stack(trajectory(model, method.integrator, drive, tuple(state), turns=lasting), axis=-1)
+    matrix = matrix * blank
     if method.half:
         roots = multipliers(matrix)
         floquet = Floquet(roots * roots, roots, matrix @ matrix)
@@ -234,7 +238,7 @@ def _orbit(
         model=model,
         excitation=excitation,
         periods=method.periods,
-        y0=solution.state * blank,
+        y0=state * blank,
         floquet=floquet,
         symmetric=found & (mirrored if method.periods == 1 else False),
         time=time,

@@ -1,14 +1,17 @@
 """Curves over frequency or amplitude that a designer reads.
 
-In: an isolator, a drive amplitude or displacements. Out: `FrequencyResponse` past its folds,
-`BackboneCurve` (free vibration and phase resonance), `Transmissibility`. Read _frequency_response (a branch
-over frequency), _free_vibration and _backbone, _transmissibility. Orbits come from the rooms branch and
-map.
+In: an isolator, a drive amplitude or displacements. Out: `FrequencyResponse` past its folds, `Resonance` (its
+largest point), `BackboneCurve` (free vibration and phase resonance), `Transmissibility`. Read
+_frequency_response (a branch over frequency), _resonance, _free_vibration and _backbone, _transmissibility.
+Orbits come from the rooms branch and map.
 """
 
 from ._backbone import BackboneCurve as BackboneCurve
 from ._backbone import backbone_curve as backbone_curve
 from ._frequency_response import FrequencyResponse as FrequencyResponse
 from ._frequency_response import frequency_response as frequency_response
+from ._resonance import Resonance as Resonance
+from ._resonance import find_resonance as find_resonance
+from ._resonance import resonance_near as resonance_near
 from ._transmissibility import Transmissibility as Transmissibility
 from ._transmissibility import transmissibility as transmissibility

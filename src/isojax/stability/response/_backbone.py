@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS
 from ..._show import brief, shown
 from ..._types import check_float64
@@ -25,7 +26,7 @@ from ...models import (
     find_band,
 )
 from ..map import Lane, MapMethod, states_at_zero
-from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory
+from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory, value_and_jacobian
 from ._free_vibration import natural_frequencies
 from ._frequency_response import drive_amplitude, fundamental
 
@@ -127,34 +128,28 @@ def _resonance(
 ) -> BackboneCurve:
     rest = rest_displacement(model)
 
+    still, at_rest = frozen((model, rest))
+
     def point(amplitude: Array) -> tuple[Lane, Array]:
-        start, cycle = _balanced(model, amplitude, rest)
+        start, cycle = _balanced(still, amplitude, at_rest)
         push = jnp.hypot(start.sine, jnp.asarray(start.cosine))
         internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
         inner = jnp.where(internal == 0.0, amplitude, jnp.abs(internal))
+        held = integrator, amplitude, jnp.concatenate([jnp.stack([push, push, start.frequency]), inner])
 
-        def unpack(unknown: Array) -> tuple[Sine, State]:
-            drive = Sine(unknown[0] * push, unknown[1] * push, unknown[2] * start.frequency)
-            return drive, (rest + amplitude, 0.0 * amplitude, *(unknown[3:] * inner))
-
-        def gap(unknown: Array) -> Array:
-            drive, state = unpack(unknown)
-            path = trajectory(model, integrator, drive, state)
-            scale = (amplitude, amplitude * drive.angular_frequency, *inner)
-            open_end = [(along[-1] - along[0]) / c for along, c in zip(path, scale, strict=True)]
-            turned = fundamental(path[0]) * jnp.conj(drive_amplitude(drive))
-            return jnp.stack([*open_end, jnp.real(turned) / (amplitude * push)])
-
-        def improve(_: Array, unknown: Array) -> Array:
-            step = jnp.linalg.solve(jax.jacfwd(gap)(unknown), gap(unknown))
+        def improve(_: Array | int, unknown: Array) -> Array:
+            left, slope = value_and_jacobian(
+                lambda at: _out_of_resonance(at, (still, at_rest), held)[0], unknown
+            )
+            step = jnp.linalg.solve(slope, left)
             return unknown - step * jnp.minimum(1.0, _AMPLITUDE_STEP / jnp.max(jnp.abs(step)))
 
-        begin = jnp.concatenate(
-            [jnp.stack([start.sine, jnp.asarray(start.cosine)]) / push, jnp.ones(1), internal / inner]
-        )
+        quadratures = jnp.stack([start.sine, jnp.asarray(start.cosine)]) / push
+        begin = jnp.concatenate([quadratures, jnp.ones(1), internal / inner])
         found = jax.lax.fori_loop(0, _CORRECTIONS_A_POINT, improve, begin)
-        drive, state = unpack(found)
-        good = jnp.max(jnp.abs(gap(found))) < integrator.orbit_tolerance
+        left, (drive, state) = _out_of_resonance(found, (still, at_rest), held)
+        good = jnp.max(jnp.abs(left)) < integrator.orbit_tolerance
+        drive, state = with_derivatives((drive, state), _out_of_resonance, found, (model, rest), held)
         return Lane(state, drive, (), amplitude), good & (drive.frequency > 0.0)
 
     lanes, good = jax.vmap(point)(amplitudes)
@@ -196,3 +191,19 @@ def _balanced(
     begin = jnp.where(pull > 0.0, pull, 1.0)
     square = jax.lax.fori_loop(0, _BALANCE, approach, begin)
     return imposed_balance(model, amplitude, jnp.sqrt(square) / (2.0 * math.pi), rest)
+
+
+def _out_of_resonance(
+    unknown: Float[Array, " unknown"],
+    live: tuple[Isolator, Float[Array, ""]],
+    held: tuple[Integrator, Float[Array, ""], Float[Array, " unknown"]],
+) -> tuple[Float[Array, " unknown"], tuple[Sine, State]]:
+    """Give what vanishes at phase resonance: the gap of the motion, and its part in phase with the drive."""
+    (model, rest), (integrator, amplitude, sizes) = live, held
+    sine, cosine, frequency, *internal = unknown * sizes
+    drive, state = Sine(sine, cosine, frequency), (rest + amplitude, 0.0 * amplitude, *internal)
+    path = trajectory(model, integrator, drive, state)
+    scale = (amplitude, amplitude * drive.angular_frequency, *sizes[3:])
+    open_end = [(along[-1] - along[0]) / size for along, size in zip(path, scale, strict=True)]
+    turned = fundamental(path[0]) * jnp.conj(drive_amplitude(drive))
+    return jnp.stack([*open_end, jnp.real(turned) / (amplitude * sizes[0])]), (drive, state)

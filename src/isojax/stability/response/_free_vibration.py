@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._implicit import frozen, with_derivatives
 from ...models import Instant, Isolator
 from ..orbit import rest_displacement
 
@@ -49,31 +50,24 @@ def natural_frequencies(model: Isolator, amplitudes: Float[Array, " point"]) -> 
     Source: Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 2.1.
     """
     rest = rest_displacement(model)
-
-    def pull(x: Array) -> Array:
-        still = (x, jnp.zeros_like(x), *(jnp.zeros_like(x),) * model.internal_states)
-        return -model.acceleration(still, Instant(jnp.zeros_like(x)))
-
-    def work(near: Array, far: Array) -> Array:
-        """Potential at `far` over that at `near`, without the cancellation of taking both."""
-        return (far - near) * jnp.sum(_SHARES * pull(near + (far - near) * _PLACES))
+    still, at_rest = frozen((model, rest))
 
     def quarter(end: Array) -> Array:
         """Twice the time from rest to the turning point `rest + end`."""
         phi = 0.5 * math.pi * _PLACES
         gap = 2.0 * np.sin(0.5 * (0.5 * math.pi - phi)) ** 2
         places = rest + end * (1.0 - gap)
-        left = jax.vmap(lambda near: work(near, rest + end))(places)
+        left = jax.vmap(lambda near: _work(model, near, rest + end))(places)
         held = jnp.all(left > 0.0)
         speed = jnp.sqrt(2.0 * jnp.where(left > 0.0, left, 1.0))
         time = math.pi * jnp.sum(_SHARES * jnp.abs(end) * np.cos(phi) / speed)
         return jnp.where(held, time, jnp.nan)
 
     def one(amplitude: Array) -> Array:
-        energy = work(rest, rest + amplitude)
+        energy = _work(still, at_rest, at_rest + amplitude)
 
         def excess(depth: Array) -> Array:
-            return work(rest, rest - depth) - energy
+            return _work(still, at_rest, at_rest - depth) - energy
 
         def halve(_: Array, ends: tuple[Array, Array]) -> tuple[Array, Array]:
             low, high = ends
@@ -87,10 +81,30 @@ def natural_frequencies(model: Isolator, amplitudes: Float[Array, " point"]) -> 
         begin = (trials[jnp.maximum(first - 1, 0)], trials[first])
         low, high = jax.lax.fori_loop(0, _BISECTIONS, halve, begin)
         mirrored = jnp.abs(excess(amplitude)) <= _ALIKE * jnp.abs(energy)
-        depth = jax.lax.stop_gradient(jnp.where(mirrored, amplitude, 0.5 * (low + high)))
-        # One step with the derivative kept: by the implicit function theorem it carries that of the root.
-        depth = depth - excess(depth) / jax.lax.stop_gradient(-pull(rest - depth))
-        met = jnp.abs(excess(depth)) <= _MET * jnp.abs(energy)
+        found = jnp.where(mirrored, amplitude, 0.5 * (low + high))
+        found = found - excess(found) / -_pull(still, at_rest - found)
+        depth = with_derivatives(found, _excess, found[None], (model, rest, amplitude), None)
+        met = jnp.abs(excess(found)) <= _MET * jnp.abs(energy)
         return jnp.where(met, 1.0 / (quarter(amplitude) + quarter(-depth)), jnp.nan)
 
     return jax.vmap(one)(amplitudes)
+
+
+def _pull(model: Isolator, x: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Give minus the acceleration at rest at a place."""
+    still = (x, jnp.zeros_like(x), *(jnp.zeros_like(x),) * model.internal_states)
+    return -model.acceleration(still, Instant(jnp.zeros_like(x)))
+
+
+def _work(model: Isolator, near: Float[Array, ""], far: Float[Array, ""]) -> Float[Array, ""]:
+    """Give the potential at `far` over that at `near`, without the cancellation of taking both."""
+    return (far - near) * jnp.sum(_SHARES * _pull(model, near + (far - near) * _PLACES))
+
+
+def _excess(
+    depth: Float[Array, "1"], live: tuple[Isolator, Float[Array, ""], Float[Array, ""]], held: None
+) -> tuple[Float[Array, "1"], Float[Array, ""]]:
+    """Give the potential at the other turning point over that at the amplitude, and its place."""
+    model, rest, amplitude = live
+    left = _work(model, rest, rest - depth[0]) - _work(model, rest, rest + amplitude)
+    return left[None], depth[0]

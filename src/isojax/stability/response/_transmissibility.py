@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS
 from ..._show import number, shown
 from ..._types import Lanes, Scalar, as_float64, check_float64
@@ -18,15 +19,14 @@ from ...models import (
     Integrator,
     Isolator,
     Modelled,
-    State,
     as_isolator,
     find_band,
 )
 from ..map import StabilityMap, stability_map
-from ..orbit import Sine, ascending, period_map, recorded_sine, trajectory
+from ..orbit import Sine, ascending, period_map, recorded_sine, refuse_traced, trajectory, value_and_jacobian
 from ._frequency_response import fundamental
 
-_CLOSING_STEPS = 3
+_CLOSING_STEPS = 4
 """Steps of Newton's method from an orbit of a map to machine precision."""
 
 
@@ -117,16 +117,16 @@ def transmissibility(
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
     grid = ascending("frequencies", frequencies)
     force = as_float64(amplitude)
-    held = np.asarray(jax.lax.stop_gradient(force))
+    refuse_traced(model, force)
+    held = np.asarray(frozen(force))
     if held.ndim or not np.isfinite(held) or not held > 0.0:
         raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
-    frozen = jax.lax.stop_gradient(model)
-    orbits = stability_map(frozen, held[None], grid, coexisting=coexisting, integrator=integrator)
+    orbits = stability_map(frozen(model), held[None], grid, coexisting=coexisting, integrator=integrator)
     starts = orbits.y0[..., 0, :, :]
-    ratio, peak = _passed(model, frozen, force, orbits, starts)
+    ratio, peak = _passed(model, force, orbits, starts)
 
     def curve(isolator: Isolator) -> Array:
-        return jnp.abs(_passed(isolator, frozen, force, orbits, starts)[0])[None]
+        return jnp.abs(_passed(isolator, force, orbits, starts)[0])[None]
 
     band = None if fit is None else find_band(fit, model, ("magnitude",), curve)
     result = jax.tree.map(lambda values: values[..., 0, :], orbits.result)
@@ -137,7 +137,6 @@ def transmissibility(
 @eqx.filter_jit
 def _passed(
     model: Isolator,
-    frozen: Isolator,
     amplitude: Float[Array, ""],
     orbits: StabilityMap,
     y0: Float[Array, "*orbit frequency state"],
@@ -147,7 +146,7 @@ def _passed(
     # From the phase zero of the recorded drive: one that moved with the orbit would move the steps along it.
     drive = recorded_sine(model, jnp.broadcast_to(amplitude, frequency.shape), frequency)
     drive = drive._replace(cosine=jnp.broadcast_to(jnp.asarray(drive.cosine), frequency.shape))
-    state = _closed(model, frozen, orbits, drive, y0.reshape(-1, y0.shape[-1]))
+    state = _closed(model, orbits, drive, y0.reshape(-1, y0.shape[-1]))
     path = trajectory(model, orbits.integrator, drive, tuple(state.T))
     turn = 2.0 * np.pi / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
     at = jax.vmap(drive.at)(jnp.asarray(np.sin(turn)), jnp.asarray(np.cos(turn)))
@@ -166,33 +165,32 @@ def _passed(
 
 
 def _closed(
-    model: Isolator, frozen: Isolator, orbits: StabilityMap, drive: Sine, start: Float[Array, "lane state"]
+    model: Isolator, orbits: StabilityMap, drive: Sine, start: Float[Array, "lane state"]
 ) -> Float[Array, "lane state"]:
-    """Close each orbit, with the derivative of the orbit itself.
-
-    Closed to machine precision first: a step of Newton's method has the derivative of the orbit only there.
-    """
-    turns = 0.5 if orbits.symmetric else 1.0
+    """Close each orbit to machine precision: only there do its equations have the derivative of the orbit."""
+    half = orbits.symmetric
 
     def lane(sine: Array, cosine: Array, frequency: Array, state: Array) -> Array:
-        push = Sine(sine, cosine, frequency)
-        still = jax.lax.stop_gradient(push)
-
-        def moved(isolator: Isolator, force: Sine, here: Array) -> Array:
-            end: State = period_map(isolator, orbits.integrator, force, tuple(here), turns=turns)
-            return jnp.stack(end)
-
-        def improved(here: Array, live: Isolator, force: Sine) -> Array:
-            slope = jax.jacfwd(lambda it: moved(frozen, still, it))(here)
-            return here + jnp.linalg.solve(jnp.eye(state.size) - slope, moved(live, force, here) - here)
+        live = model, Sine(sine, cosine, frequency)
+        held = orbits.integrator, half
 
         def closing(_: Array | int, here: Array) -> Array:
-            return improved(here, frozen, still)
+            left, slope = value_and_jacobian(lambda it: _open_end(it, frozen(live), held)[0], here)
+            return here - jnp.linalg.solve(slope, left)
 
-        near = jax.lax.fori_loop(0, _CLOSING_STEPS, closing, state)
-        return improved(near, model, push)
+        near = jax.lax.fori_loop(0, _CLOSING_STEPS, closing, frozen(state))
+        return with_derivatives(near, _open_end, near, live, held)
 
     return jax.vmap(lane)(drive.sine, jnp.asarray(drive.cosine), drive.frequency, start)
+
+
+def _open_end(
+    state: Float[Array, " state"], live: tuple[Isolator, Sine], held: tuple[Integrator, bool]
+) -> tuple[Float[Array, " state"], Float[Array, " state"]]:
+    """Give how far a motion misses its own start, and the start."""
+    (model, drive), (integrator, half) = live, held
+    end = period_map(model, integrator, drive, tuple(state), turns=0.5 if half else 1.0)
+    return jnp.stack(end) - state, state
 
 
 def _half_range(path: Float[Array, "time lane"]) -> Lanes:

@@ -1,0 +1,130 @@
+"""A known answer found again for another model: what JAX can trace, batch and differentiate."""
+
+from typing import Any, TypeVar
+
+import jax
+import numpy as np
+from jax.core import Tracer
+
+from ..._types import Scalar, as_float64, check_float64
+from ...excitations import Harmonic
+from ...models import Isolator, Modelled, as_isolator
+from ..branch import ParameterFamily, PointGuess, SpecialPoint, special_point
+from ..map import StabilityMap, found_again
+from ..orbit import Orbit, find_periodic_orbit
+from ..response import Resonance, resonance_near
+
+_MOVED_WITHIN = 1.0
+"""Share of the range of its branch by which a bifurcation may move: it does so with the model."""
+
+Answer = TypeVar("Answer", Orbit, SpecialPoint, StabilityMap, Resonance)
+
+
+def find_again(
+    answer: Answer,
+    model: Isolator | Modelled,
+    *,
+    amplitude: Scalar | float | None = None,
+    frequency: Scalar | float | None = None,
+) -> Answer:
+    """Find a known orbit, bifurcation, resonance or map again for a model close by.
+
+    From the known one by Newton's method, so that the shape of the answer is known beforehand: `jax.jit`,
+    `jax.vmap`, `jax.jacfwd` and `jax.grad` go through, also where those that found it in the first place
+    refuse. What vanishes on the way, as an orbit does past its fold, is NaN.
+
+    Args:
+        answer: an orbit; a special point of a branch, such as a fold; a resonance; or a map, of which each
+            cell is found again. Its numbers must be known: find it outside what JAX transforms.
+        model: the isolator, with the same elements; its numbers may be traced.
+        amplitude: of the drive, in place of that of the answer [N, or m/s^2 for base excitation].
+        frequency: of the drive, in place of that of the answer [Hz].
+
+    Returns:
+        The answer for this model.
+
+    Raises:
+        ValueError: if `answer` is none of the four or is traced, or a drive is given that it solves for or
+            that differs from cell to cell.
+        RuntimeError: if JAX is not in 64-bit mode.
+
+    Source: Newton's method from the known solution; derivatives by the implicit function theorem.
+
+    Example:
+        >>> import jax
+        >>> model = ij.paper.y_direction()
+        >>> branch = ij.continue_branch(model, parameter="amplitude", frequency=4.3, start=120.0, stop=200.0)
+        >>> fold = branch.special_points[0]
+        >>> slopes = jax.grad(lambda model: ij.find_again(fold, model).amplitude)(model)
+        >>> bool(slopes["linear_stiffness.coefficient"] > 0.0)  # a stiffer spring jumps later
+        True
+    """
+    isolator = as_isolator(model)
+    check_float64()
+    finders: dict[type, Any] = {
+        Orbit: _orbit,
+        SpecialPoint: _special_point,
+        StabilityMap: _map,
+        Resonance: _resonance,
+    }
+    if type(answer) not in finders:
+        raise ValueError(
+            "Argument `answer` must be an orbit, a special point, a resonance or a map, but is of type "
+            f"{type(answer).__name__}."
+        )
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(answer)):
+        raise ValueError(
+            "Argument `answer` must hold known numbers, but JAX is tracing it. Find it outside the function "
+            "that JAX transforms."
+        )
+    drive = [None if value is None else as_float64(value) for value in (amplitude, frequency)]
+    return finders[type(answer)](answer, isolator, *drive)
+
+
+def _orbit(orbit: Orbit, model: Isolator, amplitude: Any, frequency: Any) -> Orbit:
+    own = orbit.excitation
+    drive = Harmonic(
+        own.amplitude if amplitude is None else amplitude, own.frequency if frequency is None else frequency
+    )
+    return find_periodic_orbit(
+        model, drive, start=orbit.y0, periods=orbit.periods, symmetric=_closed_by_half(orbit)
+    )
+
+
+def _closed_by_half(orbit: Orbit) -> bool:
+    """Say whether an orbit was closed with the half-period map: then alone has it multipliers over it."""
+    return bool(np.all(np.isfinite(np.asarray(orbit.floquet.half_period_multipliers))))
+
+
+def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequency: Any) -> SpecialPoint:
+    known = point.family
+    for name, value in (("amplitude", amplitude), ("frequency", frequency)):
+        if value is not None and name in known.names:
+            raise ValueError(
+                f"Argument `{name}` must be omitted where the point solves for it, but is {value}."
+            )
+    fixed = (
+        known.amplitude if amplitude is None else amplitude,
+        known.frequency if frequency is None else frequency,
+    )
+    family = ParameterFamily(model, *fixed, known.start, known.stop, known.names)
+    guess = PointGuess(point.y0, known.shares(point.value[None]))
+    return special_point(family, point.method, point.kind, point.branch, guess, _MOVED_WITHIN)
+
+
+def _map(smap: StabilityMap, model: Isolator, amplitude: Any, frequency: Any) -> StabilityMap:
+    for name, value in (("amplitude", amplitude), ("frequency", frequency)):
+        if value is not None:
+            raise ValueError(f"Argument `{name}` must be omitted for a map, but is {value}.")
+    return found_again(smap, model)
+
+
+def _resonance(resonance: Resonance, model: Isolator, amplitude: Any, frequency: Any) -> Resonance:
+    if frequency is not None:
+        raise ValueError(
+            f"Argument `frequency` must be omitted for a resonance, which solves for it, but is {frequency}."
+        )
+    orbit = resonance.orbit
+    push = as_float64(orbit.excitation.amplitude if amplitude is None else amplitude)
+    half = _closed_by_half(orbit)
+    return resonance_near(model, push, orbit.y0, resonance.frequency, half, resonance.integrator)

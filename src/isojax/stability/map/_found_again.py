@@ -1,0 +1,256 @@
+"""The cells of a map found again for another model: pure JAX, so that every transformation goes through."""
+
+import dataclasses
+from typing import NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ..._implicit import frozen, with_derivatives
+from ..._results import RESULTS
+from ...excitations import Harmonic
+from ...models import Isolator
+from ..orbit import (
+    Sine,
+    find_periodic_orbit,
+    has_continuous_slopes,
+    modulus,
+    multipliers,
+    recorded_sine,
+    trajectory,
+    value_and_jacobian,
+)
+from ._map import StabilityMap
+from ._map_method import Lane, MapMethod
+from ._nodes import half_peak_to_peak, kinks_between
+
+_CELL_CLOSED_TO, _MOST_CELL_STEPS = 1e-9, 12
+"""Largest last step of Newton's method, over the size of the motion, and steps after which a cell fails."""
+
+_CELLS_AT_ONCE, _SINGLE_ORBITS_AT_ONCE = 8192, 256
+"""Cells computed at once, so that they stay in the cache: by one integration each, or as single orbits."""
+
+
+class _Cells(NamedTuple):
+    """Orbits of some cells, cell first: see `StabilityMap`."""
+
+    start: Float[Array, "cell state"]
+    direction: Float[Array, "cell 2"]
+    phases: Float[Array, "cell crossing"]
+    multipliers: Array
+    response: Float[Array, " cell"]
+    found: Bool[Array, " cell"]
+
+
+class _Way(NamedTuple):
+    """How cells are found again; constant to JAX."""
+
+    method: MapMethod
+    kinks: Int[Array, " crossing"]
+    sizes: Float[Array, " unknown"]
+
+
+def found_again(
+    smap: StabilityMap,
+    model: Isolator,
+    more_force: Float[Array, ""] | float = 0.0,
+    more_frequency: Float[Array, ""] | float = 0.0,
+) -> StabilityMap:
+    """Find the orbits of a map again for another model, each from the one that the map holds.
+
+    Args:
+        smap: the map, of known numbers.
+        model: the isolator; traced or not.
+        more_force: by how much the drive of every cell is larger [N, or m/s^2 for base excitation].
+        more_frequency: by how much its frequency is larger [Hz].
+
+    Returns:
+        The map. An orbit that the map lacks is not looked for.
+    """
+    shape, states = smap.spectral_radius.shape, smap.start.shape[-1]
+    cells = smap.spectral_radius.size
+    force = jnp.broadcast_to(smap.amplitudes[:, None], shape).ravel() + more_force
+    frequency = jnp.broadcast_to(smap.frequencies, shape).ravel() + more_frequency
+    held = np.isfinite(np.asarray(smap.spectral_radius).ravel())
+    with jax.ensure_compile_time_eval():
+        smooth = has_continuous_slopes(smap.model)
+    together = held & np.asarray(smap.split).ravel() & smooth
+    start, direction = smap.start.reshape(cells, states), smap.direction.reshape(cells, 2)
+    phases = smap.phases.reshape(cells, -1)
+    blank = _Cells(
+        jnp.full(start.shape, jnp.nan),
+        jnp.full(direction.shape, jnp.nan),
+        jnp.full(phases.shape, jnp.nan),
+        jnp.full((cells, states), jnp.nan + 0j),
+        jnp.full(cells, jnp.nan),
+        jnp.zeros(cells, bool),
+    )
+    steps = jnp.asarray(smap.integrator.steps_a_period(smap.model))
+    method = MapMethod(smap.integrator, smap.symmetric, smap.sides, steps)
+    kinks = jnp.asarray(kinks_between(np.asarray(smap.sides)))
+    places = np.flatnonzero(together)
+    if places.size:
+        own = (start[places], direction[places], phases[places], force[places], frequency[places])
+        blank = _put(blank, places, _close(model, method, kinks, *own))
+    places = np.flatnonzero(held & ~together)
+    if places.size:
+        y0 = smap.y0.reshape(cells, states)[places]
+        found = _single(model, y0, force[places], frequency[places])
+        # Where kinks are passed is of no interest: they are not split at.
+        blank = _put(blank, places, found._replace(phases=phases[places]))
+    radius = modulus(blank.multipliers[:, 0]).reshape(shape)
+    good = blank.found.reshape(shape)
+    ending = _ending
+    for _ in shape:
+        ending = jax.vmap(ending)
+    return dataclasses.replace(
+        smap,
+        model=model,
+        amplitudes=smap.amplitudes + more_force,
+        frequencies=smap.frequencies + more_frequency,
+        spectral_radius=radius,
+        multipliers=blank.multipliers.reshape(*shape, states),
+        start=blank.start.reshape(smap.start.shape),
+        direction=blank.direction.reshape(smap.direction.shape),
+        phases=blank.phases.reshape(smap.phases.shape),
+        response=blank.response.reshape(shape),
+        count=jnp.sum(good, axis=0) if len(shape) == 3 else good.astype(int),
+        result=ending(good),
+        probability_stable=None,
+        probability_coexisting=None,
+        standard_errors=None,
+    )
+
+
+def _ending(good: Bool[Array, ""]) -> RESULTS:
+    return RESULTS.where(good, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
+
+
+def _put(cells: _Cells, places: np.ndarray, found: _Cells) -> _Cells:
+    return jax.tree.map(lambda all_of, some: all_of.at[places].set(some), cells, found)
+
+
+@eqx.filter_jit
+def _close(
+    model: Isolator,
+    method: MapMethod,
+    kinks: Int[Array, " crossing"],
+    start: Float[Array, "cell state"],
+    direction: Float[Array, "cell 2"],
+    phases: Float[Array, "cell crossing"],
+    force: Float[Array, " cell"],
+    frequency: Float[Array, " cell"],
+) -> _Cells:
+    states = start.shape[1]
+
+    def one(cell: tuple[Array, ...]) -> _Cells:
+        start, direction, phases, push, rate = cell
+        size = jnp.abs(start[0])
+        inner = jnp.where(start[2:] == 0.0, size, jnp.abs(start[2:]))
+        sizes = jnp.concatenate([size[None], jnp.ones(1), inner, jnp.ones(phases.size)])
+        way = _Way(method, kinks, sizes)
+        turn = jnp.arctan2(direction[1], direction[0])
+        begin = jnp.concatenate([start[:1], turn[None], start[2:], phases]) / sizes
+        live = model, push, rate
+        still = frozen(live)
+
+        def newton(carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+            root, _, count = carry
+            left, slope = value_and_jacobian(lambda at: _gap(at, still, way)[0], root)
+            step = jnp.linalg.solve(slope, left)
+            size = jnp.max(jnp.abs(step))
+            # Far off, a full step may leave the basin of the orbit.
+            return root - step * jnp.minimum(1.0, 0.3 / size), size, count + 1
+
+        def unfinished(carry: tuple[Array, Array, Array]) -> Array:
+            _, size, count = carry
+            return ~(size <= _CELL_CLOSED_TO) & ~jnp.isnan(size) & (count < _MOST_CELL_STEPS)
+
+        first = (begin, jnp.asarray(jnp.inf), jnp.asarray(0))
+        root, size, _ = jax.lax.while_loop(unfinished, newton, first)
+        _, (real, matrix) = _gap_and_matrix(root, still, way)
+        real, matrix = with_derivatives((real, matrix), _gap_and_matrix, root, live, way)
+        state, drive = _state_and_drive(real, live, states)
+        path = trajectory(model, method.integrator, drive, tuple(state), turns=0.5 if method.half else 1.0)
+        # A motion starts at its largest displacement; the rest of one that is symmetric adds nothing to it.
+        response = jnp.abs(state[0]) if method.half else half_peak_to_peak(path[0], False)
+        roots = multipliers(matrix)
+        roots = roots * roots if method.half else roots
+        found = (size <= method.integrator.map_tolerance) & jnp.all(jnp.isfinite(matrix))
+        blank = jnp.where(found, 1.0, jnp.nan)
+        way_of_drive = jnp.stack([jnp.cos(real[1]), jnp.sin(real[1])])
+        return _Cells(
+            state * blank,
+            way_of_drive * blank,
+            real[states:] * blank,
+            roots * blank,
+            response * blank,
+            found,
+        )
+
+    return jax.lax.map(one, (start, direction, phases, force, frequency), batch_size=_CELLS_AT_ONCE)
+
+
+def _state_and_drive(
+    real: Float[Array, " unknown"],
+    live: tuple[Isolator, Float[Array, ""], Float[Array, ""]],
+    states: int,
+) -> tuple[Float[Array, " state"], Sine]:
+    """Give the start, at which the velocity is zero, and the drive, whose phase is counted from there."""
+    _, push, frequency = live
+    state = jnp.concatenate([real[:1], jnp.zeros(1), real[2:states]])
+    return state, Sine(push * jnp.cos(real[1]), push * jnp.sin(real[1]), frequency)
+
+
+def _gap(
+    root: Array, live: tuple[Isolator, Array, Array], way: _Way, shift: Array | None = None
+) -> tuple[Array, Array]:
+    """Give what vanishes for a cell's orbit, and the state that its period ends with."""
+    states = root.size - way.kinks.size
+    real = root * way.sizes
+    state, drive = _state_and_drive(real, live, states)
+    begin = state if shift is None else state + shift
+    lane = Lane(tuple(begin), drive, tuple(real[states:]), real[0])
+    moved, reached = way.method.moved_past(live[0], lane, way.kinks)
+    end, omega = jnp.stack(moved), drive.angular_frequency
+    scale = jnp.concatenate([way.sizes[:1], way.sizes[:1] * omega, way.sizes[2:states]])
+    return jnp.concatenate([(end - state) / scale, reached]), end
+
+
+def _gap_and_matrix(
+    root: Array, live: tuple[Isolator, Array, Array], way: _Way
+) -> tuple[Array, tuple[Array, Array]]:
+    """Give the residual; the unknowns in SI units and the derivative of the map by the start.
+
+    Where slopes are continuous across kinks, their instants need not follow a disturbance.
+    """
+
+    def after(shift: Array) -> tuple[Array, Array]:
+        left, end = _gap(root, live, way, shift)
+        return end, left
+
+    matrix, left = jax.jacfwd(after, has_aux=True)(jnp.zeros(root.size - way.kinks.size))
+    return left, (root * way.sizes, matrix)
+
+
+@eqx.filter_jit
+def _single(
+    model: Isolator,
+    y0: Float[Array, "cell state"],
+    force: Float[Array, " cell"],
+    frequency: Float[Array, " cell"],
+) -> _Cells:
+    def one(cell: tuple[Array, Array, Array]) -> _Cells:
+        start, push, rate = cell
+        orbit = find_periodic_orbit(model, Harmonic(push, rate), start=start)
+        drive = recorded_sine(model, jnp.ones(()), rate)
+        blank = jnp.where(orbit.result == RESULTS.successful, 1.0, jnp.nan)
+        direction = jnp.stack([drive.sine, jnp.asarray(drive.cosine)]) * blank
+        roots, good = orbit.floquet.multipliers, jnp.isfinite(blank)
+        return _Cells(orbit.y0, direction, jnp.zeros(0), roots, orbit.amplitude, good)
+
+    return jax.lax.map(one, (y0, force, frequency), batch_size=_SINGLE_ORBITS_AT_ONCE)

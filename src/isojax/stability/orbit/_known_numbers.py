@@ -1,0 +1,40 @@
+"""Refusing what hides its numbers, where the shape of an answer depends on them."""
+
+import jax
+from jax.core import Tracer
+
+from ..._implicit import frozen
+
+
+def refuse_traced(*values: object) -> None:
+    """Refuse to work under a transformation that hides the numbers.
+
+    Args:
+        *values: pytrees whose numbers must be known.
+
+    Raises:
+        ValueError: if a number is known to no one yet, as under `jax.jit` or `jax.vmap`.
+    """
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(frozen(values))):
+        raise ValueError(
+            "Argument `model` must hold known numbers, because how many points a curve has depends on them, "
+            "but it is being traced. Call outside jax.jit and jax.vmap (jax.jacfwd and jax.grad work); under "
+            "them, `isojax.find_again` finds a known orbit, bifurcation, resonance or map again."
+        )
+
+
+def refuse_transformed(model: object, instead: str) -> None:
+    """Refuse a model that JAX traces or differentiates, where an answer is put together on the host.
+
+    Args:
+        model: pytree whose numbers must be plain ones.
+        instead: what to use, a sentence.
+
+    Raises:
+        ValueError: if JAX transforms the function that this is called from.
+    """
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(model)):
+        raise ValueError(
+            "Argument `model` must hold plain numbers, because this answer is put together on the host, but "
+            f"JAX is tracing or differentiating it. {instead}"
+        )

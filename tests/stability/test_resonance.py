@@ -1,0 +1,80 @@
+"""Resonance against the closed form of the linear isolator, forwards, backwards and under vmap."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import isojax as ij
+
+MASS, STIFFNESS, DAMPING, FORCE = 800.0, 1.0e6, 8.0e3, 100.0
+
+
+def peak(k, c, m=MASS):
+    """Give frequency and size of the largest response: `w^2 = k/m - c^2/(2 m^2)`."""
+    omega = jnp.sqrt(k / m - c**2 / (2.0 * m**2))
+    return jnp.stack([omega / (2.0 * jnp.pi), FORCE / jnp.abs(k - m * omega**2 + 1j * omega * c)])
+
+
+def linear(k, c) -> ij.Isolator:
+    return ij.Isolator(MASS, (ij.LinearStiffness(k), ij.LinearDamping(c)))
+
+
+@pytest.fixture(scope="module")
+def resonance() -> ij.stability.Resonance:
+    return ij.find_resonance(linear(STIFFNESS, DAMPING), FORCE, (4.0, 7.0), step=0.1)
+
+
+def again(resonance, k, c):
+    found = ij.find_again(resonance, linear(k, c))
+    return jnp.stack([found.frequency, found.amplitude])
+
+
+def test_resonance_of_the_linear_isolator_is_that_of_its_receptance(resonance):
+    assert ij.is_successful(resonance.result)
+    expected = peak(STIFFNESS, DAMPING)
+    # The frequency by 256 steps a period; the size by the orbit there, of which it is stationary.
+    assert float(resonance.frequency) == pytest.approx(float(expected[0]), rel=1e-6)
+    assert float(resonance.amplitude) == pytest.approx(float(expected[1]), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_derivatives_at_resonance_are_those_of_the_closed_form_in_both_modes(resonance):
+    at = (jnp.asarray(STIFFNESS), jnp.asarray(DAMPING))
+    expected = jax.jacfwd(peak, (0, 1))(*at)
+    for mode in (jax.jacfwd, jax.jacrev):
+        for found, wanted in zip(mode(lambda *x: again(resonance, *x), (0, 1))(*at), expected, strict=True):
+            np.testing.assert_allclose(found, wanted, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_batch_of_models_has_the_resonances_of_each(resonance):
+    stiffness = STIFFNESS * jnp.asarray([0.97, 1.03])
+    found = jax.vmap(lambda k: again(resonance, k, jnp.asarray(DAMPING)))(stiffness)
+    np.testing.assert_allclose(found, jax.vmap(lambda k: peak(k, DAMPING))(stiffness), rtol=1e-6)
+
+
+def test_a_window_beside_the_resonance_is_refused():
+    with pytest.raises(ValueError, match=r"from 2\.0 to 3\.0 Hz the response is largest at an end"):
+        ij.find_resonance(linear(STIFFNESS, DAMPING), FORCE, (2.0, 3.0), step=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"frequency": 5.0}, "`frequency` must be omitted for a resonance"),
+        ({"model": None}, "`model` must be an isolator"),
+    ],
+)
+def test_what_cannot_be_found_again_is_refused(resonance, given: dict, words: str):
+    arguments = {"model": linear(STIFFNESS, DAMPING)} | given
+    with pytest.raises(ValueError, match=words):
+        ij.find_again(resonance, **arguments)
+
+
+def test_an_answer_that_is_traced_is_refused(resonance):
+    model = linear(STIFFNESS, DAMPING)
+    with pytest.raises(ValueError, match="`answer` must hold known numbers"):
+        jax.jit(lambda known: ij.find_again(known, model).frequency)(resonance)
+    with pytest.raises(ValueError, match="must be an orbit, a special point, a resonance or a map"):
+        ij.find_again(model, model)
