@@ -1,9 +1,8 @@
-"""Resonance against the closed form of the linear isolator, forwards, backwards and under vmap."""
+"""Resonance against the closed form of the linear isolator, forwards and backwards."""
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 import pytest
 
 import isojax as ij
@@ -46,14 +45,8 @@ def test_derivatives_at_resonance_are_those_of_the_closed_form_in_both_modes(res
     for mode in (jax.jacfwd, jax.jacrev):
         for found, wanted in zip(mode(lambda *x: again(resonance, *x), (0, 1))(*at), expected, strict=True):
             # The frequency is where that parabola is largest.
-            np.testing.assert_allclose(found, wanted, rtol=[2e-5, 1e-6])
-
-
-@pytest.mark.slow
-def test_a_batch_of_models_has_the_resonances_of_each(resonance):
-    stiffness = STIFFNESS * jnp.asarray([0.97, 1.03])
-    found = jax.vmap(lambda k: again(resonance, k, jnp.asarray(DAMPING)))(stiffness)
-    np.testing.assert_allclose(found, jax.vmap(lambda k: peak(k, DAMPING))(stiffness), rtol=1e-6)
+            assert float(found[0]) == pytest.approx(float(wanted[0]), rel=2e-5)
+            assert float(found[1]) == pytest.approx(float(wanted[1]), rel=1e-6)
 
 
 def test_a_window_beside_the_resonance_is_refused():
