@@ -73,7 +73,8 @@ def run_one(seed: int) -> dict[str, Any]:
     begin = time.perf_counter()
     drawn = sketch(seed, "none", ())
     drawn = sketch(seed, "coverage", ()) if drawn.layout != "stepped" else drawn
-    plant, row = drawn.plant, {"seed": seed, "hidden": "", "drift": drawn.bench.drift}
+    plant = drawn.plant
+    row: dict[str, Any] = {"seed": seed, "hidden": "", "drift": drawn.bench.drift}
     with tempfile.TemporaryDirectory() as folder:
         if seed % 2 == 0:
             name = tuple(HIDDEN)[seed // 2 % len(HIDDEN)]
@@ -87,7 +88,7 @@ def run_one(seed: int) -> dict[str, Any]:
         path = rig.write_campaign(Path(folder) / "blind", plant, plans_of(drawn), seed, "blind", drawn.bench)
         campaign = read_campaign(path)
     loop = close_loop(campaign)
-    named = [sorted({one.finding.effect, *one.finding.indistinguishable}) for one in loop.extensions]
+    named = [sorted({one.effect, *one.indistinguishable}) for one in loop.findings]
     row |= {"verdict": loop.verdict, "named": named, "chi2_per_dof": loop.after.errors["fit"].chi2_per_dof}
     if any(row["hidden"] == element.name for element in loop.after.model.elements):
         # The model's reference is the mean over the records; the change in N/m a Pa is the same.
