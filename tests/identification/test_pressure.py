@@ -7,7 +7,7 @@ import pytest
 
 from isojax import rig
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
-from isojax.health import dwell_stability
+from isojax.health import DwellStability, dwell_stability
 from isojax.identification import diagnose, fit, scales
 from isojax.identification.fitting._estimate import stiffness_scatter
 from isojax.identification.jacobian._channels import channel_table, effects_without_signal
@@ -91,10 +91,12 @@ def test_dwells_are_compared_with_orbits_at_their_own_pressure(simulated, monkey
     campaign = dataclasses.replace(simulated(PLANT, plan, 4, BENCH, **DECLARED), records=tuple(records))
     follows = START.with_elements(CATALOGUE["pressure_stiffness"](5e5, REFERENCE))
 
-    def stiffness(model, measured):
-        return [float(model["linear_stiffness.coefficient"])] * len(measured)
+    def held(model, measured):
+        stiffness = float(model["linear_stiffness.coefficient"])
+        return [DwellStability(m.record.name, None, m.dwell, 1.0, stiffness, 0.0, 0.0) for m in measured]
 
-    monkeypatch.setattr("isojax.health._dwell_stability._held_against_orbits", stiffness)
+    monkeypatch.setattr("isojax.health._dwell_stability._held_against_orbits", held)
     high, low = 1.05e6 + 0.2 * 5e5, 1.05e6 - 0.15 * 5e5
-    np.testing.assert_allclose(dwell_stability(follows, campaign), [high] * 2 + [low] * 2 + [high] * 2)
-    assert dwell_stability(START, campaign) == (1.05e6,) * 6
+    seen = [one.spectral_radius for one in dwell_stability(follows, campaign)]
+    np.testing.assert_allclose(seen, [high] * 2 + [low] * 2 + [high] * 2)
+    assert {one.spectral_radius for one in dwell_stability(START, campaign)} == {1.05e6}

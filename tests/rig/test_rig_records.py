@@ -241,7 +241,7 @@ def test_a_plant_at_a_pressure_is_one_with_coefficients_of_that_pressure():
 
 
 def test_a_campaign_at_pressures_is_filed_with_them(tmp_path):
-    sweep = rig.Multisine((50.0,), 2.0, 12.0, 1.0, 1)
+    sweep = rig.Multisine((50.0,), 2.0, 12.0, 1.0, 2)
     plans = tuple(rig.AtPressure(sweep, pressure) for pressure in (1.8e5, 2.4e5))
     plant = LINEAR.plus(rig.PressureStiffness(6e5, 2e5))
     campaign = read_campaign(rig.write_campaign(tmp_path, plant, plans, 1, "pressures", EXACT))

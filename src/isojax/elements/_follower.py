@@ -2,7 +2,7 @@
 
 from typing import ClassVar, NamedTuple
 
-from .._types import Lanes
+from .._types import Lanes, Scalar
 from ._effect import AbstractEffect, Channels
 from ._force import AbstractForce
 
@@ -17,7 +17,7 @@ class Dependence(NamedTuple):
     """
 
     condition: str
-    reference: Lanes
+    reference: Scalar
     law: AbstractForce
 
     def share(self, value: Lanes) -> Lanes:
