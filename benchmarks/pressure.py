@@ -121,6 +121,8 @@ def report(rows: list[dict[str, Any]]) -> None:
     alone = sum(any(names == [row["hidden"]] for names in row["named"]) for row in found)
     print(f"named alone, not in a set: {alone} of {len(found)}")
     print(f"a wrong effect of pressure was named in {len(wrong)} of {len(rows)} campaigns")
+    others = [row for row in rows if any(not {row["hidden"], *HIDDEN} & set(names) for names in row["named"])]
+    print(f"another effect that is not there was named in {len(others)} of {len(rows)} campaigns")
     off = np.array([row["off"] for row in rows if "off" in row])
     if off.size:
         within, rms = np.mean(np.abs(off) < 1.96), np.sqrt(np.mean(off**2))
@@ -129,7 +131,7 @@ def report(rows: list[dict[str, Any]]) -> None:
         if row not in found:
             size = abs(row["size"] / row["limit"])
             print(f"missed: seed {row['seed']}, {row['hidden']}, {size:.1f} limits, named {row['named']}")
-    for row in wrong:
+    for row in [*wrong, *others]:
         print(f"wrong: seed {row['seed']}, hidden {row['hidden'] or 'nothing'}, named {row['named']}")
 
 
