@@ -150,6 +150,21 @@ def test_map_in_which_nothing_converged_ends_with_code_one_and_says_why(
 
 
 @pytest.mark.slow
+def test_a_model_that_follows_the_pressure_is_mapped_at_one(z_map, tmp_path, capsys, monkeypatch):
+    follows = ij.paper.z_direction().with_elements(ij.elements.PressureStiffness(4e5, 2e5))
+    path, mapped = tmp_path / "model.json", []
+    ij.save_model(follows, path)
+    monkeypatch.setattr(
+        "isojax.stability.stability_map", lambda model, *_, **__: mapped.append(model) or z_map
+    )
+    command = ["map", str(path), *WINDOW, "--out", str(tmp_path / "out"), "--quiet"]
+    assert main(command) == 2
+    assert "`pressure` must be given" in capsys.readouterr().err
+    assert main([*command, "--pressure", "2.5e5"]) == 0
+    assert eqx.tree_equal(mapped, [follows.at(pressure=2.5e5)])
+
+
+@pytest.mark.slow
 def test_nothing_is_written_where_a_picture_fails(z_file, z_map, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ValueError("no ink")
@@ -172,6 +187,8 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
         "--folds",
         "--out",
         "--checkpoint",
+        "--pressure",
+        "--temperature",
         "--json",
         "--verbose",
         "--quiet",

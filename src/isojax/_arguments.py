@@ -96,6 +96,13 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
     plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
     _axis(plane, "amplitudes", "drive amplitudes [N, or m/s^2 for base excitation]")
     _axis(plane, "frequencies", "drive frequencies [Hz]")
+    for condition, unit in (("pressure", "Pa"), ("temperature", "K")):
+        plane.add_argument(
+            f"--{condition}",
+            type=float,
+            metavar="VALUE",
+            help=f"absolute {condition} [{unit}] of the map, where a coefficient of the model follows it",
+        )
     plane.add_argument(
         "--coexisting",
         action=argparse.BooleanOptionalAction,

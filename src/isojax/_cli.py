@@ -255,10 +255,13 @@ def _map(asked: argparse.Namespace) -> int:
     frequencies = _values("--frequencies", asked.frequencies)
     _start_jax()
 
-    from .models import load_model
+    from .models import fit_at, load_model
+    from .records import CONDITIONS
 
     model = load_model(asked.model)
     fit = _fit_beside(Path(asked.model), model) if asked.chances else None
+    stated = {name: getattr(asked, name) for name in CONDITIONS if getattr(asked, name) is not None}
+    model, fit = model.at(**stated), None if fit is None else fit_at(fit, **stated)
 
     import numpy as np
 

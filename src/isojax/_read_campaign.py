@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .records import Campaign, Declaration, read_declaration, read_measurements
+from .records import CONDITIONS, Campaign, Declaration, read_declaration, read_measurements
 
 
 def read_campaign(
@@ -89,7 +89,16 @@ def _check_names(declared: Declaration) -> None:
     from .elements import CATALOGUE
 
     model = declared.sections["model"]
+    fitted = [record for record in declared.records if record["role"] == "fit"]
     for name in catalogue_names(declared.file, model["stiffness"], model["damping"], model["elements"]):
+        for condition in set(CONDITIONS).intersection(CATALOGUE[name].channels):
+            first = fitted[0][condition]
+            if all(record[condition] == first for record in fitted):
+                raise ValueError(
+                    f"{declared.file}: [model] names `{name}`, which follows the {condition} of the records "
+                    f"to fit, so that `{condition}` must differ between these [[record]], but "
+                    + ("none states it" if first is None else f"of each it is {first:g}")
+                )
         if "floor" in CATALOGUE[name].channels and declared.sections["floor"] is None:
             raise ValueError(
                 f"{declared.file}: [model] names `{name}`, which follows the measured motion of the "

@@ -126,7 +126,7 @@ def test_an_element_overrides_methods_of_one_contract_alone(kind):
         {name for name, what in vars(contract).items() if callable(what) and not name.startswith("_")}
         for contract in CONTRACTS
     ]
-    assert [len(names) for names in methods] == [10, 4, 5]
+    assert [len(names) for names in methods] == [10, 4, 6]
     assert sum(bool(names & set(vars(kind))) for names in methods) == 1
 
 
@@ -263,6 +263,7 @@ def absent():
 def simulated(effects: dict[str, AbstractElement], integrator: Integrator | None = None):
     """A record that is let go from the largest motion, so that it passes every gap."""
     model = paper.y_direction().with_elements(*effects.values())
+    model = model.at(**{name: 1.1 * getattr(SCALES, name) for name in model.conditions})
     start = (SCALES.displacement,) + (0.0,) * (1 + model.internal_states)
     return simulate(model, DRIVE, duration=0.2, initial_state=start, integrator=integrator)
 

@@ -41,6 +41,7 @@ def _as_record(one: rig.SimulatedRecord) -> Record:
         dwells=dwells,
         kind=kind,
         floor=one.floor,
+        pressure=one.pressure,
     )
 
 

@@ -201,6 +201,26 @@ MISTAKES = {
     ),
     "a folder for a file": ('"run.csv"', '"."', r"file = '\.' must be the name of a file"),
     "a folder that is there": ('"run.csv"', '"inner"', r"inner is a folder; a record must be one file"),
+    "a pressure below vacuum": (
+        RECORD,
+        RECORD + "\npressure = -2e4",
+        r"\[\[record\]\] number 1 pressure = -20000.0 must be a finite number above 0",
+    ),
+    "a pressure that one record lacks": (
+        RECORD,
+        f'{RECORD}\npressure = 2e5\nstop = 900\n[[record]]\nfile = "run.csv"\nstart = 900\n{RECORD}',
+        r'\[\[record\]\] number 2, file = "run.csv", lacks `pressure`, but number 1 has pressure = 200000',
+    ),
+    "a law that follows a pressure that none states": (
+        r'\["linear"\]',
+        '["linear", "pressure"]',
+        r"\[model\] names `pressure_stiffness`, .* `pressure` must differ .* none states it",
+    ),
+    "a temperature that never changes": (
+        r'\["linear"\](.|\n)*role = "fit"',
+        f'["linear", "temperature"]\n[[record]]\nfile = "run.csv"\n{RECORD}\ntemperature = 300',
+        r"`temperature_stiffness`, .* `temperature` must differ .* of each it is 300",
+    ),
     "text for a level": (RECORD, RECORD + '\nlevel = "60 N"', r"level = '60 N' must be a finite number"),
 }
 

@@ -219,3 +219,33 @@ def test_a_held_drive_is_the_discrete_system_of_its_samples(order, method):
     )
     (smooth,) = rig.run(LINEAR, plan, 5, EXACT)
     np.testing.assert_allclose(smooth.force, record.force, rtol=1e-12)
+
+
+def test_a_plant_at_a_pressure_is_one_with_coefficients_of_that_pressure():
+    laws = (
+        rig.PressureStiffness(6e5, 2e5),
+        rig.PressureDamping(4e3, 2e5),
+        rig.PressureCubicStiffness(9e10, 2e5),
+    )
+    stretch = rig.Stretch(0.0, 1.0, SECONDS, 2.5e5)
+    held = tuple(law.placed(stretch, np.random.default_rng(0)) for law in laws)
+
+    def field(t, y):
+        x, v = y
+        spring = (K + 0.25 * 6e5) * x + (2.5e11 + 0.25 * 9e10) * x**3
+        return v, (sine(t) - spring - (C + 0.25 * 4e3) * v) / MASS
+
+    x, _ = solve(field, [0.0, 0.0])
+    motion = rig.response(CUBIC.plus(*held), [SINE], TIMES)
+    assert np.std(motion["displacement"] - x) < 1e-7 * np.std(x)
+
+
+def test_a_campaign_at_pressures_is_filed_with_them(tmp_path):
+    sweep = rig.Multisine((50.0,), 2.0, 12.0, 1.0, 2)
+    plans = tuple(rig.AtPressure(sweep, pressure) for pressure in (1.8e5, 2.4e5))
+    plant = LINEAR.plus(rig.PressureStiffness(6e5, 2e5))
+    campaign = read_campaign(rig.write_campaign(tmp_path, plant, plans, 1, "pressures", EXACT))
+    assert [record.pressure for record in campaign.records] == [1.8e5, 2.4e5]
+    assert campaign.records[0].name.startswith("180kPa_")
+    with pytest.raises(ValueError, match="must be `AtPressure`"):
+        rig.run(plant, sweep, 1, EXACT)

@@ -14,6 +14,7 @@ from ._added_mass import AddedMass as AddedMass
 from ._asymmetric_friction import AsymmetricFriction as AsymmetricFriction
 from ._base import AbstractElement as AbstractElement
 from ._base import Channels as Channels
+from ._base import Dependence as Dependence
 from ._base import Group as Group
 from ._base import LookAlike as LookAlike
 from ._base import Scales as Scales
@@ -42,6 +43,9 @@ from ._mains_hum import MainsHum as MainsHum
 from ._maxwell_branch import MaxwellBranch as MaxwellBranch
 from ._polytropic_gas import PolytropicGas as PolytropicGas
 from ._position_damping import PositionDamping as PositionDamping
+from ._pressure_cubic_stiffness import PressureCubicStiffness as PressureCubicStiffness
+from ._pressure_damping import PressureDamping as PressureDamping
+from ._pressure_stiffness import PressureStiffness as PressureStiffness
 from ._quadratic_stiffness import QuadraticStiffness as QuadraticStiffness
 from ._quintic_stiffness import QuinticStiffness as QuinticStiffness
 from ._second_mode import SecondMode as SecondMode
@@ -49,6 +53,8 @@ from ._sensor_gain import SensorGain as SensorGain
 from ._sensor_offset import SensorOffset as SensorOffset
 from ._stiffness_drift import StiffnessDrift as StiffnessDrift
 from ._stribeck_friction import StribeckFriction as StribeckFriction
+from ._temperature_damping import TemperatureDamping as TemperatureDamping
+from ._temperature_stiffness import TemperatureStiffness as TemperatureStiffness
 
 CATALOGUE: dict[str, type[AbstractElement]] = {
     member.name: member

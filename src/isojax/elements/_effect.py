@@ -71,6 +71,8 @@ class Scales(eqx.Module):
         slowest_velocity: smallest velocity amplitude among the dwells or windows [m/s].
         reading: amplitude of the measured output [its SI unit].
         largest_reading: largest measured output [its SI unit]; 0 where it is not known.
+        pressure: mean pressure of the records [Pa]; that of the air where none is recorded.
+        temperature: mean temperature of the records [K]; that of a room where none is recorded.
     """
 
     mass: float
@@ -83,6 +85,8 @@ class Scales(eqx.Module):
     slowest_velocity: float
     reading: float
     largest_reading: float = 0.0
+    pressure: float = 101325.0
+    temperature: float = 293.15
 
 
 class AbstractEffect(eqx.Module):

@@ -1,9 +1,28 @@
 """The contract of what follows a signal of the record beside its drive, such as the clock or the floor."""
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
-from .._types import Lanes
+from .._types import Lanes, Scalar
 from ._effect import AbstractEffect, Channels
+from ._force import AbstractForce
+
+
+class Dependence(NamedTuple):
+    """A coefficient that follows an operating condition of the record, such as the chamber pressure.
+
+    Attributes:
+        condition: name of the condition, which is that of its signal, too.
+        reference: value at which the coefficient is that of the model [SI unit of the condition].
+        law: what acts in addition where the condition is twice the reference, proportional to its strength.
+    """
+
+    condition: str
+    reference: Scalar
+    law: AbstractForce
+
+    def share(self, value: Lanes) -> Lanes:
+        """Give how much of the law acts at a value of the condition [1]."""
+        return value / self.reference - 1.0
 
 
 class AbstractFollower(AbstractEffect):
@@ -46,7 +65,23 @@ class AbstractFollower(AbstractEffect):
         Returns:
             Force [N].
         """
-        return 0.0
+        follows = self.dependence()
+        return (
+            0.0
+            if follows is None
+            else follows.share(channels[follows.condition]) * follows.law.force(x, v, ())
+        )
+
+    def dependence(self) -> Dependence | None:
+        """Give the operating condition that the effect follows, and the law that it changes.
+
+        Where there is one, `channel_force` follows from it, and the isolator at a given condition has the law
+        among its plain coefficients.
+
+        Returns:
+            Both, or None.
+        """
+        return None
 
     def channel_base(self, channels: Channels) -> Lanes | None:
         """Give the acceleration that the ground under the isolator has by signals of the record.

@@ -80,12 +80,24 @@ def dwell_stability(model: Isolator, campaign: Campaign) -> tuple[DwellStability
     """
     pairs = [(record, dwell) for record in campaign.records for dwell in record.dwells]
     measured = [_measured(campaign, record, dwell) for record, dwell in pairs]
-    known = [one for one in measured if isinstance(one, _Measured)]
-    found = iter(_held_against_orbits(model, known) if known else ())
+    alike: dict[tuple[tuple[str, float], ...], list[_Measured]] = {}
+    for one in measured:
+        if isinstance(one, _Measured):
+            alike.setdefault(_conditions(model, one.record), []).append(one)
+    found = {
+        stated: iter(_held_against_orbits(model.at(**dict(stated)), known)) for stated, known in alike.items()
+    }
     return tuple(
-        next(found) if isinstance(one, _Measured) else _unknown(record, dwell, math.nan, one)
+        next(found[_conditions(model, record)])
+        if isinstance(one, _Measured)
+        else _unknown(record, dwell, math.nan, one)
         for (record, dwell), one in zip(pairs, measured, strict=True)
     )
+
+
+def _conditions(model: Isolator, record: Record) -> tuple[tuple[str, float], ...]:
+    """Give the operating conditions of a record that the model follows."""
+    return tuple((name, value) for name, value in record.conditions if name in model.conditions)
 
 
 def _measured(campaign: Campaign, record: Record, dwell: Dwell) -> _Measured | str:

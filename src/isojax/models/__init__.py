@@ -4,7 +4,8 @@ In: a mass, elements and a drive. Out: an `Isolator`, its simulated motion and r
 Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at one time), then `_rk4.py` and
 `_integrator.py` (the step), `_scan.py` (many records), `_solve.py` (diffrax) and `_simulate.py` (one drive).
 `_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file;
-`_coefficient_errors.py` carries the covariance of a fit into answers, and `_band.py` into curves.
+`_coefficient_errors.py` carries the covariance of a fit into answers, and `_band.py` into curves;
+`_conditions.py` and `_fit_at.py` give the isolator and a fit at a chamber pressure or temperature.
 """
 
 from ._as_isolator import Modelled as Modelled
@@ -21,6 +22,8 @@ from ._event_step import add_ringing as add_ringing
 from ._event_step import find_regime as find_regime
 from ._event_step import find_ringing as find_ringing
 from ._event_step import split_step as split_step
+from ._fit_at import FitAt as FitAt
+from ._fit_at import fit_at as fit_at
 from ._instant import Instant as Instant
 from ._instant import split_stages as split_stages
 from ._integrator import Integrator as Integrator

@@ -15,23 +15,30 @@ class Modelled(Protocol):
         ...
 
 
-def as_isolator(value: object, argument: str = "model") -> Isolator:
+def as_isolator(value: object, argument: str = "model", recorded: bool = False) -> Isolator:
     """Give the isolator that is meant.
 
     Args:
         value: an isolator, or what holds one as `.model`.
         argument: name of the argument, for the message.
+        recorded: whether records say at what pressure or temperature it is.
 
     Returns:
         The isolator.
 
     Raises:
-        ValueError: if there is none.
+        ValueError: if there is none, or a coefficient follows a condition that nothing states.
     """
     meant = value if isinstance(value, Isolator) else getattr(value, "model", None)
     if not isinstance(meant, Isolator):
         raise ValueError(
             f"Argument `{argument}` must be an isolator, such as guess.model or fit.model, but is of type "
             f"{type(value).__name__}."
+        )
+    if meant.conditions and not recorded:
+        given = ", ".join(f"{name}=..." for name in meant.conditions)
+        raise ValueError(
+            f"Argument `{argument}` must be an isolator at one {' and '.join(meant.conditions)}, which a "
+            f"coefficient follows, such as {argument}.at({given})."
         )
     return meant

@@ -20,6 +20,7 @@ from .._parameters import (
 from .._show import Row, amount, listed, shown
 from .._types import Lanes, Scalar
 from ..elements import AbstractElement, Channels
+from ._conditions import followed_conditions, plain_elements
 from ._instant import Instant
 from ._laws import ROUNDED, AbstractLaw, State, evaluate_switches, share_internal
 
@@ -157,6 +158,32 @@ class Isolator(eqx.Module):
         gone = {name for element in added for name in element.absorbs}
         kept = tuple(element for element in self.elements if element.name not in gone)
         return Isolator(self.mass, (*kept, *added), self.excitation)
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Names of the operating conditions that some coefficient follows, such as "pressure"."""
+        return followed_conditions(self.elements)
+
+    def at(self, **conditions: Scalar | float) -> "Isolator":
+        """Give the isolator at operating conditions: what follows them goes into plain coefficients.
+
+        Args:
+            **conditions: pressure [Pa] and temperature [K], absolute; every one that a coefficient follows.
+
+        Returns:
+            The isolator without effects that follow a condition, for orbits, maps and simulation.
+
+        Raises:
+            ValueError: if a condition is missing, or is not positive.
+
+        Example:
+            >>> chamber = ij.elements.PressureStiffness(change=8e5, reference=2e5)
+            >>> elements = (ij.elements.LinearStiffness(1e6), ij.elements.LinearDamping(4e3), chamber)
+            >>> model = ij.Isolator(800.0, elements).at(pressure=2.5e5)
+            >>> float(model["linear_stiffness.coefficient"]), len(model.elements)
+            (1200000.0, 2)
+        """
+        return Isolator(self.mass, plain_elements(self.elements, conditions), self.excitation)
 
     def _following(self, channels: Channels) -> tuple[AbstractElement, ...]:
         """List the elements that follow signals of the record, where there is one."""

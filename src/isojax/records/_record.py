@@ -14,6 +14,9 @@ _Answer = TypeVar("_Answer")
 
 Direction = Literal["forward", "backward", "none"]
 Role = Literal["fit", "holdout"]
+CONDITIONS = ("pressure", "temperature")
+"""Operating conditions that a record may state: fields of `Record`, and of [[record]]."""
+
 ExcitationKind = Literal["stepped_sine", "periodic", "swept", "free_decay", "impulse", "broadband"]
 
 
@@ -70,6 +73,8 @@ class Record:
         time_jitter: rms by which its time column departs from the even grid, beyond its rounding [s]; 0 where
             it has none.
         removed_spikes: Samples of both channels that the reader replaced, as campaign.toml asks for.
+        pressure: Absolute pressure in the chamber during the record [Pa], or None.
+        temperature: Absolute temperature during the record [K], or None.
     """
 
     name: str
@@ -93,6 +98,8 @@ class Record:
     floor: Float[np.ndarray, " time"] | None = None
     time_jitter: float = 0.0
     removed_spikes: int = 0
+    pressure: float | None = None
+    temperature: float | None = None
     _kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def once(self, question: Hashable, work: Callable[[], _Answer]) -> _Answer:
@@ -100,6 +107,12 @@ class Record:
         if question not in self._kept:
             self._kept[question] = work()
         return self._kept[question]
+
+    @property
+    def conditions(self) -> tuple[tuple[str, float], ...]:
+        """Operating conditions that are stated, by name [SI]; repeats have equal ones."""
+        stated = ((name, getattr(self, name)) for name in CONDITIONS)
+        return tuple((name, value) for name, value in stated if value is not None)
 
     @property
     def rings_down(self) -> bool:
@@ -122,6 +135,6 @@ class Record:
     def _rows(self) -> list[str | Row]:
         met = [dwell.frequency for dwell in self.dwells]
         span = f"{len(met)}, {number(min(met))} to {number(max(met))} Hz" if met else "none"
-        optional = ("level", "repeat", "period", "floor")
+        optional = ("level", "repeat", "period", "floor", *CONDITIONS)
         given = [name for name in optional if getattr(self, name) is not None]
         return ["input", "output", Row("dwells", span), "direction", "settle", *given, "file"]

@@ -65,6 +65,10 @@ from ._plan import Plan as Plan
 from ._plan import Trial as Trial
 from ._plant import Plant as Plant
 from ._plant import base_laws as base_laws
+from ._pressure import AtPressure as AtPressure
+from ._pressure import PressureCubicStiffness as PressureCubicStiffness
+from ._pressure import PressureDamping as PressureDamping
+from ._pressure import PressureStiffness as PressureStiffness
 from ._relaxation import FractionalDamping as FractionalDamping
 from ._relaxation import MaxwellBranch as MaxwellBranch
 from ._shaker import EXAMPLE_SHAKER as EXAMPLE_SHAKER

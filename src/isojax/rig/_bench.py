@@ -68,6 +68,7 @@ class SimulatedRecord:
         settle: samples at the start.
         stiffness_scale: by which the linear stiffness had drifted.
         floor: recorded acceleration of the floor, m/s^2; None where it is not measured.
+        pressure: in the chamber, Pa; None where it is not recorded.
     """
 
     name: str
@@ -84,6 +85,7 @@ class SimulatedRecord:
     settle: int
     stiffness_scale: float
     floor: Float[np.ndarray, " time"] | None = None
+    pressure: float | None = None
 
 
 def response(
@@ -141,7 +143,7 @@ def run(
     shares = (ends / ends[-1]).tolist()
     records = []
     for index, trial in enumerate(trials):
-        stretch = Stretch(shares[index], shares[index + 1], trial.seconds)
+        stretch = Stretch(shares[index], shares[index + 1], trial.seconds, trial.pressure)
         placed = plant.placed(stretch, np.random.default_rng([seed, 2, index]))
         records.append(_record(placed, trial, bench, np.random.default_rng([seed, 0, index])))
     return tuple(records)
@@ -185,4 +187,5 @@ def _record(plant: Plant, trial: Trial, bench: Bench, draw: np.random.Generator)
         settle=round(trial.settle * bench.rate),
         stiffness_scale=scale,
         floor=sum(sensed[1:], sensed[0]) if sensed else None,
+        pressure=trial.pressure,
     )

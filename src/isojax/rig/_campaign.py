@@ -168,4 +168,5 @@ def _toml(
         ]
         lines += [f"period = {record.period}"] if record.period is not None else []
         lines += [f"settle = {record.settle}"] if record.settle else []
+        lines += [f"pressure = {record.pressure!r}"] if record.pressure is not None else []
     return "\n".join(lines) + "\n"

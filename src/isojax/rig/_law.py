@@ -29,11 +29,13 @@ class Stretch:
         begin: share of the test, 0 to 1, that is over when the record begins.
         end: the same when it ends.
         seconds: length of the record; its time starts at 0.
+        pressure: in the chamber, Pa; None where it is not recorded.
     """
 
     begin: float
     end: float
     seconds: float
+    pressure: float | None = None
 
 
 class Law(ABC):

@@ -28,6 +28,7 @@ class Trial:
         schedule: start in s, frequency in Hz and cycles of each dwell.
         period: of a periodic force, s.
         settle: at the start of the record, s.
+        pressure: in the chamber, Pa; None where it is not recorded.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Trial:
     schedule: tuple[tuple[float, float, float], ...] = ()
     period: float | None = None
     settle: float = 0.0
+    pressure: float | None = None
 
 
 class Plan(ABC):

@@ -161,8 +161,9 @@ SMALLEST_SCATTER = 1e-5
 def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: float) -> float:
     """Give the standard deviation of the linear stiffness between repeats of a record.
 
-    Repeats at equal level and direction share every deterministic error of the model, so that their
-    differences show repeatability alone; without repeats, records of equal level serve, then all records.
+    Repeats at equal level, direction and operating conditions share every deterministic error of the model,
+    so that their differences show repeatability alone; without repeats, records of equal level serve, then
+    those of equal conditions, then all. Records at unequal pressures would pass its effect for scatter.
 
     Args:
         records: the records, two at least.
@@ -175,7 +176,12 @@ def stiffness_scatter(records: tuple[Record, ...], point: Point, inflation: floa
     values = (point.nuisances.stiffness + point.reduced.stiffness_map[:, -1]) * STIFFNESS_SCALE_UNIT
     variance = point.reduced.stiffness_variance * max(1.0, inflation)
     groups: list[list[int]] = []
-    for key in (lambda r: (r.level, r.direction), lambda r: r.level, lambda r: None):
+    for key in (
+        lambda r: (r.conditions, r.level, r.direction),
+        lambda r: (r.conditions, r.level),
+        lambda r: r.conditions,
+        lambda r: None,
+    ):
         alike = defaultdict(list)
         for place, record in enumerate(records):
             alike[key(record)].append(place)

@@ -84,7 +84,7 @@ def fit(
     if campaign is None and isinstance(model, Campaign | str | Path):
         campaign = as_campaign(model)
         model = classical_guess(campaign)
-    campaign, model = as_campaign(campaign), as_isolator(model)
+    campaign, model = as_campaign(campaign), as_isolator(model, recorded=True)
     if integrator is not None:
         check_integrator(integrator)
     places = free_places(model, fixed, free, campaign.mass_free)

@@ -34,10 +34,10 @@ def segment_scatter(
 ) -> float:
     """Give the standard deviation of the linear stiffness from segment to segment within a record.
 
-    Two repeats of a record (equal level, direction and role) share every deterministic error of the model,
-    transients included, segment by segment; what their difference keeps beyond a constant, which is the
-    scatter from record to record, and beyond the noise, is scatter from segment to segment. Dwells that the
-    repeats passed on different branches of the response say nothing.
+    Two repeats of a record (equal level, direction, conditions and role) share every deterministic error of
+    the model, transients included, segment by segment; what their difference keeps beyond a constant, which
+    is the scatter from record to record, and beyond the noise, is scatter from segment to segment. Dwells
+    that the repeats passed on different branches of the response say nothing.
 
     Args:
         records: the records.
@@ -70,7 +70,7 @@ def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Po
     """List pairs of repeats, no record in more than one."""
     groups = defaultdict(list)
     for place, record in enumerate(records):
-        groups[record.level, record.direction, record.role, record.kind].append(place)
+        groups[record.level, record.direction, record.conditions, record.role, record.kind].append(place)
     held = defaultdict(list)
     for lane, segment in enumerate(segments):
         held[segment.record].append((lane, segment))

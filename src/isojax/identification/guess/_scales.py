@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ...elements import Scales
-from ...records import Campaign, Record
+from ...records import CONDITIONS, Campaign, Record
 from ..jacobian import workers
 from ._motion import Motion, measured_motion
 
@@ -107,4 +107,11 @@ def scales(campaign: Campaign) -> Scales:
         slowest_velocity=min(_slowest(*pair, centre) for pair, centre in zip(pairs, centres, strict=True)),
         reading=reading,
         largest_reading=max(float(np.max(np.abs(record.output))) for record in records),
+        **_conditions(records),
     )
+
+
+def _conditions(records: tuple[Record, ...]) -> dict[str, float]:
+    """Give the mean of each operating condition that all records state [SI]."""
+    stated = {name: [getattr(record, name) for record in records] for name in CONDITIONS}
+    return {name: float(np.mean(values)) for name, values in stated.items() if None not in values}

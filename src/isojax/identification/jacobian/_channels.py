@@ -1,4 +1,4 @@
-"""Signals of a record beside its drive, which some effects follow: clock, holds, harmonics, hum, floor."""
+"""Signals of a record beside its drive, which effects follow: clock, holds, hum, floor, pressure, others."""
 
 from typing import cast, get_args
 
@@ -9,7 +9,7 @@ from scipy.signal.windows import blackmanharris
 
 from ...elements import CATALOGUE
 from ...excitations import Hold, tabulate
-from ...records import Record
+from ...records import CONDITIONS, Record
 
 
 def effects_without_signal(records: tuple[Record, ...]) -> tuple[str, ...]:
@@ -23,6 +23,8 @@ def effects_without_signal(records: tuple[Record, ...]) -> tuple[str, ...]:
     """
     followed = {name for kind in CATALOGUE.values() for name in kind.channels}
     absent = {name for name in followed if not all(carries(record, name) for record in records)}
+    # An operating condition that never changes says nothing.
+    absent |= {name for name in CONDITIONS if len({getattr(record, name) for record in records}) == 1}
     return tuple(name for name, kind in CATALOGUE.items() if absent.intersection(kind.channels))
 
 
@@ -30,7 +32,7 @@ def carries(record: Record, name: str) -> bool:
     """Say whether a signal means anything in a record.
 
     The phase of a drive is that of a sine or a sweep; a line must lie below half the sampling rate; a floor
-    must have been measured.
+    or an operating condition must have been measured.
 
     Args:
         record: the record.
@@ -44,7 +46,7 @@ def carries(record: Record, name: str) -> bool:
         return record.kind in ("stepped_sine", "swept")
     if kind == "hum":
         return record.rate > 2.0 * float(rest)
-    return kind != "floor" or record.floor is not None
+    return name not in ("floor", *CONDITIONS) or getattr(record, name) is not None
 
 
 def channel_table(
@@ -59,7 +61,8 @@ def channel_table(
             "drive_cosine_2", "drive_sine_2" and so on: the drive's amplitude times the cosine and sine of so
             many times its phase. "hum_50", "hum_60": a cosine of that frequency [Hz] and of amplitude one,
             with the phase that the record's output has there. "floor": measured acceleration of the floor
-            [m/s^2], band-limited between its samples.
+            [m/s^2], band-limited between its samples. "pressure" [Pa], "temperature" [K]: those of the
+            record, constant.
         record: the record.
         hold: what its drive does between samples.
         substeps: integration steps a sample.
@@ -78,6 +81,10 @@ def channel_table(
                 f"Record {record.name} must hold the motion of the floor, but no [floor] is declared."
             )
         return tabulate(record.floor, record.rate, "band_limited", substeps)[0]
+    if name in CONDITIONS:
+        if not carries(record, name):
+            raise ValueError(f"Record {record.name} must state its {name}, but none is declared.")
+        return np.full((record.input.size, 2 * substeps + 1), getattr(record, name))
     kind, _, rest = name.partition("_")
     if kind == "hold" and rest in get_args(Hold):
         other, _ = drive_table(record, record.input, cast(Hold, rest), substeps, shift, skew)

@@ -21,7 +21,7 @@ from ._families import ElementFamily, follow_motion
 _HOOKS: dict[str, tuple[str, ...]] = {
     "recorded": ("shift", "skew", "channel_drive"),
     "acted": ("drive",),
-    "force": ("force", "channel_force"),
+    "force": ("force", "channel_force", "dependence"),
     "mass": ("inertia",),
     "base": ("channel_base",),
     "read": ("reading", "channel_reading"),

@@ -1,4 +1,4 @@
-"""Records that repeat each other at equal level and direction, and their unexplained difference."""
+"""Records that repeat each other at equal level, direction and conditions; their unexplained difference."""
 
 from collections.abc import Sequence
 
@@ -16,17 +16,20 @@ _SAME_INPUT = 0.9
 
 
 def repeat_groups(records: Sequence[Record]) -> dict[str, tuple[Record, ...]]:
-    """Gives for each record, by name, the others at its level and direction: its repeats."""
+    """Gives for each record, by name, the others at its level, direction and conditions: its repeats."""
     return {
         one.name: tuple(
             other
             for other in records
-            if other is not one
-            and one.level is not None
-            and (other.level, other.direction, other.kind) == (one.level, one.direction, one.kind)
+            if other is not one and one.level is not None and _test(other) == _test(one)
         )
         for one in records
     }
+
+
+def _test(record: Record) -> tuple[object, ...]:
+    """Gives what two records have in common that repeat each other."""
+    return record.level, record.direction, record.kind, record.conditions
 
 
 def repeat_difference(one: Record, other: Record) -> Float[np.ndarray, " time"] | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..._show import shown
 from .._campaign import Hold, InputQuantity, OutputQuantity
-from .._record import Direction, ExcitationKind, Role
+from .._record import CONDITIONS, Direction, ExcitationKind, Role
 from .._wording import listing, nearest
 
 # Why no validation library: this declaration was also written for pydantic 2 and tried with msgspec. pydantic
@@ -143,6 +143,7 @@ RECORD: Mapping[str, Field] = {
     "settle": _count(default=0),
     "schedule": _file(),
     "kind": _choice(*get_args(ExcitationKind)),
+    **{name: _positive() for name in CONDITIONS},
 }
 _REQUIRED_SECTIONS = ("campaign", "input", "output")
 _ABSENT_SECTIONS = ("floor", "filter")
@@ -309,6 +310,8 @@ def _check_together(file: Path, sections: Mapping[str, Any], records: tuple[Mapp
         )
     for number, record in enumerate(records, start=1):
         _check_kind(f"{file}: [[record]] number {number}", record)
+    for name in CONDITIONS:
+        _check_stated(file, name, records)
     if not any(record["role"] == "fit" for record in records):
         raise ValueError(f'{file}: no [[record]] has role = "fit"; at least one record is needed to fit')
 
@@ -324,6 +327,18 @@ def _check_columns(file: Path, sections: Mapping[str, Any]) -> None:
             )
         if column is not None:
             named[column] = name
+
+
+def _check_stated(file: Path, name: str, records: tuple[Mapping[str, Any], ...]) -> None:
+    """Refuses an operating condition that only some of the records state."""
+    stated = [record[name] is not None for record in records]
+    if any(stated) and not all(stated):
+        lacking, having = stated.index(False), stated.index(True)
+        raise ValueError(
+            f'{file}: [[record]] number {lacking + 1}, file = "{records[lacking]["file"]}", lacks `{name}`, '
+            f"but number {having + 1} has {name} = {records[having][name]:g}; state it of every record or "
+            "of none"
+        )
 
 
 def _check_kind(where: str, record: Mapping[str, Any]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._campaign import TIME_DERIVATIVES, Campaign, Filter, FloorChannel, InputChannel, OutputChannel
-from .._record import Dwell, ExcitationKind, Record
+from .._record import CONDITIONS, Dwell, ExcitationKind, Record
 from ..spectrum import ringing_frequency
 from ._channel_factor import check_units
 from ._declaration import Declaration
@@ -136,6 +136,7 @@ def _read_record(
         floor=channels.floor_acceleration(declared),
         time_jitter=channels.time_jitter,
         removed_spikes=channels.removed_spikes,
+        **{name: entry[name] for name in CONDITIONS},
     )
     return record, channels.units
 

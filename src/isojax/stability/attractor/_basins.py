@@ -13,7 +13,7 @@ from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator, State
+from ...models import Integrator, Isolator, State, as_isolator
 from ..orbit import ascending, period_map, recorded_sine
 from ._stroboscope import Repetition, Watch, bounded_or_not, check_counts, repeats_after, settle_down
 
@@ -96,6 +96,7 @@ def basins_of_attraction(
 
     Source: Thompson & Stewart 2002, Nonlinear Dynamics and Chaos, sec. 7.3.
     """
+    model = as_isolator(model)
     check_float64()
     check_counts(settle=settle, most=most, longest=longest)
     integrator = Integrator() if integrator is None else integrator

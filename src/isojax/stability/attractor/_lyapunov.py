@@ -12,7 +12,7 @@ from ..._results import RESULTS
 from ..._show import amount, shown
 from ..._types import Lanes, check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator, State
+from ...models import Integrator, Isolator, State, as_isolator
 from ..orbit import recorded_sine
 from ._stroboscope import Watch, any_disturbance, bounded_or_not, check_counts, start_states, watch_settled
 
@@ -73,6 +73,7 @@ def largest_lyapunov_exponent(
 
     Source: Benettin et al. 1980, Meccanica 15:9; Wolf et al. 1985, Physica D 16:285.
     """
+    model = as_isolator(model)
     check_float64()
     check_counts(settle=settle, periods=periods)
     if periods < _BLOCKS:

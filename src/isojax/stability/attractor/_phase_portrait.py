@@ -10,7 +10,7 @@ from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator, State
+from ...models import Integrator, Isolator, State, as_isolator
 from ..orbit import AbstractStatePath, recorded_sine, trajectory
 from ._stroboscope import bounded_or_not, check_counts, settle_down, start_states
 
@@ -56,6 +56,7 @@ def phase_portrait(
         ValueError: if `start` has the wrong length, or a count is not positive.
         RuntimeError: if JAX is not in 64-bit mode.
     """
+    model = as_isolator(model)
     check_float64()
     check_counts(settle=settle, periods=periods)
     integrator = Integrator() if integrator is None else integrator

@@ -13,7 +13,7 @@ from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
-from ...models import Integrator, Isolator, State, advance
+from ...models import Integrator, Isolator, State, advance, as_isolator
 from ..orbit import AbstractStatePath, Sine, recorded_sine, trajectory
 from ._stroboscope import Watch, bounded_or_not, check_counts, settle_down, start_states
 
@@ -64,6 +64,7 @@ def poincare_section(
 
     Source: Moon 1992, Chaotic and Fractal Dynamics, sec. 2.4.
     """
+    model = as_isolator(model)
     check_float64()
     check_counts(settle=settle, periods=periods)
     integrator = Integrator() if integrator is None else integrator

@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
-from ...models import Integrator, Isolator
+from ...models import Integrator, Isolator, as_isolator
 from ..orbit import (
     is_odd,
     modulus,
@@ -128,6 +128,7 @@ def find_nearest_folds(
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359 (arc length); Nayfeh & Balachandran 1995,
     sec. 3.2 (multipliers) and 6.1.
     """
+    model = as_isolator(model)
     check_float64()
     refuse_transformed(
         model,

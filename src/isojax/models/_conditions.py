@@ -1,0 +1,57 @@
+"""Coefficients that follow an operating condition, such as the chamber pressure, at given values of it."""
+
+from collections.abc import Mapping
+from typing import cast
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from .._types import Scalar
+from ..elements import AbstractElement
+
+
+def followed_conditions(elements: tuple[AbstractElement, ...]) -> tuple[str, ...]:
+    """Name the operating conditions that some coefficient of these effects follows."""
+    followed = (element.dependence() for element in elements)
+    return tuple(sorted({one.condition for one in followed if one is not None}))
+
+
+def plain_elements(
+    elements: tuple[AbstractElement, ...], conditions: Mapping[str, Scalar | float]
+) -> tuple[AbstractElement, ...]:
+    """Give effects at operating conditions: what follows them goes into plain coefficients.
+
+    Args:
+        elements: the effects.
+        conditions: value of every condition that is followed, and of no other [SI].
+
+    Returns:
+        The effects that follow none, with what the others add to their strengths.
+
+    Raises:
+        ValueError: if a condition is missing, follows nothing, or is not positive.
+    """
+    known = followed_conditions(elements)
+    for name, value in conditions.items():
+        if name not in known:
+            followed = " and ".join(known) if known else "nothing"
+            raise ValueError(f"Argument `{name}` must not be given: the model follows {followed}.")
+        if not isinstance(value, Tracer) and not np.all(np.asarray(value) > 0):
+            raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
+    for name in known:
+        if name not in conditions:
+            raise ValueError(f"Argument `{name}` must be given: a coefficient of the model follows it.")
+    plain = [element for element in elements if element.dependence() is None]
+    for follows in (element.dependence() for element in elements):
+        if follows is None:
+            continue
+        law = cast(AbstractElement, follows.law)
+        share = follows.share(jnp.asarray(conditions[follows.condition], dtype=float))
+        place = next((place for place, one in enumerate(plain) if one.name == law.name), len(plain))
+        strength = share * getattr(law, law.strength)
+        if place < len(plain):
+            strength = getattr(plain[place], law.strength) + strength
+        plain[place : place + 1] = [eqx.tree_at(lambda one: getattr(one, one.strength), law, strength)]
+    return tuple(plain)

@@ -1,0 +1,80 @@
+"""A fit at an operating condition: the isolator there, and the covariance of its plain coefficients."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._parameters import find_parameter, list_parameters, replace_parameters
+from .._results import RESULTS
+from .._show import shown
+from .._types import Scalar
+from ._coefficient_errors import EndsEstimated, Estimated
+from ._isolator import Isolator
+
+
+@shown
+class FitAt(NamedTuple):
+    """What a fit says of the isolator at an operating condition; it goes wherever `fit=` is asked for.
+
+    Attributes:
+        model: the isolator at the condition.
+        free: names of its coefficients that the fit moves.
+        covariance: of these [product of their units].
+        result: how the search of the fit ended.
+    """
+
+    model: Isolator
+    free: tuple[str, ...]
+    covariance: Float[np.ndarray, "coefficient coefficient"]
+    result: RESULTS
+
+
+def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitAt:
+    """Give a fit at an operating condition, for the bands and chances of curves and maps there.
+
+    The plain coefficients there are linear in the fitted ones, so that their covariance is exact.
+
+    Args:
+        fit: a fit, a saved one, or what ends with one, such as a closed loop.
+        **conditions: as in `Isolator.at`.
+
+    Returns:
+        The isolator at the condition with its covariance.
+
+    Raises:
+        ValueError: if there is no fit; if a condition is missing, follows nothing, or is not positive.
+
+    Example:
+        A fitted stiffness that follows the pressure, k(p) = k + dk (p/p0 - 1):
+
+        >>> chamber = ij.elements.PressureStiffness(change=8e5, reference=2e5)
+        >>> model = ij.Isolator(800.0, (ij.elements.LinearStiffness(1e6), chamber))
+        >>> free = ("linear_stiffness.coefficient", "pressure_stiffness.change")
+        >>> fit = ij.models.FitAt(model, free, np.diag([3e3, 2e4]) ** 2, ij.RESULTS.successful)
+        >>> there = ij.models.fit_at(fit, pressure=2.4e5)
+        >>> there.free, np.sqrt(there.covariance).round()
+        (('linear_stiffness.coefficient',), array([[5000.]]))
+    """
+    held = fit if isinstance(fit, Estimated) else getattr(fit, "after", None)
+    if not isinstance(held, Estimated):
+        raise ValueError(
+            f"Argument `fit` must be a fit, or end with one, but is of type {type(fit).__name__}."
+        )
+    places = [find_parameter(held.model, name) for name in held.free]
+    numbers = [entry.value for entry in list_parameters(held.model)]
+
+    def plain(values: Array) -> Array:
+        moved = list(numbers)
+        for place, value in zip(places, values, strict=True):
+            moved[place] = value
+        there = replace_parameters(held.model, moved).at(**conditions)
+        return jnp.stack([entry.value for entry in list_parameters(there)])
+
+    model = held.model.at(**conditions)
+    slopes = np.asarray(jax.jacfwd(plain)(jnp.stack([numbers[place] for place in places])))
+    moves = np.any(slopes != 0.0, axis=1)
+    names = tuple(entry.name for entry, moved in zip(list_parameters(model), moves, strict=True) if moved)
+    return FitAt(model, names, slopes[moves] @ np.asarray(held.covariance) @ slopes[moves].T, held.result)

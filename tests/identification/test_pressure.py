@@ -1,0 +1,102 @@
+"""Coefficients that follow the chamber pressure of a record, on the simulated bench."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from isojax import rig
+from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
+from isojax.health import DwellStability, dwell_stability
+from isojax.identification import diagnose, fit, scales
+from isojax.identification.fitting._estimate import stiffness_scatter
+from isojax.identification.jacobian._channels import channel_table, effects_without_signal
+from isojax.models import Isolator
+from isojax.records.noise._repeats import repeat_groups
+
+REFERENCE = 2e5
+TRUTH = {"pressure_stiffness": 5e5, "pressure_damping": 3e3, "pressure_cubic_stiffness": 6e10}
+LAWS = {
+    "pressure_stiffness": rig.PressureStiffness,
+    "pressure_damping": rig.PressureDamping,
+    "pressure_cubic_stiffness": rig.PressureCubicStiffness,
+}
+PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(1e11), rig.LinearDamping(8e3)))
+START = Isolator(800.0, (LinearStiffness(1.05e6), CubicStiffness(1.2e11), LinearDamping(9e3)))
+DECLARED = {"stiffness": ("linear", "cubic"), "damping": ("linear",)}
+BENCH = rig.Bench(rate=200.0, noise=5e-3, drift=5e-4, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+RIVALS = ("pressure_stiffness", "pressure_damping", "stiffness_drift")
+OTHERS = tuple(name for name in CATALOGUE if name not in RIVALS)
+
+
+def campaign_of_pressures(simulated, *hidden: str, seed: int = 4):
+    """Two levels at each of three pressures, which rise and fall in the course of the test."""
+    plan = rig.Multisine((150.0, 600.0), 2.0, 14.0, period=2.0, periods=2, lines="full")
+    plans = tuple(rig.AtPressure(plan, pressure) for pressure in (2e5, 2.4e5, 1.7e5))
+    plant = PLANT.plus(*(LAWS[name](TRUTH[name], REFERENCE) for name in hidden))
+    return simulated(plant, plans, seed, BENCH, **DECLARED)
+
+
+def test_changes_that_are_declared_are_recovered_within_their_errors(simulated):
+    campaign = campaign_of_pressures(simulated, *LAWS)
+    magnitudes = scales(campaign)
+    assert magnitudes.pressure == pytest.approx(np.mean((1.7e5, 2e5, 2.4e5)))
+    at_zero = (CATALOGUE[name].guess(dataclasses.replace(magnitudes, pressure=REFERENCE)) for name in LAWS)
+    found = fit(START.with_elements(*at_zero), campaign)
+    assert found.errors["fit"].chi2_per_dof < 1.05
+    for name, truth in TRUTH.items():
+        entry = found.parameters[f"{name}.change"]
+        assert abs(entry.value - truth) < 3.0 * entry.standard_error
+        assert entry.standard_error < 0.2 * truth
+
+
+def test_a_change_that_is_not_declared_is_named(simulated):
+    verdict = diagnose(fit(START, campaign_of_pressures(simulated, "pressure_stiffness")), excluded=OTHERS)
+    assert verdict.verdict == "found"
+    assert verdict.finding.effect == "pressure_stiffness"
+    assert verdict.finding.indistinguishable in ((), ("pressure_stiffness",))
+
+
+def test_pressure_that_changes_nothing_is_not_named(simulated):
+    verdict = diagnose(fit(START, campaign_of_pressures(simulated)), excluded=OTHERS)
+    assert verdict.verdict == "none"
+    upper, _ = verdict.bounds["pressure_stiffness"]
+    assert upper < 0.05 * 1.08e6
+
+
+def test_records_at_different_pressures_are_no_repeats_and_show_no_scatter(simulated):
+    campaign = campaign_of_pressures(simulated, "pressure_stiffness")
+    assert not any(repeat_groups(campaign.records).values())
+    found = fit(START, campaign).estimate
+    scatter = stiffness_scatter(campaign.records, found.point, 1.0)
+    # The stiffness differs by a tenth between the pressures, and by 5e-4 at one of them.
+    assert scatter < 5e-3
+    unstated = tuple(dataclasses.replace(record, pressure=None) for record in campaign.records)
+    assert stiffness_scatter(unstated, found.point, 1.0) > 0.02
+
+
+def test_a_pressure_is_followed_only_where_it_is_stated_and_differs(simulated):
+    records = campaign_of_pressures(simulated).records
+    assert not {*LAWS} & {*effects_without_signal(records)}
+    assert {*LAWS} <= {*effects_without_signal(records[:2])}
+    np.testing.assert_array_equal(channel_table("pressure", records[2], "linear", 1, 0.0), 2.4e5)
+    with pytest.raises(ValueError, match="must state its pressure"):
+        channel_table("pressure", dataclasses.replace(records[0], pressure=None), "linear", 1, 0.0)
+
+
+def test_dwells_are_compared_with_orbits_at_their_own_pressure(simulated, monkeypatch):
+    plan = rig.SteppedSine((150.0,), (4.5, 6.5), 12, ("forward",))
+    plans = tuple(rig.AtPressure(plan, pressure) for pressure in (2.4e5, 1.7e5, 2.4e5))
+    records = [one for part in plans for one in simulated(PLANT, part, 4, BENCH, **DECLARED).records]
+    campaign = dataclasses.replace(simulated(PLANT, plan, 4, BENCH, **DECLARED), records=tuple(records))
+    follows = START.with_elements(CATALOGUE["pressure_stiffness"](5e5, REFERENCE))
+
+    def held(model, measured):
+        stiffness = float(model["linear_stiffness.coefficient"])
+        return [DwellStability(m.record.name, None, m.dwell, 1.0, stiffness, 0.0, 0.0) for m in measured]
+
+    monkeypatch.setattr("isojax.health._dwell_stability._held_against_orbits", held)
+    high, low = 1.05e6 + 0.2 * 5e5, 1.05e6 - 0.15 * 5e5
+    seen = [one.spectral_radius for one in dwell_stability(follows, campaign)]
+    np.testing.assert_allclose(seen, [high] * 2 + [low] * 2 + [high] * 2)
+    assert {one.spectral_radius for one in dwell_stability(START, campaign)} == {1.05e6}
