@@ -41,7 +41,9 @@ class Rules:
 
     significance: float = 0.01
     """Family-wise level of the score test (Westfall & Young 1993), of laws that describe a remainder, and of
-    the tests for lack of fit and for scatter of the stiffness within records."""
+    the tests for lack of fit, for scatter of the stiffness within records, of one strength and of a free run
+    that got worse. The score test takes half of it after each finding, so that all its levels of one loop sum
+    up to twice the first."""
 
     close_bic: float = 10.0
     """Difference of Schwarz's criterion from which the evidence is clear: very strong in the scale of Kass

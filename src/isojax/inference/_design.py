@@ -15,7 +15,7 @@ from ..models import EndsEstimated, Estimated, Isolator, Modelled, as_isolator, 
 from ._constraint import Constraint
 from ._design_result import Design, Outcome
 from ._design_scan import Scan, scan_design
-from ._design_search import Found, Task, search, stand
+from ._design_search import FoundDesign, Task, search, stand
 from ._design_space import NotFinite, Quantity, Space, space_of
 
 _RESTARTS = 3
@@ -170,7 +170,7 @@ def _size_of(wanted: Quantity, start: np.ndarray) -> float:
     return max(sizes) or 1.0
 
 
-def _searched(task: Task, start: np.ndarray, count: int, seed: int) -> tuple[Found, Scan]:
+def _searched(task: Task, start: np.ndarray, count: int, seed: int) -> tuple[FoundDesign, Scan]:
     """Search, compare with other points, and go on from a better one."""
     found = search(task, start)
     compared, better = scan_design(task, found, count, seed)
@@ -184,7 +184,7 @@ def _searched(task: Task, start: np.ndarray, count: int, seed: int) -> tuple[Fou
     return found._replace(retreats=retreats), compared
 
 
-def _outcome(limit: Quantity, found: Found) -> Outcome:
+def _outcome(limit: Quantity, found: FoundDesign) -> Outcome:
     answer = limit.at(found.at, slopes=False)
     assert limit.constraint is not None
     return Outcome(limit.constraint, answer.value, answer.bound)

@@ -10,7 +10,7 @@ from .._show import Row, amount, number, shown
 from ..models import Isolator
 from ._constraint import Constraint
 from ._design_scan import Scan
-from ._design_search import ALLOWED_MISS, sizes_of
+from ._design_search import ALLOWED_MISS, limit_sizes
 
 _ACTIVE = 1e-4
 """Margin over the limit below which a constraint holds the design where it is."""
@@ -43,17 +43,17 @@ class Outcome(NamedTuple):
     @property
     def kept(self) -> bool:
         """Whether every number keeps to its limit."""
-        return bool(np.all(self.margins >= -ALLOWED_MISS * sizes_of(self._limits)))
+        return bool(np.all(self.margins >= -ALLOWED_MISS * limit_sizes(self._limits)))
 
     @property
     def active(self) -> bool:
         """Whether the limit holds the design where it is."""
-        return bool(np.min(self.margins / sizes_of(self._limits)) < _ACTIVE)
+        return bool(np.min(self.margins / limit_sizes(self._limits)) < _ACTIVE)
 
     @property
     def words(self) -> str:
         """Whether it is kept, with the number that lies closest to its limit or misses it most."""
-        place = int(np.argmin(self.margins / sizes_of(self._limits)))
+        place = int(np.argmin(self.margins / limit_sizes(self._limits)))
         value, margin = number(float(self.value[place])), float(self.margins[place])
         sure = "" if self.constraint.chance is None else f", its end {number(float(self.bound[place]))}"
         if not self.kept:

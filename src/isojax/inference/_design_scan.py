@@ -7,7 +7,7 @@ from jaxtyping import Float
 from scipy.stats import qmc
 
 from .._show import shown
-from ._design_search import ALLOWED_MISS, Found, Task, stand
+from ._design_search import ALLOWED_MISS, FoundDesign, Task, stand
 from ._design_space import NotFinite
 
 _REACH = (0.005, 0.1)
@@ -48,7 +48,7 @@ class Scan(NamedTuple):
 
 
 def scan_design(
-    task: Task, found: Found, count: int, seed: int
+    task: Task, found: FoundDesign, count: int, seed: int
 ) -> tuple[Scan, Float[np.ndarray, " coordinate"] | None]:
     """Compare a design with other coefficients.
 

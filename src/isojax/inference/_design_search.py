@@ -50,7 +50,7 @@ class Task(NamedTuple):
             assert constraint is not None
             answer = quantity.at(at, slopes)
             limit = np.broadcast_to(np.ravel(constraint.limit), answer.bound.shape)
-            unit = (-1.0 if constraint.upper else 1.0) / sizes_of(limit)
+            unit = (-1.0 if constraint.upper else 1.0) / limit_sizes(limit)
             values.append(unit * (answer.bound - limit))
             if answer.slope is not None:
                 changes.append(unit[:, None] * answer.slope)
@@ -58,12 +58,12 @@ class Task(NamedTuple):
         return Answer(margin, margin, np.concatenate(changes) if slopes else None)
 
 
-def sizes_of(limit: Float[np.ndarray, " number"]) -> Float[np.ndarray, " number"]:
+def limit_sizes(limit: Float[np.ndarray, " number"]) -> Float[np.ndarray, " number"]:
     """Give the sizes by which misses of limits are measured: their magnitude, one where they are zero."""
     return np.where(limit == 0.0, 1.0, np.abs(limit))
 
 
-class Found(NamedTuple):
+class FoundDesign(NamedTuple):
     """Where a search ended.
 
     Attributes:
@@ -86,7 +86,7 @@ class Found(NamedTuple):
         return self.violation <= ALLOWED_MISS
 
 
-def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> Found:
+def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> FoundDesign:
     """Search for the smallest objective that keeps to the limits; where none does, for the smallest miss.
 
     Where the start misses a limit, the largest miss is made small first. From then on the search goes from
@@ -105,7 +105,7 @@ def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> Found:
 
     Source: Kraft 1988, DFVLR-FB 88-28 (SLSQP).
     """
-    nearest = Found(start, *stand(task, start), True, 0)
+    nearest = FoundDesign(start, *stand(task, start), True, 0)
     if not nearest.feasible:
         nearest = _in_boxes(task, start, elastic=True)
     if not nearest.feasible:
@@ -114,7 +114,7 @@ def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> Found:
     return found._replace(retreats=found.retreats + nearest.retreats)
 
 
-def _in_boxes(task: Task, start: Float[np.ndarray, " coordinate"], elastic: bool) -> Found:
+def _in_boxes(task: Task, start: Float[np.ndarray, " coordinate"], elastic: bool) -> FoundDesign:
     """Search in boxes: `elastic` for the smallest miss, else among points that keep the limits."""
     centre, radius, retreats = start, np.inf, 0
     for _ in range(_BOXES):
@@ -135,9 +135,9 @@ def _in_boxes(task: Task, start: Float[np.ndarray, " coordinate"], elastic: bool
             continue
         cut = np.isclose(end, low) & (low > 0.0) | np.isclose(end, high) & (high < 1.0)
         if not cut.any() or (elastic and violation <= ALLOWED_MISS):
-            return Found(end, objective, violation, converged, retreats)
+            return FoundDesign(end, objective, violation, converged, retreats)
         centre, radius = end, 2.0 * radius
-    return Found(centre, *stand(task, centre), False, retreats)
+    return FoundDesign(centre, *stand(task, centre), False, retreats)
 
 
 def stand(task: Task, at: Float[np.ndarray, " coordinate"]) -> tuple[float, float]:

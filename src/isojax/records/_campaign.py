@@ -16,6 +16,9 @@ Hold = Literal["band_limited", "linear", "zero_order"]
 TIME_DERIVATIVES: Mapping[OutputQuantity, int] = {"displacement": 0, "velocity": 1, "acceleration": 2}
 """How often the displacement is differentiated to give each quantity."""
 
+RELATIVE_ERROR = 1e-3
+"""Error of a reading over the response where none is declared: what ordinary sensors keep."""
+
 _RECORDS_SHOWN = 16
 """Records of a campaign that are shown one by one."""
 
@@ -68,7 +71,7 @@ class OutputChannel:
     unit: str
     offset_free: bool = False
     noise: float | None = None
-    relative_error: float = 1e-3
+    relative_error: float = RELATIVE_ERROR
     remove_spikes: bool = False
 
 

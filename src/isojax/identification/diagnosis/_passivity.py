@@ -18,6 +18,9 @@ STEPS = 1024
 STEADY = 1e-2
 """Share of its range by which a settled force may differ between the last two cycles."""
 
+LOOPS = (0.25, 1.0)
+"""Amplitudes over the largest visited one: a passive law is so over smaller loops, too."""
+
 WORK_OF_STEPS = 1e-3
 """Share of the elastic energy of a loop up to which its work is the error of the steps."""
 
@@ -105,7 +108,7 @@ def find_activity(element: AbstractElement, largest_x: float, largest_v: float) 
     shape = element.unphysical_shape(largest_x)
     if shape is not None:
         return f"its {element.words} {shape}"
-    amplitude = largest_x * np.array([0.25, 1.0])  # a passive law is so over smaller loops, too
+    amplitude = largest_x * np.array(LOOPS)
     work, elastic = work_per_cycle(element, amplitude, np.full(2, largest_v / largest_x))
     if not np.all(np.isfinite(work)):
         return f"its {element.words} diverges over the visited loop"

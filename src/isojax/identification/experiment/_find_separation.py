@@ -18,11 +18,11 @@ from ._trial_information import (
     Columns,
     absent,
     carry_out,
-    columns_of,
     expected_chi2,
     full_matrix,
     needs_every_sample,
     old_point,
+    trial_columns,
     trial_point,
 )
 
@@ -164,7 +164,7 @@ def _columns(extension: Extension, scales: Scales) -> tuple[Columns, float]:
     known = {rival.name: rival for rival in finding.rivals}
     others = (known.get(name, CATALOGUE[name].guess(scales)) for name in finding.indistinguishable)
     probes = tuple(map(absent, (effect, *others)))
-    columns = columns_of(fitted, probes, tuple(probe.typical_strength(scales) for probe in probes))
+    columns = trial_columns(fitted, probes, tuple(probe.typical_strength(scales) for probe in probes))
     strength = float(getattr(effect, effect.strength))
     unit = dict(own_parameters(effect))[effect.strength].unit
     for held in fitted.model.elements:

@@ -27,11 +27,11 @@ from ._trial_information import (
     Columns,
     absent,
     carry_out,
-    columns_of,
     expected_chi2,
     full_matrix,
     needs_every_sample,
     old_point,
+    trial_columns,
     trial_point,
 )
 
@@ -198,7 +198,7 @@ def _ask(
         errors = _errors_of(gradient, fit.covariance)
     probes, effect = _rival(fit, rivals)
     scales = campaign_scales(fit.campaign)
-    columns = columns_of(fit.estimate, probes, tuple(probe.typical_strength(scales) for probe in probes))
+    columns = trial_columns(fit.estimate, probes, tuple(probe.typical_strength(scales) for probe in probes))
     old = old_point(columns) if probes else None
     return _Asked(fit, columns, gradient, errors, old, effect, max(1.0, fit.estimate.chi2 / fit.estimate.dof))
 

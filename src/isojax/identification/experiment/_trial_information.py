@@ -43,7 +43,9 @@ def absent(element: AbstractElement) -> AbstractElement:
     return eqx.tree_at(lambda e: getattr(e, e.strength), element, jnp.zeros(()))
 
 
-def columns_of(fitted: Estimate, probes: tuple[AbstractElement, ...], typical: tuple[float, ...]) -> Columns:
+def trial_columns(
+    fitted: Estimate, probes: tuple[AbstractElement, ...], typical: tuple[float, ...]
+) -> Columns:
     """Give the columns of the fitted coefficients and of the strengths of absent effects.
 
     Args:

@@ -34,7 +34,7 @@ IDLE = 3
 
 PACE = 5
 """Accepted steps over which the pace of a search is taken, where another model is ahead of it. Refused ones
-tell no pace: what comes after them may gain more than what went before."""
+do not count: what comes after them may gain more than what went before."""
 
 SHRINKS = 3
 """Refusals that a trial which diverged counts for: it lies far outside, not just a little too far."""

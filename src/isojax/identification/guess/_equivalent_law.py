@@ -15,7 +15,7 @@ from ._measured_receptance import MeasuredResponse
 
 @shown
 @dataclasses.dataclass(frozen=True)
-class Resonance:
+class MeasuredResonance:
     """Equivalent stiffness and damping of one record at its resonance.
 
     Attributes:
@@ -48,12 +48,12 @@ class Resonance:
     damping: float
 
 
-def find_resonance(
+def measured_resonance(
     response: MeasuredResponse,
     mass: float,
     damping: Literal["half_power", "circle"] = "half_power",
     resonance: Literal["peak", "phase"] = "peak",
-) -> Resonance | None:
+) -> MeasuredResonance | None:
     """Find resonance, equivalent stiffness and equivalent damping of one record.
 
     Args:
@@ -78,7 +78,7 @@ def find_resonance(
     ratio = half_power.damping_ratio if damping == "half_power" else circle.damping_ratio
     at = used if np.isfinite(used) else half_power.peak_frequency
     omega = 2 * np.pi * used
-    return Resonance(
+    return MeasuredResonance(
         record=response.record,
         level=response.level,
         direction=response.direction,

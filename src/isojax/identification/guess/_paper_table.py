@@ -9,7 +9,7 @@ from jaxtyping import Float
 from ... import elements
 from ..._show import shown
 from ...models import Isolator
-from ._equivalent_law import EquivalentLaw, Resonance, find_resonance, fit_equivalent_law
+from ._equivalent_law import EquivalentLaw, MeasuredResonance, fit_equivalent_law, measured_resonance
 from ._measured_receptance import MeasuredResponse
 from ._physical_fit import unphysical_side
 
@@ -31,14 +31,16 @@ class PaperTable:
     Source: the paper, sec. 4.
     """
 
-    resonances: tuple[Resonance, ...]
+    resonances: tuple[MeasuredResonance, ...]
     stiffness: EquivalentLaw | None
     damping: EquivalentLaw | None
     model: Isolator | None
     notes: tuple[str, ...]
 
 
-def _equivalent_points(resonances: tuple[Resonance, ...], side: str) -> dict[str, Float[np.ndarray, "_ 2"]]:
+def _equivalent_points(
+    resonances: tuple[MeasuredResonance, ...], side: str
+) -> dict[str, Float[np.ndarray, "_ 2"]]:
     """Give amplitude and equivalent coefficient by sweep direction."""
     rows: dict[str, list[tuple[float, float]]] = {}
     for one in resonances:
@@ -89,7 +91,7 @@ def paper_table(
 
     Source: the paper, eqs. (9)-(13), (15)-(18).
     """
-    found = [find_resonance(response, mass, damping, resonance) for response in responses]
+    found = [measured_resonance(response, mass, damping, resonance) for response in responses]
     resonances = tuple(one for one in found if one is not None)
     notes: list[str] = []
     jumped = [one.record for one in resonances if one.half_power.jump_inside]

@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 
 from ..._show import shown
-from .._campaign import Hold, InputQuantity, OutputQuantity
+from .._campaign import RELATIVE_ERROR, Hold, InputQuantity, OutputQuantity
 from .._record import CONDITIONS, Direction, ExcitationKind, Role
 from .._wording import listing, nearest
 
@@ -112,7 +112,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "unit": _text(),
         "offset_free": _flag(),
         "noise": _positive(),
-        "relative_error": _positive(default=1e-3),
+        "relative_error": _positive(default=RELATIVE_ERROR),
         "remove_spikes": _flag(),
     },
     "floor": {

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from ...inference import Posterior, Profile
 from ..words import typeset_unit
-from ._style import AFTER, BAND, BEFORE, MEASURED, axes_for, entitle, parameter_words
+from ._style import AFTER, BAND, BEFORE, MEASURED, axes_for, entitle, parameter_label
 
 
 def plot_profile(profile: Profile, *, ax: Axes | None = None) -> Figure:
@@ -38,9 +38,9 @@ def plot_profile(profile: Profile, *, ax: Axes | None = None) -> Figure:
     ax.plot(values, root**2, "o", color=AFTER, markersize=3.5)
     ax.axhline(limit, color=MEASURED, linewidth=0.8, linestyle=":")
     ax.set_ylim(0.0, 1.5 * limit)
-    ax.set_xlabel(f"{parameter_words(profile.name)} [{typeset_unit(profile.unit)}]")
+    ax.set_xlabel(f"{parameter_label(profile.name)} [{typeset_unit(profile.unit)}]")
     ax.set_ylabel("rise of χ² [standard errors squared]")
-    entitle(ax, f"{parameter_words(profile.name)}: all other coefficients fitted anew at each value")
+    entitle(ax, f"{parameter_label(profile.name)}: all other coefficients fitted anew at each value")
     return figure
 
 
@@ -77,7 +77,7 @@ def plot_posterior(posterior: Posterior, name: str = "", *, ax: Axes | None = No
         linewidth=1.2,
         label="value and standard error of the fit",
     )
-    ax.set_xlabel(f"{parameter_words(one.name)} [{typeset_unit(one.unit)}]")
+    ax.set_xlabel(f"{parameter_label(one.name)} [{typeset_unit(one.unit)}]")
     ax.set_ylabel("density [1 / unit]")
-    entitle(ax, f"posterior of {parameter_words(one.name)}")
+    entitle(ax, f"posterior of {parameter_label(one.name)}")
     return figure

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...inference import GlobalSensitivity
-from ._style import AFTER, MEASURED, NEUTRAL, axes_for, entitle, parameter_words
+from ._style import AFTER, MEASURED, NEUTRAL, axes_for, entitle, parameter_label
 
 _HEIGHT = 0.36
 """Height of a bar, over the distance of two inputs."""
@@ -57,7 +57,7 @@ def plot_global_sensitivity(
             linewidth=0.9,
         )
     ax.axvline(0.0, color=MEASURED, linewidth=0.8)
-    ax.set_yticks(rows, [parameter_words(sensitivity.inputs[place]) for place in order])
+    ax.set_yticks(rows, [parameter_label(sensitivity.inputs[place]) for place in order])
     ax.invert_yaxis()
     ax.grid(False, axis="y")
     ax.set_xlabel("share of the variance of the quantity [1]")

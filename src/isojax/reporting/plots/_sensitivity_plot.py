@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ...stability import Sensitivity
 from ..words import typeset_number
-from ._style import AFTER, BEFORE, MEASURED, axes_for, entitle, parameter_words
+from ._style import AFTER, BEFORE, MEASURED, axes_for, entitle, parameter_label
 
 
 def plot_sensitivity(
@@ -73,7 +73,7 @@ def plot_sensitivity(
             label=words,
         )
     ax.axvline(0.0, color=MEASURED, linewidth=0.8)
-    ax.set_yticks(rows, [parameter_words(sensitivity.parameters[place]) for place in known])
+    ax.set_yticks(rows, [parameter_label(sensitivity.parameters[place]) for place in known])
     ax.invert_yaxis()
     ax.grid(False, axis="y")
     ax.set_xlabel("change of the quantity for 1 % more of the parameter [%]")

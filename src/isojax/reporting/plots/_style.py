@@ -132,7 +132,7 @@ def entitle(ax: Axes, title: str, handles: Sequence[Artist] | None = None) -> No
     ax.set_title("\n".join(lines), fontsize=9.5, loc="left", pad=6.0 + rows * _LEGEND_ROW)
 
 
-def parameter_words(name: str) -> str:
+def parameter_label(name: str) -> str:
     """Give the name of a parameter as an axis shows it.
 
     Args:

@@ -178,7 +178,7 @@ class _Whole(NamedTuple):
 
 def _curve(
     model: Isolator, search: _Search, start: SpecialPoint | None, integrator: Integrator | None
-) -> "_Curve":
+) -> "_OrbitCurve":
     """Check what was asked for, and give the search for a curve from its start on."""
     check_float64()
     refuse_traced(model)
@@ -199,7 +199,7 @@ def _curve(
     # Only a symmetric orbit has multipliers over half a period; a doubling never is of one.
     symmetric = bool(np.isfinite(np.asarray(start.half_period_multipliers)).all())
     method = ShootingMethod(integrator, start.periods, symmetric)
-    return _Curve(family, method, search.kind, start, search.stride)
+    return _OrbitCurve(family, method, search.kind, start, search.stride)
 
 
 def _meet(model: Isolator, search: _Search, integrator: Integrator) -> SpecialPoint:
@@ -231,7 +231,7 @@ def _meet(model: Isolator, search: _Search, integrator: Integrator) -> SpecialPo
     )
 
 
-class _Curve(eqx.Module):
+class _OrbitCurve(eqx.Module):
     """The search for one curve: traced by fixed steps, found anew with the motion split at its kinks."""
 
     family: ParameterFamily
@@ -316,12 +316,12 @@ class _Curve(eqx.Module):
 
 
 @eqx.filter_jit
-def _begin(curve: _Curve) -> tuple[Array, Array]:
+def _begin(curve: _OrbitCurve) -> tuple[Array, Array]:
     return curve.begin()
 
 
 @eqx.filter_jit
-def _walk(curve: _Curve, scale: Array, first: Array, sign: float) -> Followed:
+def _walk(curve: _OrbitCurve, scale: Array, first: Array, sign: float) -> Followed:
     family, states = curve.still, scale.shape[0]
     critical = CRITICAL[curve.kind]
 
@@ -340,7 +340,9 @@ def _walk(curve: _Curve, scale: Array, first: Array, sign: float) -> Followed:
 
 
 @eqx.filter_jit
-def _polish_points(curve: _Curve, places: int, scale: Array, unknowns: Array, normals: Array) -> Polished:
+def _polish_points(
+    curve: _OrbitCurve, places: int, scale: Array, unknowns: Array, normals: Array
+) -> Polished:
     states = scale.shape[0]
 
     def lane(unknown: Array, normal: Array) -> Polished:

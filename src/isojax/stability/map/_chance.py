@@ -145,7 +145,7 @@ class _Curves:
         self.stable = np.asarray(smap.spectral_radius) < 1.0
         self.force = np.broadcast_to(np.log(np.asarray(smap.amplitudes))[:, None], self.stable.shape)
 
-    def at(self, column: int) -> "_Curve | None":
+    def at(self, column: int) -> "_OrbitsOfColumn | None":
         """Give the curve at one frequency; None where too few orbits are known."""
         x, y, fold, others, stable = (
             one[..., column].ravel()
@@ -170,10 +170,10 @@ class _Curves:
         # counts as it is.
         margin = np.minimum(ratio, others)
         margin = np.where(stable | (rise < 0.0), margin, -np.abs(margin))
-        return _Curve(x, CubicHermiteSpline(x, y, rise), margin)
+        return _OrbitsOfColumn(x, CubicHermiteSpline(x, y, rise), margin)
 
 
-class _Curve(NamedTuple):
+class _OrbitsOfColumn(NamedTuple):
     """The orbits of a map at one frequency.
 
     Attributes:
@@ -188,7 +188,7 @@ class _Curve(NamedTuple):
 
 
 def _in_doubt(
-    curves: list[_Curve], grid: Float[np.ndarray, " displacement"]
+    curves: list[_OrbitsOfColumn], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, " doubtful"]:
     """Give log displacements that a draw may fold or destabilise; elsewhere all maps are far from it."""
     force, margin = _tables(curves, grid)
@@ -201,7 +201,7 @@ def _in_doubt(
 
 
 def _tables(
-    curves: list[_Curve], grid: Float[np.ndarray, " displacement"]
+    curves: list[_OrbitsOfColumn], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, "2 map displacement"]:
     """Give log force and margin of all maps over common displacements."""
     return np.array(

@@ -14,7 +14,7 @@ _POLISHING = 2
 """Steps of Newton's method on the polynomial of a piece, after the parabola of a part."""
 
 
-class Reading(NamedTuple):
+class ReadOrbits(NamedTuple):
     """Orbits as read off the surface, each from the phase of its largest displacement.
 
     Attributes:
@@ -120,7 +120,7 @@ def read_surface(
     force: Int[Array, " candidate"],
     column: Int[Array, " candidate"],
     part: Int[Array, " candidate"],
-) -> Reading:
+) -> ReadOrbits:
     """Give candidates as read off the surface.
 
     Args:
@@ -191,4 +191,4 @@ def read_surface(
     half_trace, determinant, response = (value(own[tables - k], at) for k in (3, 2, 1))
     # There the velocity is zero, and the displacement is what the surface counts by.
     here = (surface.rest + size, 0.0 * size, *internal)
-    return Reading(here, (sine / push, cosine / push), phases, (half_trace, determinant), response * size)
+    return ReadOrbits(here, (sine / push, cosine / push), phases, (half_trace, determinant), response * size)
