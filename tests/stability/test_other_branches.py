@@ -18,16 +18,22 @@ def after(rates, state, seconds: float) -> np.ndarray:
     return run.y[:, -1]
 
 
+def oscillator(cubic: float, *damping: float) -> ij.Isolator:
+    """Unit mass and stiffness; damping in v, |v| v and v^3. One structure, so that it is compiled once."""
+    linear, quadratic, third = damping
+    laws = (
+        ij.elements.LinearDamping(linear),
+        ij.elements.AbsQuadraticDamping(quadratic),
+        ij.elements.CubicDamping(third),
+    )
+    springs = (ij.elements.LinearStiffness(1.0), ij.elements.CubicStiffness(cubic))
+    return ij.Isolator(1.0, (*springs, *laws))
+
+
 @pytest.fixture(scope="module")
 def beside_isola():
     """A damper that rises, falls and rises again: 0.105 N holds three amplitudes at resonance."""
-    damper = (
-        ij.elements.LinearDamping(0.25),
-        ij.elements.AbsQuadraticDamping(-0.2),
-        ij.elements.CubicDamping(0.045),
-    )
-    model = ij.Isolator(1.0, (ij.elements.LinearStiffness(1.0), *damper))
-    return ij.frequency_response(model, 0.105, (0.12, 0.2))
+    return ij.frequency_response(oscillator(0.0, 0.25, -0.2, 0.045), 0.105, (0.12, 0.2))
 
 
 def test_an_isola_is_found_unasked_where_the_balance_of_one_harmonic_has_it(beside_isola):
@@ -71,12 +77,8 @@ def test_print_and_picture_show_the_isola(beside_isola):
 
 def test_a_subharmonic_of_order_one_third_is_found_where_perturbation_has_it():
     cubic, half_damping, force = 0.01, 0.002, 8.0
-    duffing = (
-        ij.elements.LinearStiffness(1.0),
-        ij.elements.CubicStiffness(cubic),
-        ij.elements.LinearDamping(2.0 * half_damping),
-    )
-    response = ij.frequency_response(ij.Isolator(1.0, duffing), force, (0.49, 0.51), periods=(3,))
+    duffing = oscillator(cubic, 2.0 * half_damping, 0.0, 0.0)
+    response = ij.frequency_response(duffing, force, (0.49, 0.51), periods=(3,))
     curves = [one for one in response.others if one.branch.periods == 3]
     # Of the two, stable and unstable, each passes through this band.
     assert len(curves) == 2
