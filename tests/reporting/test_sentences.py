@@ -11,7 +11,7 @@ from isojax.records.noise._health import UnsettledDwell
 from isojax.reporting import render_text, result_dict, verdict_summary
 from isojax.reporting.words import alternative_words
 from isojax.reporting.words._health_words import budget_words
-from isojax.reporting.words._sentences import caveats, finding_words, headline, health_words
+from isojax.reporting.words._sentences import caveats, finding_words, verdict_sentence, health_words
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ from isojax.reporting.words._sentences import caveats, finding_words, headline, 
     ],
 )
 def test_headline_says_what_the_verdict_says(found, verdict, start):
-    sentence = headline(dataclasses.replace(found, verdict=verdict))
+    sentence = verdict_sentence(dataclasses.replace(found, verdict=verdict))
     assert sentence.startswith(start)
     assert ("something else is missing too" in sentence) == (verdict == "partly_explained")
     assert sentence.endswith(".")
@@ -52,11 +52,11 @@ def test_what_held_out_records_say_against_a_finding_is_told_and_it_is_not_calle
     def errors(held):
         return {"holdout": Errors(0.01, 0.04, 0.04, before if held is found.before else after, samples)}
 
-    plain = headline(dataclasses.replace(found))
+    plain = verdict_sentence(dataclasses.replace(found))
     monkeypatch.setattr(Fit, "errors", property(errors))
     loop = dataclasses.replace(found)
-    assert headline(loop).endswith(said)
-    assert ("held-out records" in headline(loop).removeprefix(plain)) == bool(said)
+    assert verdict_sentence(loop).endswith(said)
+    assert ("held-out records" in verdict_sentence(loop).removeprefix(plain)) == bool(said)
     expected = "partly_explained" if said else "found"
     assert overall_verdict(found.before, found.after, 1, found.last, found.rules) == expected
     assert dataclasses.replace(found, extensions=()).doubt == ""
@@ -70,9 +70,9 @@ def test_of_what_is_below_the_noise_no_share_is_told(found):
 
 def test_headline_without_findings_names_nothing(found):
     alone = dataclasses.replace(found, extensions=(), after=found.before)
-    assert headline(dataclasses.replace(alone, verdict="none")).startswith("Nothing is missing")
+    assert verdict_sentence(dataclasses.replace(alone, verdict="none")).startswith("Nothing is missing")
     for verdict in ("partly_explained", "unexplained"):
-        sentence = headline(dataclasses.replace(alone, verdict=verdict))
+        sentence = verdict_sentence(dataclasses.replace(alone, verdict=verdict))
         assert sentence.startswith("Something is missing that no known effect explains; held-out χ²/dof")
         assert "→" not in sentence
 
@@ -85,13 +85,13 @@ def test_a_finding_that_a_later_one_contains_is_told_by_that(found):
     after = found.after._replace(model=model)
     both = dataclasses.replace(found, extensions=(step, later), after=after)
     assert [one.effect for one in both.findings] == ["stribeck_friction"]
-    assert headline(both).startswith("Falling (Stribeck) friction")
+    assert verdict_sentence(both).startswith("Falling (Stribeck) friction")
     assert len(budget_words(DriftBudget(math.nan, ()), after, both.findings)) == 0
 
 
 def test_more_than_two_findings_of_a_good_fit_are_said_to_explain_it(found):
     (step,) = found.extensions
-    sentence = headline(dataclasses.replace(found, extensions=(step,) * 3, verdict="partly_explained"))
+    sentence = verdict_sentence(dataclasses.replace(found, extensions=(step,) * 3, verdict="partly_explained"))
     assert "explain the records together" in sentence
     assert "something else is missing too" not in sentence
 
@@ -189,7 +189,7 @@ def test_the_range_of_laws_is_told_and_a_better_one_forbids_the_name(found, rise
     assert overall_verdict(found.before, found.after, 1, found.last, found.rules, others) == verdict
     loop = dataclasses.replace(found, verdict=verdict, alternatives=others)
     assert alternative_words(loop) == (said,)
-    assert headline(loop).startswith("Something is missing, but its law") == (verdict == "partly_explained")
+    assert verdict_sentence(loop).startswith("Something is missing, but its law") == (verdict == "partly_explained")
     (entry,) = result_dict(loop)["alternatives"]
     assert entry["effects"] == ["coulomb_friction"]
     assert entry["laws"][0]["delta_chi2"] == rise
