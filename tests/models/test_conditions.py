@@ -27,14 +27,6 @@ FOLLOWERS = (PressureStiffness(DK, REFERENCE), PressureDamping(DC, REFERENCE))
 MODEL = ij.Isolator(MASS, (*LAWS, *FOLLOWERS))
 
 
-def test_an_orbit_at_a_pressure_has_the_amplitude_of_the_linear_receptance_there():
-    pressure, omega = 2.7e5, 2.0 * np.pi * FREQUENCY
-    stiffness, damping = K + 0.35 * DK, C + 0.35 * DC
-    expected = abs(FORCE / (stiffness - MASS * omega**2 + 1j * omega * damping))
-    orbit = ij.find_periodic_orbit(MODEL.at(pressure=pressure), ij.Harmonic(FORCE, FREQUENCY))
-    assert float(orbit.amplitude) == pytest.approx(expected, rel=1e-6)
-
-
 def test_pressures_go_side_by_side_and_the_slope_by_pressure_is_that_of_the_coefficients():
     def force(pressure):
         model = MODEL.at(pressure=pressure)
