@@ -11,7 +11,7 @@ from isojax.records.noise._health import UnsettledDwell
 from isojax.reporting import render_text, result_dict, verdict_summary
 from isojax.reporting.words import alternative_words
 from isojax.reporting.words._health_words import budget_words
-from isojax.reporting.words._sentences import caveats, finding_words, verdict_sentence, health_words
+from isojax.reporting.words._sentences import caveats, finding_words, health_words, verdict_sentence
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,9 @@ def test_a_finding_that_a_later_one_contains_is_told_by_that(found):
 
 def test_more_than_two_findings_of_a_good_fit_are_said_to_explain_it(found):
     (step,) = found.extensions
-    sentence = verdict_sentence(dataclasses.replace(found, extensions=(step,) * 3, verdict="partly_explained"))
+    sentence = verdict_sentence(
+        dataclasses.replace(found, extensions=(step,) * 3, verdict="partly_explained")
+    )
     assert "explain the records together" in sentence
     assert "something else is missing too" not in sentence
 
@@ -189,7 +191,9 @@ def test_the_range_of_laws_is_told_and_a_better_one_forbids_the_name(found, rise
     assert overall_verdict(found.before, found.after, 1, found.last, found.rules, others) == verdict
     loop = dataclasses.replace(found, verdict=verdict, alternatives=others)
     assert alternative_words(loop) == (said,)
-    assert verdict_sentence(loop).startswith("Something is missing, but its law") == (verdict == "partly_explained")
+    assert verdict_sentence(loop).startswith("Something is missing, but its law") == (
+        verdict == "partly_explained"
+    )
     (entry,) = result_dict(loop)["alternatives"]
     assert entry["effects"] == ["coulomb_friction"]
     assert entry["laws"][0]["delta_chi2"] == rise
