@@ -124,7 +124,7 @@ def test_what_makes_no_sense_is_refused(decay):
 
 
 def test_the_picture_shows_both_intervals(damping):
-    axes = ij.plot.show(damping).axes[0]
+    axes = ij.plot.profile(damping).axes[0]
     straight, curved = axes.get_lines()[:2]
     limit = chi2_law.ppf(0.95, 1)
     for line, ends in ((straight, damping.symmetric), (curved, damping.interval)):

@@ -147,7 +147,7 @@ def test_an_inspected_file_shows_drive_response_and_spectra(tmp_path):
 def test_every_picture_stands_under_plot_and_is_drawn_by_a_test():
     drawn = {name: plot for name, plot in vars(isojax.plot).items() if inspect.isfunction(plot)}
     del drawn["show"]  # it chooses among the others
-    files = Path(__file__).parent.glob("test_*.py")
+    files = Path(__file__).parents[1].rglob("test_*.py")
     tests = "".join(file.read_text(encoding="utf-8") for file in files)
     assert {plot.__name__ for plot in drawn.values()} == {name for name in vars(plots) if name[:5] == "plot_"}
     for name, plot in drawn.items():

@@ -42,7 +42,7 @@ def test_headline_says_what_the_verdict_says(found, verdict, start):
         # Of few samples chi2/dof scatters by itself: sqrt(2 / 300) is 0.08.
         (1.16, 1.12, 300.0, ""),
         (1.16, 1.30, 100.0, ""),
-        (1.22, 1.30, 300.0, "down to their noise: another law may act there."),
+        (1.24, 1.30, 300.0, "down to their noise: another law may act there."),
         (3.00, math.nan, 9e3, "contradict it: the model diverges on them."),
     ],
 )

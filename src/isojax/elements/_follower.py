@@ -2,11 +2,13 @@
 
 from typing import ClassVar, NamedTuple
 
+from .._show import shown
 from .._types import Lanes, Scalar
 from ._effect import AbstractEffect, Channels
 from ._force import AbstractForce
 
 
+@shown
 class Dependence(NamedTuple):
     """A coefficient that follows an operating condition of the record, such as the chamber pressure.
 

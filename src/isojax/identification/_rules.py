@@ -23,7 +23,8 @@ class Rules:
 
     smallest_share: float = 0.2
     """Share of the excess that matters where a fit is not good: an effect that explains less is not named,
-    and all effects together are the explanation once less is left."""
+    and all effects together are the explanation once less is left. A law of which another leaves less is one
+    of the same kind."""
 
     smallest_gain: float = 0.0005
     """Gain in chi2/dof below which effects are ties: no test repeats so well that a smaller one means

@@ -32,7 +32,7 @@ class SelectedLaw(NamedTuple):
         force: its size at the largest motion [N].
         z: score when it was selected, in standard deviations of the noise.
         share: share of the excess that the laws up to this one remove, by the linear step; 1 at most.
-        alike: formulas of laws that would do in its place, nearest first: chi2 would rise by a tie at most.
+        alike: formulas of laws that would remove most of the same, nearest first: all but `smallest_share`.
     """
 
     formula: str
@@ -115,9 +115,9 @@ def _select(
         size = np.sqrt(np.where(free, own, np.inf))
         likeness = np.abs(information[place]) / (size * size[place])
         near = np.argsort(-likeness)
-        # What chi2 would lose with the other law in the place of this one.
-        lost = gain * (1.0 - likeness**2)
-        alike = tuple(int(k) for k in near if lost[k] <= tie and k != place)
+        # The share of this gain that another law in its place would leave.
+        left = 1.0 - likeness**2
+        alike = tuple(int(k) for k in near if left[k] <= rules.smallest_share and k != place)
         selected.append(_Selection(place, float(score[place] / size[place]), gain, alike))
         column = information[:, place].copy()
         score = score - column * score[place] / column[place]
