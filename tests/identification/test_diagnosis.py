@@ -21,6 +21,7 @@ from isojax.identification import close_loop, diagnose, extend, fit, residual, s
 from isojax.identification.diagnosis._score import absent_effects, score_test
 from isojax.identification.fitting import Search
 from isojax.models import Integrator, Isolator
+from isojax.records import CONDITIONS
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
 START = Isolator(800.0, (LinearStiffness(1.05e6), LinearDamping(1.1e4)))
@@ -152,10 +153,11 @@ def test_bounds_of_an_innocent_model_hold_zero_and_carry_units(innocent):
     assert set(verdict.bounds) | set(verdict.hidden) == set(CATALOGUE) - {
         "linear_stiffness",
         "linear_damping",
-        # It is a part of dry friction; this drive is no sine; and no floor was measured.
+        # It is a part of dry friction; this drive is no sine; no floor was measured, and no condition stated.
         "asymmetric_friction",
         "drive_harmonics",
         "floor_motion",
+        *(name for name, kind in CATALOGUE.items() if set(CONDITIONS).intersection(kind.channels)),
     }
     upper, unit = verdict.bounds["coulomb_friction"]
     assert 0.0 < upper < 2.0
