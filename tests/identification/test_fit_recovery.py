@@ -13,6 +13,7 @@ from isojax.elements import CATALOGUE, CoulombFriction, LinearDamping, LinearSti
 from isojax.identification import fit, scales
 from isojax.identification.guess._force_balance import with_strength
 from isojax.models import Integrator, Isolator
+from isojax.records import CONDITIONS
 
 PLAN = rig.Multisine((60.0, 110.0), 2.0, 14.0, period=2.0, periods=5, lines="full")
 EXACT = rig.Bench(rate=500.0, noise=2e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
@@ -76,6 +77,7 @@ ELSEWHERE = {
     "test_clock_skew.py": ("clock_skew",),
     "test_channels.py": ("damping_drift", "drive_harmonics", "input_hold", "mains_hum", "stiffness_drift"),
     "test_moving_floor.py": ("floor_motion",),
+    "test_pressure.py": ("pressure_damping", "pressure_stiffness"),
 }
 """Effects whose recovery has a file of its own."""
 
@@ -91,7 +93,12 @@ def test_recoveries_of_their_own_are_of_effects_of_the_catalogue():
             assert name in text or CATALOGUE[name].__name__ in text
 
 
-UNASKED = sorted(set(CATALOGUE) - set(CASES) - {name for names in ELSEWHERE.values() for name in names})
+CONDITIONED = {name for name, kind in CATALOGUE.items() if set(CONDITIONS).intersection(kind.channels)}
+"""Effects of a condition that these records do not state; `test_conditions.py` compares their forces."""
+
+UNASKED = sorted(
+    set(CATALOGUE) - set(CASES) - {name for names in ELSEWHERE.values() for name in names} - CONDITIONED
+)
 """Effects without a recovery of their own, which a new one is at first: SciPy integrates their law."""
 
 
