@@ -22,7 +22,6 @@ FAIL.
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import time
@@ -31,11 +30,11 @@ from pathlib import Path
 
 import jax
 
+from _set_up_jax import set_up_jax
 from _trial_campaign import CLASSES, kind_of
 from _trial_effects import COMMONEST, EFFECTS
 from _trial_judge import coverage_markdown, line, markdown, print_table
 from _trial_run import crowded, run_one
-from isojax import compile_quickly
 
 Task = tuple[int, str, str, tuple[str, ...] | None]
 
@@ -152,11 +151,7 @@ def main() -> None:
             print("\n\n".join("\n".join(lines) for lines in tables))
             return
         sys.exit(0 if print_table(rows, options.verbose) else 1)
-    jax.config.update("jax_enable_x64", True)
-    compile_quickly()
-    if options.cache:
-        jax.config.update("jax_compilation_cache_dir", os.fspath(options.cache))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    set_up_jax(options.cache)
     run(options)
 
 

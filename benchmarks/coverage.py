@@ -15,7 +15,6 @@ and the rms.
 
 import argparse
 import json
-import os
 import tempfile
 import time
 from pathlib import Path
@@ -25,9 +24,10 @@ import jax.numpy as jnp
 import numpy as np
 
 import isojax as ij
+from _set_up_jax import set_up_jax
 from _trial_campaign import Sketch, sketch
 from _trial_judge import wilson
-from isojax import compile_quickly, rig
+from isojax import rig
 from isojax.identification import Fit
 from isojax.identification.fitting import invert_information
 
@@ -151,11 +151,7 @@ def main() -> None:
     if options.report:
         report(rows)
         return
-    jax.config.update("jax_enable_x64", True)
-    compile_quickly()
-    if options.cache:
-        jax.config.update("jax_compilation_cache_dir", os.fspath(options.cache))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    set_up_jax(options.cache)
     done = {(row["seed"], row["records"]) for row in rows}
     begin = time.perf_counter()
     for seed in range(*(int(end) for end in options.seeds.split(":"))):

@@ -23,7 +23,6 @@ hold the truth. Over all flaws at most 5 of 100 may be named and 10 unexplained,
 
 import argparse
 import json
-import os
 import tempfile
 import time
 import traceback
@@ -38,12 +37,13 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
+from _set_up_jax import set_up_jax
 from _trial_campaign import CYCLES, RATE, Secret, Sketch, file_campaign, sketch
 from _trial_effects import generator
 from _trial_judge import wilson
 from _trial_run import crowded
 from blind_trial import commit, read
-from isojax import compile_quickly, rig
+from isojax import rig
 from isojax.identification import close_loop, read_campaign
 from isojax.identification.fitting import drive_noise
 from isojax.records import data_health
@@ -232,11 +232,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.report:
         raise SystemExit(0 if report([row for path in options.report for row in read(path)]) else 1)
-    jax.config.update("jax_enable_x64", True)
-    compile_quickly()
-    if options.cache:
-        jax.config.update("jax_compilation_cache_dir", os.fspath(options.cache))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    set_up_jax(options.cache)
     done = {(row["seed"], row["flaw"]) for row in read(options.out)}
     begin, version = time.perf_counter(), commit()
     first, _, stop = options.seeds.partition(":")

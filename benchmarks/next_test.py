@@ -20,7 +20,6 @@ the standard error before, for all coefficients the geometric mean along the axe
 import argparse
 import dataclasses
 import json
-import os
 import tempfile
 import time
 from pathlib import Path
@@ -30,9 +29,10 @@ import jax.numpy as jnp
 import numpy as np
 
 import isojax as ij
+from _set_up_jax import set_up_jax
 from _trial_campaign import Sketch, sketch
 from coverage import BAND, DRIVE, FOLD_FREQUENCY, records_of
-from isojax import compile_quickly, rig
+from isojax import rig
 from isojax.identification import Fit, Proposal
 
 RESULTS = Path(__file__).parent / "results" / "next_test.jsonl"
@@ -167,11 +167,7 @@ def main() -> None:
     if options.report:
         report(rows)
         return
-    jax.config.update("jax_enable_x64", True)
-    compile_quickly()
-    if options.cache:
-        jax.config.update("jax_compilation_cache_dir", os.fspath(options.cache))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    set_up_jax(options.cache)
     begin = time.perf_counter()
     drawn = sketch(SEED, "coverage", ())
     drawn = dataclasses.replace(drawn, bench=dataclasses.replace(drawn.bench, drift=SCATTER))

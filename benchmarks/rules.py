@@ -16,7 +16,6 @@ import argparse
 import dataclasses
 import json
 import math
-import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -24,10 +23,10 @@ from typing import Any
 
 import jax
 
+from _set_up_jax import set_up_jax
 from _trial_campaign import kind_of, sketch
 from _trial_run import crowded, simulated
 from blind_trial import commit, read
-from isojax import compile_quickly
 from isojax.elements import Scales
 from isojax.identification import Rules, classical_guess, fit, read_campaign, scales
 from isojax.identification._close_loop import find_alternatives, overall_verdict, search_effects
@@ -254,11 +253,7 @@ def main() -> None:
     if options.report:
         report(read(options.out))
         return
-    jax.config.update("jax_enable_x64", True)
-    compile_quickly()
-    if options.cache:
-        jax.config.update("jax_compilation_cache_dir", os.fspath(options.cache))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    set_up_jax(options.cache)
     run(options)
 
 
