@@ -102,5 +102,6 @@ def _constraint(
         raise ValueError(f"Argument `limit` must hold finite numbers, but is {limit}.")
     if chance is not None and not 0.5 < chance < 1.0:
         raise ValueError(f"Argument `chance` must lie between 0.5 and 1, but is {chance}.")
-    label = getattr(quantity, "__name__", "quantity") if name is None else name
+    own = getattr(quantity, "__name__", "")
+    label = name if name is not None else own if own.isidentifier() else "quantity"
     return Constraint(quantity, limits, upper, label.replace("_", " "), chance)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from ...identification import NextTest
 from ...inference import Design
 from ..words import typeset_number
-from ._style import AFTER, BEFORE, MEASURED, axes_for, entitle
+from ._style import AFTER, MEASURED, NEUTRAL, axes_for, entitle
 
 
 def plot_next_test(test: NextTest, *, most: int = 12, ax: Axes | None = None) -> Figure:
@@ -30,7 +30,7 @@ def plot_next_test(test: NextTest, *, most: int = 12, ax: Axes | None = None) ->
     figure, ax = axes_for(ax, 7.6, 1.2 + 0.27 * len(some))
     rows = np.arange(len(some))
     sizes = [one.chi2 if test.rivals else one.shrinkage for one in some]
-    ax.barh(rows, sizes, height=0.62, color=[AFTER, *(BEFORE,) * (len(some) - 1)])
+    ax.barh(rows, sizes, height=0.62, color=[AFTER, *(NEUTRAL,) * (len(some) - 1)])
     ax.set_yticks(rows, [one.experiment.words for one in some])
     ax.invert_yaxis()
     ax.grid(False, axis="y")
