@@ -280,7 +280,7 @@ def search_effects(
     best = doubtful.without if doubtful.is_better else final
     if again:
         new = again[-1].after.estimate
-        inflation = max(1.0, min(new.chi2 / new.dof, best.chi2 / best.dof))
+        inflation = min(new.inflation, best.inflation)
         if bic(new, inflation) <= bic(best, inflation):
             return again, last
     if best is final:

@@ -30,7 +30,7 @@ def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[s
     Returns:
         `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name.
     """
-    inflation = float(np.sqrt(max(1.0, fitted.chi2 / fitted.dof)))
+    inflation = float(np.sqrt(fitted.inflation))
     return {
         score.element.name: (
             abs(score.strength) + WIDTH_95 * inflation * score.error,

@@ -117,7 +117,7 @@ def _refit_from_balance(case: Case) -> list[Refit]:
     found = refit_from(fit.estimate, start.model, search, far=True)
     score = next(one for one in test.scores if one.element.name == start.element.name)
     # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
-    drop = max(0.0, fit.estimate.chi2 - found.chi2) / max(1.0, found.chi2 / found.dof)
+    drop = max(0.0, fit.estimate.chi2 - found.chi2) / found.inflation
     extra = max(1, len(found.places) - len(fit.estimate.places))
     p_value = float(min(1.0, len(absent) * stats.chi2.sf(drop, extra)))
     score = score._replace(element=start.element, p_value=p_value, admissible=True)

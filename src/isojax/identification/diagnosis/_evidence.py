@@ -37,7 +37,7 @@ def smallest_inflation(usable: list[Refit]) -> float:
     Returns:
         The smallest chi2/dof among them, at least 1.
     """
-    return max(1.0, min((refit.estimate.chi2 / refit.estimate.dof for refit in usable), default=1.0))
+    return min((refit.estimate.inflation for refit in usable), default=1.0)
 
 
 def rank_candidates(

@@ -76,7 +76,7 @@ def find_simpler_pair(fitted: Estimate, usable: list[Refit], search: Search) -> 
     rival = simpler[0]
 
     def gained(pair: Estimate) -> float:
-        inflation = max(1.0, pair.chi2 / pair.dof)
+        inflation = pair.inflation
         return bic(best, inflation) - bic(pair, inflation)
 
     name = usable[0].score.element.name
@@ -112,7 +112,7 @@ def find_superfluous(final: Estimate, names: tuple[str, ...], search: Search) ->
             continue
 
         def gained(other: Estimate) -> float:
-            inflation = max(1.0, min(final.chi2 / final.dof, other.chi2 / other.dof))
+            inflation = min(final.inflation, other.inflation)
             return bic(final, inflation) - bic(other, inflation)
 
         if gained(without) >= 0.0 or _best_addition(without, name, _Opponent(final, gained), search):

@@ -206,7 +206,7 @@ def with_own_shape(found: Estimate, name: str, search: Search) -> Estimate:
     search.progress(f"is the shape of {name} as it was taken?")
     places = tuple(sorted((*found.places, *held)))
     freed = estimate(found.simulator, found.model, places, search, found.point.nuisances)
-    inflation = max(1.0, freed.chi2 / freed.dof)
+    inflation = freed.inflation
     clear = bic(found, inflation) - bic(freed, inflation) > search.rules.close_bic
     return freed if freed.result == RESULTS.successful and clear else found
 

@@ -114,7 +114,7 @@ def score_test(
     chosen = np.array([probe.phased for probe in probes], dtype=bool)
     lengths = [record.output.size for record in fitted.problem.records]
     mean, deviation = chosen_phase_law(lengths)
-    inflation = np.sqrt(max(1.0, fitted.chi2 / fitted.dof))
+    inflation = np.sqrt(fitted.inflation)
     z = np.where(chosen & seen, (z - mean * inflation) / deviation, z)
 
     # Within a family a shape of admissible sign goes before any other: the others are evidence against those

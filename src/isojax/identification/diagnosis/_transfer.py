@@ -27,7 +27,7 @@ def _split(fitted: Estimate, extended: Estimate, rules: Rules) -> tuple[Problem,
     if inner := levels[1:-1]:
         out = {place for place, record in enumerate(problem.records) if record.level == inner[-1]}
         gains = _misfit_by_record(fitted) - _misfit_by_record(extended)
-        gain = gains[list(out)].sum() / max(1.0, extended.chi2 / extended.dof)
+        gain = gains[list(out)].sum() / extended.inflation
         extra = max(1, len(extended.places) - len(fitted.places))
         separated = len(problem.segments) > len(problem.records)
         if separated and not stats.chi2.sf(gain, extra) < rules.significance:
@@ -117,6 +117,6 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
     # Without the effect its coefficients, bent to make up for it, may let the motion diverge elsewhere.
     if not np.isfinite(without.excess):
         return 1.0
-    inflation = max(1.0, extended.chi2 / extended.dof)
+    inflation = extended.inflation
     gained = (without.excess - with_effect.excess) / inflation + without.volume - with_effect.volume
     return float(1.0 - with_effect.excess / max(without.excess, 1.0)) if gained > 0.0 else 0.0

@@ -100,7 +100,7 @@ def find_separating_experiment(
     # One noise for every sensor: as large beside the reading as the campaign's own.
     share = float(np.std(first.displacement) / np.std([record.output for record in first.records]))
     old, count = full_matrix(columns, old_point(columns)), len(columns.fitted.names)
-    inflation = max(1.0, after.chi2 / after.dof)
+    inflation = after.inflation
     prospects = []
     for experiment in candidate_experiments(campaign, outline, load):
         made = carry_out(columns, experiment, rest)

@@ -200,7 +200,7 @@ def _ask(
     scales = campaign_scales(fit.campaign)
     columns = trial_columns(fit.estimate, probes, tuple(probe.typical_strength(scales) for probe in probes))
     old = old_point(columns) if probes else None
-    return _Asked(fit, columns, gradient, errors, old, effect, max(1.0, fit.estimate.chi2 / fit.estimate.dof))
+    return _Asked(fit, columns, gradient, errors, old, effect, fit.estimate.inflation)
 
 
 def _errors_of(

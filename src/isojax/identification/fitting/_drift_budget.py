@@ -102,7 +102,7 @@ def drift_budget(fit: Fit | Fitted) -> DriftBudget:
     spread = found.point.nuisances.spread
     owner = np.array([segment.record for segment in found.problem.segments])
     noise, if_ignored = noise_and_scatter_errors(found.point.reduced, owner, spread)
-    inflation = np.sqrt(max(1.0, found.chi2 / found.dof))
+    inflation = np.sqrt(found.inflation)
     listed = list_parameters(fit.model)
     errors = fit.standard_errors
     shares = []

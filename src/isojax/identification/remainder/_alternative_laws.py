@@ -140,7 +140,7 @@ def _alternatives(
     force = done.copy()
     force[-1] = 0.0
     trace = (left @ force)[columns] / np.sqrt(max(force @ left @ force, 1e-300))
-    inflation = max(1.0, fitted.chi2 / fitted.dof)
+    inflation = fitted.inflation
     delta_chi2 = (done @ left @ done - gain - with_findings) / inflation
     margin = least_difference(fitted, search.rules)
     alternatives = []
