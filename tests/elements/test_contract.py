@@ -15,7 +15,7 @@ from isojax import paper
 from isojax._parameters import list_parameters, own_parameters, replace_parameters, to_free, to_physical
 from isojax._results import is_successful
 from isojax.elements import CATALOGUE, AbstractElement, Scales
-from isojax.elements._base import Group
+from isojax.elements._element import Group
 from isojax.elements._follower import AbstractFollower
 from isojax.elements._force import AbstractForce
 from isojax.elements._instrument import AbstractInstrument

@@ -42,7 +42,7 @@ from isojax.identification.jacobian._segments import Segment
 from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT, Unknowns
 from isojax.models import Integrator, Isolator, simulate
 from isojax.records import Record
-from isojax.rig._balance import Balance
+from isojax.rig._motion_equation import EquationOfMotion
 from isojax.rig._solver import Integrator as RigIntegrator
 
 RATE = 500.0
@@ -130,7 +130,7 @@ def _exact(model: Isolator, drive: np.ndarray, start: list[float]) -> np.ndarray
     laws = (rig.LinearStiffness, rig.CubicStiffness, rig.LinearDamping, rig.CoulombFriction)
     strengths = [getattr(element, element.strength) for element in model.elements]
     plant = rig.Plant(tuple(law(float(f)) for law, f in zip(laws, strengths, strict=True)), float(model.mass))
-    balance = Balance(plant)
+    balance = EquationOfMotion(plant)
     path = RigIntegrator(balance, 1e-11).run(pieces, [float(s) for s in start])
     states, sides, held = path.at(times)
     found = np.asarray(balance.acceleration(times, states, drive, sides, held))

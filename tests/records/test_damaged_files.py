@@ -171,7 +171,7 @@ def test_samples_count_as_the_float64_that_they_become(
     small = {f"a{i}": np.arange(20000, dtype=np.uint8) for i in range(4)}  # 80 kB, 640 kB as float64
     scipy.io.savemat(file, {"run": small}, do_compression=True)
     assert len(read(file)) == 4
-    monkeypatch.setattr("isojax.records.formats._bounds.MOST_BYTES", 500_000)
+    monkeypatch.setattr("isojax.records.formats._limits.MOST_BYTES", 500_000)
     with pytest.raises(ValueError, match=r"run\.mat holds 0\.00064 GB of samples, unpacked; expected"):
         read(file)
 

@@ -9,7 +9,7 @@ import scipy.signal
 
 from isojax import read_campaign, rig
 from isojax.records import estimate_noise
-from isojax.records.reading._floor import floor_acceleration
+from isojax.records.reading._floor_channel import floor_acceleration
 
 RATE, SIZE = 200.0, 2000
 TONES = ((0.03, 2.3, 0.4), (0.02, 11.0, 1.9), (0.004, 24.0, 3.0))

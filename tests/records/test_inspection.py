@@ -12,7 +12,7 @@ from isojax.demo import campaign_folder
 from isojax.records import draft_campaign, find_data_files, find_period, inspect_file
 from isojax.records.inspection._arrangement import arrange
 from isojax.records.inspection._guess import guess_quantity
-from isojax.records.inspection._inertia import guess_mass
+from isojax.records.inspection._inertia_of_records import guess_mass
 from isojax.records.noise import clipped_share
 from isojax.rig import Bench, LinearDamping, LinearStiffness, Multisine, Plant, SteppedSine, write_campaign
 

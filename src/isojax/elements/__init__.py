@@ -2,7 +2,7 @@
 
 In: coefficients in SI units. Out: forces, rates of internal states, and changes of drive, mass or reading.
 Read `_effect.py` (what every effect declares) and the three contracts `_force.py`, `_instrument.py` and
-`_follower.py`, which `_base.py` joins in `AbstractElement`. Then read an example: `_cubic_stiffness.py` is
+`_follower.py`, which `_element.py` joins in `AbstractElement`. Then read an example: `_cubic_stiffness.py` is
 the shortest, `_maxwell_branch.py` has an internal state, `_sensor_gain.py` is an instrument.
 """
 
@@ -12,12 +12,6 @@ from ._abs_quadratic_stiffness import AbsQuadraticStiffness as AbsQuadraticStiff
 from ._ac_coupling import AcCoupling as AcCoupling
 from ._added_mass import AddedMass as AddedMass
 from ._asymmetric_friction import AsymmetricFriction as AsymmetricFriction
-from ._base import AbstractElement as AbstractElement
-from ._base import Channels as Channels
-from ._base import Dependence as Dependence
-from ._base import Group as Group
-from ._base import LookAlike as LookAlike
-from ._base import Scales as Scales
 from ._bouc_wen import BoucWen as BoucWen
 from ._clipping import Clipping as Clipping
 from ._clock_skew import ClockSkew as ClockSkew
@@ -28,6 +22,12 @@ from ._dahl_friction import DahlFriction as DahlFriction
 from ._damping_drift import DampingDrift as DampingDrift
 from ._drive_harmonics import DriveHarmonics as DriveHarmonics
 from ._dual_chamber import DualChamber as DualChamber
+from ._element import AbstractElement as AbstractElement
+from ._element import Channels as Channels
+from ._element import Dependence as Dependence
+from ._element import Group as Group
+from ._element import LookAlike as LookAlike
+from ._element import Scales as Scales
 from ._end_stop import EndStop as EndStop
 from ._floor_motion import FloorMotion as FloorMotion
 from ._fractional_damping import FractionalDamping as FractionalDamping

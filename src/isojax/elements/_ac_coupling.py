@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Group, LookAlike, Scales
+from ._element import AbstractElement, Group, LookAlike, Scales
 
 
 class AcCoupling(AbstractElement):

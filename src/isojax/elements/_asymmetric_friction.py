@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
 from . import _coulomb_friction
-from ._base import AbstractElement, Group, LookAlike, Scales
+from ._element import AbstractElement, Group, LookAlike, Scales
 
 
 class AsymmetricFriction(AbstractElement):

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Group, Scales
+from ._element import AbstractElement, Group, Scales
 
 
 class BoucWen(AbstractElement):

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Group, LookAlike, Scales
+from ._element import AbstractElement, Group, LookAlike, Scales
 
 
 class ClockSkew(AbstractElement):

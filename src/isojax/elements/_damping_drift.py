@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Group, Scales
+from ._element import AbstractElement, Channels, Group, Scales
 
 
 class DampingDrift(AbstractElement):

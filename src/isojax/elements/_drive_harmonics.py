@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Group, Scales
+from ._element import AbstractElement, Channels, Group, Scales
 
 _PARTS = tuple(f"drive_{part}_{order}" for order in (2, 3) for part in ("cosine", "sine"))
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Group, Scales
+from ._element import AbstractElement, Channels, Group, Scales
 
 _ORDERS = ("hold_zero_order", "hold_linear", "hold_band_limited")
 

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from .._parameters import parameter
 from .._types import Internal, Lanes, Scalar
-from ._base import AbstractElement, Group, Scales
+from ._element import AbstractElement, Group, Scales
 
 
 class LinearStiffness(AbstractElement):

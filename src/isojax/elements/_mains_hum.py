@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractElement, Channels, Group, Scales
+from ._element import AbstractElement, Channels, Group, Scales
 
 
 class MainsHum(AbstractElement):

@@ -5,7 +5,7 @@ from typing import ClassVar
 from .._parameters import parameter
 from .._types import Scalar
 from . import _cubic_stiffness
-from ._base import AbstractElement, Dependence, Group, Scales
+from ._element import AbstractElement, Dependence, Group, Scales
 
 
 class PressureCubicStiffness(AbstractElement):

@@ -5,7 +5,7 @@ from typing import ClassVar
 from .._parameters import parameter
 from .._types import Scalar
 from . import _linear_damping
-from ._base import AbstractElement, Dependence, Group, LookAlike, Scales
+from ._element import AbstractElement, Dependence, Group, LookAlike, Scales
 
 
 class TemperatureDamping(AbstractElement):

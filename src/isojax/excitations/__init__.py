@@ -2,10 +2,10 @@
 
 In: amplitudes, frequencies and times, or the samples of a drive. Out: a function of time, with its
 derivative.
-Read `_base.py` first, then `_harmonic.py` as the shortest example and `_sampled.py` for measured drives.
+Read `_excitation.py` first, then `_harmonic.py` as the shortest example; `_sampled.py` holds measured drives.
 """
 
-from ._base import AbstractExcitation as AbstractExcitation
+from ._excitation import AbstractExcitation as AbstractExcitation
 from ._harmonic import Harmonic as Harmonic
 from ._multisine import Multisine as Multisine
 from ._multisine import random_phase_multisine as random_phase_multisine

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._base import AbstractExcitation
+from ._excitation import AbstractExcitation
 
 
 class Harmonic(AbstractExcitation):

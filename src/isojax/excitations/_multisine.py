@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import Lanes, Scalar, as_float64
-from ._base import AbstractExcitation
+from ._excitation import AbstractExcitation
 
 
 class Multisine(AbstractExcitation):

@@ -10,7 +10,7 @@ from scipy.fft import next_fast_len
 from scipy.interpolate import CubicHermiteSpline
 
 from .._types import Lanes
-from ._base import AbstractExcitation
+from ._excitation import AbstractExcitation
 
 Hold = Literal["band_limited", "linear", "zero_order"]
 """As in `isojax.records`, which stands beside this room: neither imports the other."""

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._types import Lanes, Scalar, as_float64
-from ._base import AbstractExcitation
+from ._excitation import AbstractExcitation
 
 
 class SteppedSine(AbstractExcitation):

@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from .._types import Lanes, Scalar, as_float64
-from ._base import AbstractExcitation
+from ._excitation import AbstractExcitation
 
 
 class SweptSine(AbstractExcitation):

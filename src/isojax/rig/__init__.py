@@ -21,8 +21,6 @@ from ._bench import run as run
 from ._broadband_plans import FreeDecay as FreeDecay
 from ._broadband_plans import Impulse as Impulse
 from ._broadband_plans import Multisine as Multisine
-from ._campaign import truth as truth
-from ._campaign import write_campaign as write_campaign
 from ._dampers import AbsQuadraticDamping as AbsQuadraticDamping
 from ._dampers import CubicDamping as CubicDamping
 from ._dampers import LinearDamping as LinearDamping
@@ -30,11 +28,11 @@ from ._dampers import PositionDamping as PositionDamping
 from ._drift import StiffnessDrift as StiffnessDrift
 from ._drive import DriveHarmonics as DriveHarmonics
 from ._drive import InputHold as InputHold
-from ._excitation import Chirp as Chirp
-from ._excitation import Line as Line
-from ._excitation import Piece as Piece
-from ._excitation import Tones as Tones
-from ._floor import FloorMotion as FloorMotion
+from ._floor_motion import FloorMotion as FloorMotion
+from ._force_pieces import Chirp as Chirp
+from ._force_pieces import ForcePiece as ForcePiece
+from ._force_pieces import Line as Line
+from ._force_pieces import Tones as Tones
 from ._friction import AsymmetricFriction as AsymmetricFriction
 from ._friction import CoulombFriction as CoulombFriction
 from ._friction import StribeckFriction as StribeckFriction
@@ -44,8 +42,8 @@ from ._gas import PolytropicGas as PolytropicGas
 from ._hum import MainsHum as MainsHum
 from ._hysteresis import BoucWen as BoucWen
 from ._hysteresis import DahlFriction as DahlFriction
-from ._inertia import AddedMass as AddedMass
-from ._inertia import SecondMode as SecondMode
+from ._inertial_effects import AddedMass as AddedMass
+from ._inertial_effects import SecondMode as SecondMode
 from ._instruments import AcCoupling as AcCoupling
 from ._instruments import Clipping as Clipping
 from ._instruments import ClockSkew as ClockSkew
@@ -82,3 +80,5 @@ from ._springs import LinearStiffness as LinearStiffness
 from ._springs import QuadraticStiffness as QuadraticStiffness
 from ._springs import QuinticStiffness as QuinticStiffness
 from ._two_chambers import DualChamber as DualChamber
+from ._write_campaign import truth as truth
+from ._write_campaign import write_campaign as write_campaign

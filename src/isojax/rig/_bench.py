@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from ._balance import Balance
-from ._excitation import Piece, forces_of
+from ._force_pieces import ForcePiece, forces_of
 from ._law import Stretch
+from ._motion_equation import EquationOfMotion
 from ._plan import Direction, Plan, Role, Trial
 from ._plant import Plant
 from ._sampling import anti_alias_taps, decimated, oversampling
 from ._shaker import EXAMPLE_SHAKER, Shaker
-from ._solver import Integrator
+from ._solver import PlantIntegrator
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
 
@@ -32,7 +32,7 @@ class Bench:
         shaker: what drives the plant.
         anti_alias: filter both channels before sampling; otherwise the record holds the exact values at each
             instant.
-        tolerance: local error of the integration, see `Integrator`.
+        tolerance: local error of the integration, see `PlantIntegrator`.
     """
 
     rate: float = 1000.0
@@ -90,7 +90,7 @@ class SimulatedRecord:
 
 def response(
     plant: Plant,
-    pieces: Sequence[Piece],
+    pieces: Sequence[ForcePiece],
     times: Float[np.ndarray, " time"],
     displacement: float = 0.0,
     tolerance: float = 3e-10,
@@ -108,8 +108,8 @@ def response(
         "displacement", "velocity", "acceleration" and "force", (time,) each, SI; where the floor moves the
         first two are relative to it.
     """
-    balance = Balance(plant)
-    path = Integrator(balance, tolerance).run(pieces, [displacement] + [0.0] * (balance.order - 1))
+    balance = EquationOfMotion(plant)
+    path = PlantIntegrator(balance, tolerance).run(pieces, [displacement] + [0.0] * (balance.order - 1))
     states, sides, stuck = path.at(times)
     force = forces_of(pieces, times)
     acceleration = np.asarray(balance.acceleration(times, states, force, sides, stuck))

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ._excitation import Tones
+from ._force_pieces import Tones
 from ._plan import Plan, Trial, roles
 from ._shaker import Shaker
 

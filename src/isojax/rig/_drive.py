@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ._excitation import Line, Piece
+from ._force_pieces import ForcePiece, Line
 from ._instruments import Instrument
 
 
@@ -27,8 +27,8 @@ class DriveHarmonics(Instrument):
     phase: float = 0.0
     order: float = 3.0
 
-    def acting(self, pieces: Sequence[Piece], rate: float) -> Sequence[Piece]:
-        """The pieces with one more harmonic each; see `Piece.with_harmonic`."""
+    def acting(self, pieces: Sequence[ForcePiece], rate: float) -> Sequence[ForcePiece]:
+        """The pieces with one more harmonic each; see `ForcePiece.with_harmonic`."""
         return [piece.with_harmonic(round(self.order), self.share, self.phase) for piece in pieces]
 
 
@@ -43,9 +43,9 @@ class InputHold(Instrument):
     name: ClassVar[str] = "input_hold"
     order: float = 0.0
 
-    def acting(self, pieces: Sequence[Piece], rate: float) -> Sequence[Piece]:
+    def acting(self, pieces: Sequence[ForcePiece], rate: float) -> Sequence[ForcePiece]:
         """One line a sample; samples fall on multiples of 1 / rate."""
-        held: list[Piece] = []
+        held: list[ForcePiece] = []
         place, last = 0, pieces[-1]
         first = math.floor(pieces[0].start * rate)
         values: list[float] = []

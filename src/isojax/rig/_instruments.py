@@ -14,7 +14,7 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from ._excitation import Piece
+from ._force_pieces import ForcePiece
 from ._law import Stretch
 
 
@@ -33,7 +33,7 @@ class Instrument(ABC):
         """The instrument in one record of a test; `draw` gives the record's random numbers."""
         return self
 
-    def acting(self, pieces: Sequence[Piece], rate: float) -> Sequence[Piece]:
+    def acting(self, pieces: Sequence[ForcePiece], rate: float) -> Sequence[ForcePiece]:
         """The force that acts where these pieces are recorded, `rate` samples a second; see `lag`."""
         return pieces
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from ._excitation import Piece
+from ._force_pieces import ForcePiece
 from ._shaker import Shaker
 
 Direction = Literal["forward", "backward", "none"]
@@ -32,7 +32,7 @@ class Trial:
     """
 
     name: str
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ForcePiece, ...]
     seconds: float
     level: float
     direction: Direction

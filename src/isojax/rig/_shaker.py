@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from ._excitation import Chirp, Tones
+from ._force_pieces import Chirp, Tones
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from ._balance import Balance
-from ._excitation import Piece
+from ._force_pieces import ForcePiece
 from ._law import velocity
+from ._motion_equation import EquationOfMotion
 from ._path import Path, powers
 
 _STAGES = 12
@@ -48,7 +48,7 @@ class _Event(NamedTuple):
     """Largest size of the margin over the step."""
 
 
-class Integrator:
+class PlantIntegrator:
     """Integrates one plant under a chain of pieces and keeps its path.
 
     Args:
@@ -56,7 +56,7 @@ class Integrator:
         tolerance: local error of a step over the largest value that the state has had so far.
     """
 
-    def __init__(self, balance: Balance, tolerance: float = 3e-10) -> None:
+    def __init__(self, balance: EquationOfMotion, tolerance: float = 3e-10) -> None:
         self._balance = balance
         self._tolerance = tolerance
         self._slopes = np.empty((_STAGES + 4, balance.order))
@@ -68,7 +68,7 @@ class Integrator:
         self._turning = [own for switch, _, own in balance.watches if switch is velocity]
 
     @no_type_check
-    def run(self, pieces: Sequence[Piece], start: Sequence[float]) -> Path:
+    def run(self, pieces: Sequence[ForcePiece], start: Sequence[float]) -> Path:
         """Path from the state `start` at the first piece's start to the last one's stop.
 
         Args:

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from ._bench import Bench
-from ._campaign import write_campaign
 from ._dampers import LinearDamping
 from ._friction import CoulombFriction
 from ._plant import Plant
 from ._sine_plans import SteppedSine
 from ._springs import CubicStiffness, LinearStiffness
+from ._write_campaign import write_campaign
 
 SEED = 20240611
 """Seed of the campaign in the package."""

@@ -2,7 +2,7 @@
 
 In: a file and the names of columns, or None for all. Out: a `Column` per name, float64 samples in the file's
 own unit, with the unit, rate and start time that the file states.
-Read `_samples.py` first, and `_bounds.py`: what a file may hold at most. Tables: `_units.py`, `_heading.py`,
+Read `_samples.py` first, and `_limits.py`: what a file may hold at most. Tables: `_units.py`, `_heading.py`,
 `_layout.py`, `_clock.py`, then `_text.py`, `_sheet.py`, `_parquet.py`, `_lvm.py`. Trees of arrays:
 `_leaves.py`, then `_npz.py`, `_hdf5.py`, `_mat.py`. Both: `_in_memory.py`. Lists of channels:
 `_tdms.py`, `_universal_file.py`.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ._bounds import check_count, check_levels
 from ._leaves import Leaf, leaf_columns
+from ._limits import check_count, check_levels
 from ._matlab_object import matlab_object
 from ._samples import Column
 from ._unreadable import unreadable

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from .._wording import listing
-from ._bounds import check_size
 from ._heading import split_heading
+from ._limits import check_size
 from ._samples import Column, as_samples, find_channel, missing_column, unit_of_time
 
 _INDEX = re.compile(r"(.*?)\[([\d\s]*:?[\d\s]*(?:,\s*(?:\d+|:)\s*)+)\]")

@@ -4,7 +4,7 @@ import struct
 import zlib
 from pathlib import Path
 
-from ._bounds import check_count, check_levels, check_size
+from ._limits import check_count, check_levels, check_size
 
 _MATRIX, _COMPRESSED = 14, 15
 _HEADER = 128

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ._bounds import check_size
 from ._heading import split_heading
 from ._layout import pick_columns
+from ._limits import check_size
 from ._samples import Column, as_samples, missing_extra, unit_of_time
 from ._unreadable import unreadable
 

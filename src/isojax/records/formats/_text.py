@@ -15,9 +15,9 @@ import pandas as pd
 from jaxtyping import Float
 
 from .._wording import row
-from ._bounds import check_size
 from ._clock import read_clock, seconds_since_first
 from ._layout import Layout, find_layout, numeric_cells, pick_columns
+from ._limits import check_size
 from ._samples import Column, as_samples
 
 _LOOKED_AT = 500

@@ -3,7 +3,7 @@
 In: data files. Out: a `FileInspection` of each: its channels with range, rms, clipping, drift and noise
 floor, its rate, and the kind of its excitation; from several of them the text of a campaign.toml.
 Read `_channel.py` first, then `_guess.py` (what names and units say), `_period.py`, `_inspect_file.py`; then
-`_data_files.py`, `_inertia.py`, `_arrangement.py` (levels, roles) and `_draft.py`.
+`_data_files.py`, `_inertia_of_records.py`, `_arrangement.py` (levels, roles) and `_draft.py`.
 """
 
 from ._channel import ChannelInspection as ChannelInspection

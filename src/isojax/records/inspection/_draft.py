@@ -10,7 +10,7 @@ from ..formats import channel_unit, split_heading
 from ._arrangement import Place, arrange
 from ._channel import ChannelInspection
 from ._guess import is_base, is_exciter, is_nameless
-from ._inertia import guess_mass
+from ._inertia_of_records import guess_mass
 from ._inspect_file import FileInspection
 
 _SI = {"force": "N", "acceleration": "m/s^2", "velocity": "m/s", "displacement": "m", "command": "V"}

@@ -2,7 +2,7 @@
 
 In: the path of a campaign.toml. Out: its checked `Declaration`, and from that the `Campaign` with its
 records. Read `_declaration.py` first, then `_read_measurements.py`. It uses `_record_channels.py` (with
-`_data_file.py`, `_channel_factor.py`, `_channel_units.py`, `_time_base.py`, `_floor.py`), then
+`_data_file.py`, `_channel_factor.py`, `_channel_units.py`, `_time_base.py`, `_floor_channel.py`), then
 `_reader_filter.py`, then `_schedule.py`, `_find_dwells.py` and `_excitation_kind.py`.
 """
 

@@ -13,7 +13,7 @@ from .._wording import row
 from ._channel_factor import channel_factor
 from ._data_file import read_columns
 from ._declaration import Declaration
-from ._floor import floor_acceleration
+from ._floor_channel import floor_acceleration
 from ._time_base import find_rate, time_jitter
 
 FEWEST_SAMPLES = 16

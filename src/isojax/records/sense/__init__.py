@@ -1,8 +1,8 @@
 """Whether the records can be what is declared, before anything is fitted.
 
 In: a `Campaign`. Out: what speaks against its declaration, with the likely mistake and the line to change.
-Read `_suspicion.py` and `_find_suspicions.py` first, then `_lines.py` and `_balance.py` (the balance of
-forces, without a model), `_readings.py` and `_sizes.py` (mistakes undone), `_clipping.py`,
+Read `_suspicion.py` and `_find_suspicions.py` first, then `_lines.py` and `_newton_balance.py` (the balance
+of forces, without a model), `_readings.py` and `_sizes.py` (mistakes undone), `_clipped_levels.py`,
 `_stray_samples.py`.
 """
 

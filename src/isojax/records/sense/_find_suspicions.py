@@ -7,8 +7,8 @@ import numpy as np
 
 from .._campaign import Campaign
 from .._record import Record
-from ._balance import Balance, Rows, find_balance
-from ._clipping import find_clipping
+from ._clipped_levels import find_clipping
+from ._newton_balance import Balance, Rows, find_balance
 from ._readings import declared_reading, late_readings, other_readings, rows_read, sign_cause
 from ._sizes import rate_cause, scale_causes, sizes_of
 from ._stray_samples import find_stray_samples

@@ -8,8 +8,8 @@ import scipy
 
 from .._campaign import TIME_DERIVATIVES, Campaign, InputQuantity, OutputQuantity
 from .._record import Record
-from ._balance import Rows, find_lag, rows_of
 from ._lines import lines_of
+from ._newton_balance import Rows, find_lag, rows_of
 from ._suspicion import Cause
 from ._unit_factor import unit_factor
 

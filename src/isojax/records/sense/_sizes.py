@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._campaign import TIME_DERIVATIVES, Campaign
-from ._balance import Rows
+from ._newton_balance import Rows
 from ._suspicion import Cause
 from ._unit_factor import unit_factor
 

@@ -8,7 +8,7 @@ from ._law import Switch, displacement, velocity
 from ._plant import Plant
 
 
-class Balance:
+class EquationOfMotion:
     """Force balance of one plant.
 
     The state is (x, v, internal states of the first law that has any, of the second, ...). The sides are one

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 
-class Piece(ABC):
+class ForcePiece(ABC):
     """An interval of time over which the force is smooth."""
 
     start: float
@@ -34,14 +34,14 @@ class Piece(ABC):
         """Force at each instant, N."""
 
     @abstractmethod
-    def lasting_until(self, stop: float) -> "Piece":
+    def lasting_until(self, stop: float) -> "ForcePiece":
         """The piece with another end."""
 
     @abstractmethod
-    def delayed(self, delay: float) -> "Piece":
+    def delayed(self, delay: float) -> "ForcePiece":
         """The piece, acting later by `delay` seconds."""
 
-    def with_harmonic(self, order: int, share: float, phase: float) -> "Piece":
+    def with_harmonic(self, order: int, share: float, phase: float) -> "ForcePiece":
         """The piece A cos(theta), and whatever it holds beside that, plus share A cos(order theta + phase).
 
         Raises:
@@ -51,7 +51,7 @@ class Piece(ABC):
 
 
 @dataclass(frozen=True)
-class Tones(Piece):
+class Tones(ForcePiece):
     """Sum of a_i sin(w_i (t - origin) + p_i); no tones, no force.
 
     Args:
@@ -96,11 +96,11 @@ class Tones(Piece):
             total += a * np.sin(w * (times - self.origin) + p)
         return total
 
-    def lasting_until(self, stop: float) -> "Piece":
+    def lasting_until(self, stop: float) -> "ForcePiece":
         """The piece with another end."""
         return replace(self, stop=stop)
 
-    def delayed(self, delay: float) -> "Piece":
+    def delayed(self, delay: float) -> "ForcePiece":
         """The piece, acting later by `delay` seconds."""
         return replace(self, start=self.start + delay, stop=self.stop + delay, origin=self.origin + delay)
 
@@ -128,7 +128,7 @@ class Tones(Piece):
 
 
 @dataclass(frozen=True)
-class Line(Piece):
+class Line(ForcePiece):
     """Force value + slope (t - origin).
 
     Args:
@@ -169,7 +169,7 @@ class Line(Piece):
 
 
 @dataclass(frozen=True)
-class Chirp(Piece):
+class Chirp(ForcePiece):
     """Linear sweep A sin(2 pi (f0 s + r s^2 / 2)) with s = t - origin, and its harmonics.
 
     Args:
@@ -221,11 +221,11 @@ class Chirp(Piece):
             shape = shape + ratio * np.sin(order * phase + shift)
         return self.amplitude * (1 - depth * np.exp(-away * away)) * shape
 
-    def lasting_until(self, stop: float) -> "Piece":
+    def lasting_until(self, stop: float) -> "ForcePiece":
         """The piece with another end."""
         return replace(self, stop=stop)
 
-    def delayed(self, delay: float) -> "Piece":
+    def delayed(self, delay: float) -> "ForcePiece":
         """The piece, acting later by `delay` seconds."""
         return replace(self, start=self.start + delay, stop=self.stop + delay, origin=self.origin + delay)
 
@@ -235,7 +235,7 @@ class Chirp(Piece):
         return replace(self, harmonics=(*self.harmonics, (order, share, shift)))
 
 
-def forces_of(pieces: Sequence[Piece], times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
+def forces_of(pieces: Sequence[ForcePiece], times: Float[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
     """Force at each instant (increasing), N; zero outside the pieces."""
     forces = np.zeros_like(times)
     for piece in pieces:
