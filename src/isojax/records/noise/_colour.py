@@ -98,12 +98,16 @@ def noise_colour(pieces: list[Piece], rate: float) -> Colour | None:
     lags = np.arange(most + 1)
     seen = np.sum([_products(piece.rest.signal, most) / piece.kept for piece in pieces], axis=0)
     size = np.sum([piece.rest.signal.size - lags for piece in pieces], axis=0)
+    taken: dict[int, Float[np.ndarray, " line"]] = {}
+    for piece in pieces:
+        length = piece.rest.signal.size
+        taken[length] = taken.get(length, 0.0) + piece.rest.removed
     longest = max(piece.rest.signal.size for piece in pieces)
     steps = max(_FREQUENCIES, longest)
     density, laws, errors = np.full(steps + 1, seen[0] / freedom), [np.zeros(0)], np.zeros(1)
     for _ in range(_MOST_ROUNDS):
         correlation = np.fft.irfft(density)[:longest]
-        back = np.sum([_taken_products(piece.rest, correlation, most) for piece in pieces], axis=0)
+        back = np.sum([_taken_products(*each, correlation, most) for each in taken.items()], axis=0)
         laws, errors = _levinson((seen + back) / size)
         known, density = density, _density(laws[-1], errors[-1], steps)
         if np.all(np.abs(density - known) <= _AGREED * known):
@@ -131,19 +135,18 @@ def _density(law: Float[np.ndarray, " order"], innovation: float, steps: int) ->
 
 
 def _taken_products(
-    rest: Rest, correlation: Float[np.ndarray, " time"], most: int
+    length: int, removed: Float[np.ndarray, " line"], correlation: Float[np.ndarray, " time"], most: int
 ) -> Float[np.ndarray, " lag"]:
-    """Gives the products that a window's harmonics took from noise of known autocorrelation.
+    """Gives the products that harmonics took, in windows of one length, from noise of known autocorrelation.
 
     A window does not distinguish lines closer than its own, so that it counts with their mean, which also
     keeps what is put back from growing from one round to the next.
     """
-    if not np.any(rest.removed):
+    if not np.any(removed):
         return np.zeros(most + 1)
-    length = rest.signal.size
     part = correlation[:length] * (1.0 - np.arange(length) / length)
     line = 2.0 * np.fft.rfft(part).real - part[0]
-    return np.fft.irfft(line * rest.removed, length)[: most + 1] * length
+    return np.fft.irfft(line * removed, length)[: most + 1] * length
 
 
 def _weighed(law: Float[np.ndarray, " order"], innovation: float, square: float, freedom: float) -> Colour:

@@ -116,6 +116,13 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     Returns:
         The estimate.
     """
+    if not campaign.records:
+        return _estimate(campaign)
+    seen = (campaign.output.noise, campaign.filter, campaign.records)
+    return campaign.records[0].once(("noise", seen), lambda: _estimate(campaign))
+
+
+def _estimate(campaign: Campaign) -> NoiseEstimate:
     band, note = NoiseBand(campaign.rate, campaign.filter), ""
     if campaign.filter is not None:
         note = (
