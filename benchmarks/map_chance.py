@@ -21,6 +21,9 @@ from coverage import records_of
 from isojax import compile_quickly, rig
 from isojax.models import coefficient_errors
 from isojax.stability.map._chance import find_chances, quasi_draws
+from isojax.stability.map._map import MapRun, solve_map
+from isojax.stability.map._sought import Sought
+from isojax.stability.map._surface import MapWindow
 
 CELLS = 200, 100
 
@@ -65,10 +68,11 @@ def main() -> None:
     forces, band = window(fit.model)
     errors = coefficient_errors(fit)
     plain = ij.stability_map(fit.model, forces, band, coexisting=True)
-    integrator = plain.integrator
 
-    def find(model: ij.Isolator, amplitudes: np.ndarray) -> ij.stability.StabilityMap:
-        return ij.stability_map(model, amplitudes, band, coexisting=True, integrator=integrator)
+    run = MapRun(True, plain.integrator, 32768, None, None, None)
+
+    def find(model: ij.Isolator, amplitudes: np.ndarray) -> tuple[ij.stability.StabilityMap, Sought]:
+        return solve_map(model, MapWindow(amplitudes, band, 3.0), run)
 
     ij.stability_map(fit.model, forces, band, coexisting=True, fit=fit)
     seconds = []
@@ -81,7 +85,7 @@ def main() -> None:
     begin = time.process_time()
     stable, coexisting = np.zeros(CELLS), np.zeros(CELLS)
     for place, step in enumerate(steps):
-        smap = find(errors.moved(jax.numpy.asarray(step)), forces)
+        smap, _ = find(errors.moved(jax.numpy.asarray(step)), forces)
         stable += ~np.any(np.asarray(smap.spectral_radius) >= 1.0, axis=0)
         coexisting += np.asarray(smap.count) > 1
         if place % 50 == 49:

@@ -2,8 +2,9 @@
 
 At a fold a cell gains or loses two orbits at once, so that no derivative of the cell says how probable that
 is. Over displacement and frequency the orbits do not fold: there the force that an orbit takes and its
-stability are smooth in the coefficients. Both are read off a map, and off one map either way along each
-independent step of the covariance. Draws of the coefficients then cost a product of matrices each.
+stability are smooth in the coefficients. Both are read off the surface of a map, and off that of one map
+either way along each independent step of the covariance; where orbits cannot be read off a surface, off those
+of the map. Draws of the coefficients then cost a product of matrices each.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,6 +18,8 @@ from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
 from ...models import CoefficientErrors, Isolator
+from ._sought import Sought
+from ._surface import Surface
 
 if TYPE_CHECKING:
     from ._map import StabilityMap
@@ -80,7 +83,7 @@ def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarr
 def find_chances(
     errors: CoefficientErrors,
     amplitudes: Float[np.ndarray, " amplitude"],
-    find: Callable[[Isolator, Float[np.ndarray, " wide"]], "StabilityMap"],
+    find: Callable[[Isolator, Float[np.ndarray, " wide"]], tuple["StabilityMap", Sought]],
     steps: Float[np.ndarray, "draw step"],
 ) -> Chances:
     """Give the chances of every cell.
@@ -88,7 +91,7 @@ def find_chances(
     Args:
         errors: of the coefficients.
         amplitudes: of the drive.
-        find: gives the map of a model with all coexisting orbits, at some amplitudes.
+        find: gives the map of a model with all coexisting orbits, at some amplitudes, and their surface.
         steps: draws of the coefficients, in standard deviations.
 
     Returns:
@@ -97,12 +100,13 @@ def find_chances(
     # A fold that a draw moves out of the window must still be seen.
     wide = np.concatenate([amplitudes[0] * _BELOW, amplitudes, amplitudes[-1] * _ABOVE])
     inner = slice(_BELOW.size, _BELOW.size + amplitudes.size)
-    maps = [find(errors.model, wide)]
+    found = [find(errors.model, wide)]
     for place in range(errors.steps):
         for sign in (1.0, -1.0):
             away = np.zeros(errors.steps)
             away[place] = sign * _REACH
-            maps.append(find(errors.moved(jnp.asarray(away)), wide))
+            found.append(find(errors.moved(jnp.asarray(away)), wide))
+    maps = [smap for smap, _ in found]
     along = steps / _REACH
     # The quadratic through three nodes of each step.
     sides = np.stack([0.5 * along * (along + 1.0), 0.5 * along * (along - 1.0)], axis=-1).reshape(
@@ -112,25 +116,66 @@ def find_chances(
     forces, still = np.log(amplitudes), np.log(np.asarray(maps[0].response))[:, inner]
     shape = (forces.size, maps[0].frequencies.size)
     stable, coexisting = np.ones(shape), np.zeros(shape)
-    curves = [_Curves(one) for one in maps]
+    read = np.all([sought.read_columns for _, sought in found], axis=0)
+    of_maps = [] if read.all() else [_MapOrbits(one) for one in maps]
     for column in range(shape[1]):
-        known = [curve for one in curves if (curve := one.at(column)) is not None]
-        if len(known) < len(curves):
+        if read[column]:
+            known = [_read_off(sought.surface, column) for _, sought in found]
+        else:
+            known = [curve for one in of_maps if (curve := one.at(column)) is not None]
+        if len(known) < len(maps):
             stable[:, column] = coexisting[:, column] = np.nan
             continue
-        ends = np.array([one.displacement[[0, -1]] for one in known])
-        low, high = ends[:, 0].max(), ends[:, 1].min()
+        low, high = max(one.low for one in known), min(one.high for one in known)
         grid = _in_doubt(known, np.linspace(low, high, _DISPLACEMENTS))
         if grid.size:
             table = _tables(known, grid)
             stable[:, column], coexisting[:, column] = _counted(weights, table, forces)
-        beyond = np.any((still[..., column] < low) | (still[..., column] > high), axis=0)
+        least, most = known[0].response(np.array([low, high]))
+        beyond = np.any((still[..., column] < least) | (still[..., column] > most), axis=0)
         stable[beyond, column] = coexisting[beyond, column] = np.nan
     return Chances(stable, coexisting, _standard_errors(maps, inner))
 
 
-class _Curves:
-    """The orbits of a map, frequency by frequency: displacement, force and distance from instability."""
+class _Column(NamedTuple):
+    """The orbits of a model at one frequency, over the logarithm of a displacement.
+
+    Attributes:
+        low: least displacement that is known.
+        high: largest one.
+        force: logarithm of the force that an orbit takes; where it falls the orbit is unstable.
+        margin: of each orbit, from any other loss of stability.
+        response: logarithm of half the peak-to-peak displacement.
+    """
+
+    low: float
+    high: float
+    force: Callable[[np.ndarray], np.ndarray]
+    margin: Callable[[np.ndarray], np.ndarray]
+    response: Callable[[np.ndarray], np.ndarray]
+
+
+def _read_off(surface: Surface, column: int) -> _Column:
+    """Give the orbits of one frequency that a surface holds."""
+
+    def force(grid: np.ndarray) -> np.ndarray:
+        drive = surface.at(column, grid)[:2]
+        return 0.5 * np.log(drive[0] ** 2 + drive[1] ** 2)
+
+    def margin(grid: np.ndarray) -> np.ndarray:
+        half_trace, determinant = surface.at(column, grid)[-3:-1]
+        # The roots of x^2 - trace x + determinant lie within the unit circle where these two are positive,
+        # and a third that vanishes at the folds.
+        return np.minimum(1.0 + 2.0 * half_trace + determinant, 1.0 - determinant)
+
+    def response(grid: np.ndarray) -> np.ndarray:
+        return grid + np.log(surface.at(column, grid)[-1])
+
+    return _Column(surface.breaks[0], surface.breaks[-1], force, margin, response)
+
+
+class _MapOrbits:
+    """The orbits of a map: displacement, force and distance from instability."""
 
     def __init__(self, smap: "StabilityMap"):
         """Read them off."""
@@ -145,8 +190,8 @@ class _Curves:
         self.stable = np.asarray(smap.spectral_radius) < 1.0
         self.force = np.broadcast_to(np.log(np.asarray(smap.amplitudes))[:, None], self.stable.shape)
 
-    def at(self, column: int) -> "_OrbitsOfColumn | None":
-        """Give the curve at one frequency; None where too few orbits are known."""
+    def at(self, column: int) -> _Column | None:
+        """Give the orbits of one frequency; None where too few are known."""
         x, y, fold, others, stable = (
             one[..., column].ravel()
             for one in (self.response, self.force, self.fold, self.others, self.stable)
@@ -170,25 +215,12 @@ class _Curves:
         # counts as it is.
         margin = np.minimum(ratio, others)
         margin = np.where(stable | (rise < 0.0), margin, -np.abs(margin))
-        return _OrbitsOfColumn(x, CubicHermiteSpline(x, y, rise), margin)
-
-
-class _OrbitsOfColumn(NamedTuple):
-    """The orbits of a map at one frequency.
-
-    Attributes:
-        displacement: of each, in logarithms, rising.
-        force: that takes it, over displacement, both in logarithms; where it falls the orbit is unstable.
-        margin: of each orbit, from any other loss of stability.
-    """
-
-    displacement: np.ndarray
-    force: CubicHermiteSpline
-    margin: np.ndarray
+        force = CubicHermiteSpline(x, y, rise)
+        return _Column(x[0], x[-1], force, lambda grid: np.interp(grid, x, margin), lambda grid: grid)
 
 
 def _in_doubt(
-    curves: list[_OrbitsOfColumn], grid: Float[np.ndarray, " displacement"]
+    curves: list[_Column], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, " doubtful"]:
     """Give log displacements that a draw may fold or destabilise; elsewhere all maps are far from it."""
     force, margin = _tables(curves, grid)
@@ -201,15 +233,10 @@ def _in_doubt(
 
 
 def _tables(
-    curves: list[_OrbitsOfColumn], grid: Float[np.ndarray, " displacement"]
+    curves: list[_Column], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, "2 map displacement"]:
     """Give log force and margin of all maps over common displacements."""
-    return np.array(
-        [
-            [one.force(grid) for one in curves],
-            [np.interp(grid, one.displacement, one.margin) for one in curves],
-        ]
-    )
+    return np.array([[one.force(grid) for one in curves], [one.margin(grid) for one in curves]])
 
 
 def _counted(

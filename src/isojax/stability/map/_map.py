@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import diffrax
 import equinox as eqx
@@ -30,7 +30,7 @@ from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
-from ._sought import seek
+from ._sought import Sought, seek
 from ._starts import Candidates
 from ._surface import MapWindow
 
@@ -219,27 +219,76 @@ def stability_map(
         raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
     if chunk < 1:
         raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
-    half = is_odd(model)
-    asked, integrator = integrator, Integrator() if integrator is None else integrator
     window = MapWindow(forces, band, reach)
-    sought = seek(model, integrator, half, window, integrator.map_error, coexisting, devices)
+    folder = None if checkpoint is None else Path(checkpoint)
+    run = MapRun(coexisting, integrator, chunk, folder, progress, devices)
+    smap, _ = solve_map(model, window, run)
+    if carried is None:
+        return smap
+    run = MapRun(True, smap.integrator, chunk, None, None, devices)
+
+    def find(moved: Isolator, wide: Float[np.ndarray, " wide"]) -> tuple[StabilityMap, Sought]:
+        if progress is not None:
+            progress("chances of the cells")
+        return solve_map(moved, window._replace(amplitudes=wide), run)
+
+    chances = find_chances(carried, forces, find, quasi_draws(carried))
+    orbits = smap.response.shape[0]
+    own = slice(orbits) if coexisting else 0
+    return eqx.tree_at(
+        lambda one: (one.probability_stable, one.probability_coexisting, one.standard_errors),
+        smap,
+        (
+            jnp.asarray(chances.stable),
+            jnp.asarray(chances.coexisting),
+            {name: jnp.asarray(error[own]) for name, error in chances.standard_errors.items()},
+        ),
+        is_leaf=lambda one: one is None,
+    )
+
+
+class MapRun(NamedTuple):
+    """How a map is made; see the arguments of `stability_map`."""
+
+    coexisting: bool
+    integrator: Integrator | None
+    chunk: int
+    folder: Path | None
+    progress: Callable[[str], None] | None
+    devices: Any
+
+
+def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[StabilityMap, Sought]:
+    """Make a map without chances.
+
+    Args:
+        model: the isolator.
+        window: its axes, and how far orbits are sought.
+        run: how it is made.
+
+    Returns:
+        The map, and the surface from which its orbits came.
+    """
+    half, (forces, band, _) = is_odd(model), window
+    integrator = Integrator() if run.integrator is None else run.integrator
+    sought = seek(model, integrator, half, window, integrator.map_error, run.coexisting, run.devices)
     goal = _READING_SHARE * integrator.map_error
-    if asked is None and sought.reading_error > goal:
+    if run.integrator is None and sought.reading_error > goal:
         integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
-        sought = seek(model, integrator, half, window, goal, coexisting, devices)
+        sought = seek(model, integrator, half, window, goal, run.coexisting, run.devices)
     first = sought.groups[0]
-    if asked is None and isinstance(first.solver, CellSolver):
+    if run.integrator is None and isinstance(first.solver, CellSolver):
         # Nothing is read off: each orbit is integrated for itself, and steps cost.
         integrator = integrator.with_steps(steps_needed(first.solver, first.candidates, window))
         sought = sought.with_steps(integrator.steps_a_period(model))
-    if progress is not None:
-        progress("orbits over displacement and frequency found")
-    folder = None if checkpoint is None else Path(checkpoint)
-    if folder is not None:
-        claim_folder(folder, fingerprint(model, integrator, forces, band, coexisting, reach, chunk))
+    if run.progress is not None:
+        run.progress("orbits over displacement and frequency found")
+    if run.folder is not None:
+        axes = forces, band, run.coexisting, window.reach
+        claim_folder(run.folder, fingerprint(model, integrator, *axes, run.chunk))
     parts, errors = [], [sought.reading_error]
     for name, solver, candidates in sought.groups:
-        parts.append(run_chunks(solver, candidates, chunk, folder, name, progress))
+        parts.append(run_chunks(solver, candidates, run.chunk, run.folder, name, run.progress))
         if isinstance(solver, CellSolver):
             errors.append(sampled_error(solver, candidates, parts[-1], window))
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
@@ -251,7 +300,7 @@ def stability_map(
         else Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
     )
     split = np.repeat([group.name != "whole" for group in sought.groups], [own.force.size for own in lists])
-    arrays = _gridded(candidates, found, split, len(forces), len(band), coexisting)
+    arrays = _gridded(candidates, found, split, len(forces), len(band), run.coexisting)
     code = arrays.pop("code")
     ending = _ending
     for _ in range(code.ndim):
@@ -269,30 +318,7 @@ def stability_map(
         integrator=integrator,
         **fields,
     )
-    if carried is None:
-        return smap
-
-    def find(moved: Isolator, wide: Float[np.ndarray, " wide"]) -> StabilityMap:
-        if progress is not None:
-            progress("chances of the cells")
-        return stability_map(
-            moved, wide, band, coexisting=True, reach=reach, integrator=integrator, chunk=chunk,
-            devices=devices,
-        )  # fmt: skip
-
-    chances = find_chances(carried, forces, find, quasi_draws(carried))
-    orbits = smap.response.shape[0]
-    own = slice(orbits) if coexisting else 0
-    return eqx.tree_at(
-        lambda one: (one.probability_stable, one.probability_coexisting, one.standard_errors),
-        smap,
-        (
-            jnp.asarray(chances.stable),
-            jnp.asarray(chances.coexisting),
-            {name: jnp.asarray(error[own]) for name, error in chances.standard_errors.items()},
-        ),
-        is_leaf=lambda one: one is None,
-    )
+    return smap, sought
 
 
 def _ending(code: Array) -> RESULTS:

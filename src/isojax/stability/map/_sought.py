@@ -44,6 +44,15 @@ class Sought(NamedTuple):
     groups: tuple[Group, ...]
     reading_error: float
 
+    @property
+    def read_columns(self) -> Bool[np.ndarray, " frequency"]:
+        """Whether every orbit of a frequency is read off."""
+        columns = np.ones(len(self.surface.frequencies), bool)
+        for _, solver, candidates in self.groups:
+            if isinstance(solver, CellSolver):
+                columns[candidates.frequency] = False
+        return columns
+
     def with_steps(self, steps: int) -> "Sought":
         """Give the same with other steps a period of Newton's method.
 

@@ -92,6 +92,21 @@ class Surface(NamedTuple):
     shared: Bool[np.ndarray, "frequency part"]
     error: Float[np.ndarray, "frequency part"]
 
+    def at(self, column: int, places: Float[np.ndarray, " place"]) -> Float[np.ndarray, "table place"]:
+        """Give the tables of one frequency.
+
+        Args:
+            column: of the frequencies.
+            places: logarithms of displacement over rest, between the first and the last break.
+
+        Returns:
+            Their values.
+        """
+        piece = np.searchsorted(self.breaks, places, side="right").clip(1, len(self.breaks) - 1) - 1
+        share = (places - self.breaks[piece]) / np.diff(self.breaks)[piece]
+        own = self.polynomials[column, piece]
+        return np.einsum("ptk,pk->tp", own, share[:, None] ** np.arange(own.shape[-1]))
+
 
 class _Grid(NamedTuple):
     """Orbits at the nodes of a grid.
