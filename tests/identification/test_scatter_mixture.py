@@ -7,7 +7,11 @@ from scipy.optimize import brentq
 from scipy.stats import halfcauchy, norm
 
 from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate
-from isojax.identification.fitting._scatter_mixture import integrate_scatter, log_likelihood
+from isojax.identification.fitting._scatter_mixture import (
+    integrate_scatter,
+    log_likelihood,
+    scatter_of_next,
+)
 
 UNIT = 1e-3
 """One unit of a stiffness scale's column: a tenth of a percent."""
@@ -35,8 +39,11 @@ def mean_of(readings, noise, spread, inflation=1.0):
     )
 
 
-def half_width(readings, noise, about):
-    """The same by quadrature: readings of a mean with the variance noise^2 + scatter^2 [all in UNIT]."""
+def half_width(readings, noise, about, error_at=None):
+    """The same by quadrature: readings of a mean with the variance noise^2 + scatter^2 [all in UNIT].
+
+    `error_at` gives the standard error at a scatter; that of the mean if omitted.
+    """
     readings, count = np.array(readings), len(readings)
     centre, squares = readings.mean(), np.sum((readings - readings.mean()) ** 2)
 
@@ -51,7 +58,7 @@ def half_width(readings, noise, about):
 
     def held(width):
         def inside(scatter):
-            error = np.sqrt((noise**2 + scatter**2) / count)
+            error = np.sqrt((noise**2 + scatter**2) / count) if error_at is None else error_at(scatter)
             return norm.cdf(about + width, centre, error) - norm.cdf(about - width, centre, error)
 
         return integral(inside) / integral(lambda _: 1.0)
@@ -67,6 +74,14 @@ def test_the_interval_of_a_mean_is_that_of_quadrature(readings, spread):
     # The fit's own mean, alike at every scatter because the records weigh alike.
     expected = half_width(readings, noise, float(np.mean(readings)))
     assert norm.ppf(0.975) * error == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("readings", [(-0.4, 0.5), (-3.0, 1.0, 2.5), (-0.2, 0.4, 0.1, -0.3)])
+def test_the_deviation_of_a_further_record_is_that_of_quadrature(readings):
+    noise, columns = 0.2, np.full((len(readings), 1, 1), 5.0)
+    known = reduced_of(columns, columns[..., 0], np.array(readings)[:, None] / noise, 2e-3)
+    expected = half_width(readings, noise, float(np.mean(readings)), error_at=lambda scatter: scatter)
+    assert norm.ppf(0.975) * scatter_of_next(*known, 1.0) / UNIT == pytest.approx(expected, rel=2e-3)
 
 
 def test_noise_that_was_taken_too_small_is_inflated_first():

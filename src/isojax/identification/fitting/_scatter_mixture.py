@@ -96,6 +96,32 @@ def integrate_scatter(reduced: Reduced, nuisances: Nuisances, inflation: float) 
     return invert_information(matrix, inflation) if found is None else found
 
 
+def scatter_of_next(reduced: Reduced, nuisances: Nuisances, inflation: float) -> float:
+    """Give by how much the linear stiffness of a further record may deviate from the mean over records.
+
+    Args:
+        reduced: equations at the solution, of several records with a stiffness scale each.
+        nuisances: that the equations are about.
+        inflation: factor on the squared noise: max(1, chi2/dof).
+
+    Returns:
+        The half-width that holds 95 % over all scatters which the records allow, over 1.96 [relative]; NaN
+        where the equations are singular.
+    """
+    matrix = reduced.matrix[:-1, :-1]
+    if not np.all(np.isfinite(matrix)):
+        return float("nan")
+    known = find_determined(matrix)
+    try:
+        weight = _at(
+            _with_scales(reduced, nuisances, known.vectors / known.size[:, None], inflation), _SCATTERS
+        ).weight
+    except np.linalg.LinAlgError:
+        return float("nan")
+    deviation = _SCATTERS[:, None]
+    return float(_half_width(weight, np.zeros_like(deviation), deviation)[0]) / _WIDTH
+
+
 def expect_uncertainty(
     reduced: Reduced, nuisances: Nuisances, planned: Reduced, repeats: float, inflation: float
 ) -> Uncertainty:

@@ -53,6 +53,14 @@ STIFFNESS_SCALE_UNIT = 1e-3
 
 
 def stiffness_place(model: Isolator) -> int | None:
+    """Give the place of the linear stiffness in `list_parameters`; None where the model has no such spring.
+
+    Args:
+        model: the isolator.
+
+    Returns:
+        The place.
+    """
     spring = next((one for one in model.elements if one.proportional_to == "displacement"), None)
     return None if spring is None else find_parameter(model, f"{spring.name}.{spring.strength}")
 

@@ -1,0 +1,121 @@
+"""The errors of a fit, enlarged by what is peculiar to each test: for answers about the next one."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from .._parameters import list_parameters
+from .._results import RESULTS, is_successful
+from .._show import Row, shown
+from ..identification.fitting import Fit, as_fit, scatter_of_next
+from ..identification.jacobian import stiffness_place
+from ..models import EndsEstimated, Estimated, Isolator
+
+
+@shown
+class NextRecord(NamedTuple):
+    """A fit with the errors of an answer about a further record; it goes wherever a fit goes as `fit=`.
+
+    Attributes:
+        model: the fitted isolator.
+        free: names of the coefficients that are uncertain.
+        covariance: of these [product of their units].
+        result: how the search ended.
+        scatter: standard deviation of the linear stiffness of a record [relative]; 0 without a linear spring.
+        calibration: of the force of the next test [relative].
+    """
+
+    model: Isolator
+    free: tuple[str, ...]
+    covariance: Float[np.ndarray, "coefficient coefficient"]
+    result: RESULTS
+    scatter: float
+    calibration: float
+
+    def _headline(self) -> str:
+        return (
+            f"of a further record: stiffness scatters by {100.0 * self.scatter:.2g} %, "
+            f"force known to {100.0 * self.calibration:.2g} %"
+        )
+
+    def _rows(self) -> list[Row]:
+        errors = np.sqrt(np.diag(self.covariance))
+        return [
+            Row(name, f"{float(self.model[name]):.6g} ± {error:.2g}")
+            for name, error in zip(self.free, errors, strict=True)
+        ]
+
+
+def next_record(fit: Estimated | EndsEstimated, *, calibration: float = 0.0) -> NextRecord:
+    """Give a fit the errors of answers about a further record.
+
+    The errors of a fit are those of its coefficients, which belong to the mean of all records. A further
+    record has a linear stiffness of its own, which deviates as those of the fitted records do; how much they
+    do is summed over, because few records show it badly. Its force may also be known no better than its
+    calibration: a force that is wrong by a share acts as if the mass and every coefficient of a force were.
+
+    Args:
+        fit: a fit to two records or more, or what ends with one: an extension, a closed loop.
+        calibration: standard uncertainty of the force of the next test, against that of the fitted ones
+            [relative].
+
+    Returns:
+        What `uncertainty`, `stability_map` and the curves take as `fit`.
+
+    Raises:
+        ValueError: if the fit failed, a single record shows no scatter of the stiffness, `calibration` is
+            negative or not finite, or is given under base excitation.
+
+    Source: Gelman et al. 2013, Bayesian Data Analysis, sec. 5.4 (prediction for a further group).
+
+    Example:
+        With the fit of `fit`'s example, the amplitude that a further test at 100 N and 5 Hz will show:
+
+        >>> def amplitude(model):
+        ...     return ij.find_periodic_orbit(model, ij.Harmonic(100.0, 5.0)).amplitude
+        >>> known = ij.uncertainty(fitted, amplitude)
+        >>> expected = ij.uncertainty(ij.next_record(fitted, calibration=0.005), amplitude)
+        >>> bool(expected.standard_error > known.standard_error)
+        True
+    """
+    held = as_fit(fit)
+    if not is_successful(held.result):
+        raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[held.result]}")
+    if not (np.isfinite(calibration) and calibration >= 0.0):
+        raise ValueError(f"Argument `calibration` must be 0 or above, but is {calibration}.")
+    model, listed = held.model, list_parameters(held.model)
+    if calibration and model.excitation != "force":
+        raise ValueError(
+            "Argument `calibration` is that of a force, but the model is driven through its base: an error "
+            "of the base acceleration acts like one of the same share in `amplitude`."
+        )
+    values = np.array([float(entry.value) for entry in listed])
+    own = np.zeros(len(listed))
+    spring, scatter = stiffness_place(model), 0.0
+    if spring is not None:
+        scatter = _scatter(held)
+        own[spring] = scatter * values[spring]
+    # A force in a unit that is off by a share: what is measured in newtons or kilograms follows it.
+    scaled = np.array([entry.spec.unit.startswith(("N", "kg")) for entry in listed])
+    common = np.where(scaled, calibration * values, 0.0)
+    covariance = np.diag(own**2) + np.outer(common, common)
+    names = [entry.name for entry in listed]
+    fitted = np.array([names.index(name) for name in held.free])
+    covariance[np.ix_(fitted, fitted)] += held.covariance
+    uncertain = np.flatnonzero(np.diag(covariance) != 0.0)
+    free = tuple(names[place] for place in uncertain)
+    return NextRecord(
+        model, free, covariance[np.ix_(uncertain, uncertain)], held.result, scatter, calibration
+    )
+
+
+def _scatter(fit: Fit) -> float:
+    """Give by how much the linear stiffness of a further record deviates [relative]."""
+    estimate = fit.estimate
+    if not estimate.shows_scatter:
+        raise ValueError(
+            "Argument `fit` must rest on two records or more: one shows no scatter of the stiffness between "
+            "records."
+        )
+    return scatter_of_next(estimate.point.reduced, estimate.point.nuisances, estimate.inflation)

@@ -1,0 +1,67 @@
+"""Answers about a further record: its own stiffness, and the calibration of its force."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import isojax as ij
+from isojax.demo import campaign_folder
+
+FORCE, FREQUENCY = 60.0, 5.0
+STIFFNESS = "linear_stiffness.coefficient"
+
+
+@pytest.fixture(scope="module")
+def fit():
+    campaign = ij.read_campaign(campaign_folder())
+    return ij.fit(ij.classical_guess(campaign).model, campaign)
+
+
+def variance_of(fit, name):
+    return fit.covariance[fit.free.index(name), fit.free.index(name)]
+
+
+def test_the_stiffness_of_a_further_record_deviates_by_its_scatter(fit):
+    found = ij.next_record(fit)
+    own = variance_of(found, STIFFNESS) - variance_of(fit, STIFFNESS)
+    assert np.sqrt(own) == pytest.approx(found.scatter * float(fit.model[STIFFNESS]), rel=1e-9)
+    # Few records show the scatter badly: a further one may deviate by more than their own rms.
+    assert found.scatter > fit.stats.stiffness_scatter
+    others = [name for name in fit.free if name != STIFFNESS]
+    assert [variance_of(found, name) for name in others] == [variance_of(fit, name) for name in others]
+
+
+def test_a_force_known_to_a_per_cent_is_a_linear_amplitude_known_to_a_per_cent(fit):
+    omega = 2.0 * np.pi * FREQUENCY
+
+    def amplitude(model):
+        stiffness = model[STIFFNESS] - model.mass * omega**2
+        return FORCE / jnp.hypot(stiffness, omega * model["linear_damping.coefficient"])
+
+    plain, calibrated = (
+        ij.uncertainty(ij.next_record(fit, calibration=share), amplitude) for share in (0.0, 0.01)
+    )
+    added = np.sqrt(float(calibrated.standard_error) ** 2 - float(plain.standard_error) ** 2)
+    assert added == pytest.approx(0.01 * float(plain.value), rel=1e-9)
+
+
+def test_it_says_what_it_holds(fit):
+    words = str(ij.next_record(fit, calibration=0.01))
+    assert "of a further record: stiffness scatters by" in words
+    assert "force known to 1 %" in words
+    assert "mass" in words
+
+
+def test_one_record_shows_no_scatter(fit):
+    single = fit.campaign.fit_records[:1]
+    alone = ij.fit(fit.model, dataclasses.replace(fit.campaign, records=single), max_steps=8)
+    with pytest.raises(ValueError, match="must rest on two records or more"):
+        ij.next_record(alone)
+
+
+@pytest.mark.parametrize("calibration", [-0.01, float("nan")])
+def test_a_calibration_is_a_share(fit, calibration):
+    with pytest.raises(ValueError, match=f"must be 0 or above, but is {calibration}"):
+        ij.next_record(fit, calibration=calibration)
