@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.stats import norm, truncnorm
 
 import isojax as ij
@@ -86,6 +87,35 @@ def test_bounds_hold_and_draws_that_fail_are_counted(wide):
     assert drawn.curved
     found = ij.uncertainty(wide, lambda m: jnp.where(m[STIFFNESS] > seen * 1.05, jnp.nan, m[STIFFNESS]))
     assert found.failed == pytest.approx(norm.sf(0.5), abs=0.05)
+
+
+def test_fits_that_the_data_do_not_separate_are_mixed_by_their_evidence(wide):
+    # Another law whose stiffness is a third higher, and whose BIC is 2 ln 4 higher: a fifth of the evidence.
+    inflation = wide.stats.chi2 / wide.stats.dof
+    assert inflation > 1.0
+    centre, error = float(wide.model[STIFFNESS]), 0.1 * float(wide.model[STIFFNESS])
+    stats = wide.stats._replace(bic=wide.stats.bic + 2.0 * inflation * np.log(4.0))
+    other = wide._replace(
+        model=wide.model.replace(linear_stiffness__coefficient=4.0 * centre / 3.0), stats=stats
+    )
+    found = ij.uncertainty([wide, other], lambda model: model[STIFFNESS], draws=50_000)
+    np.testing.assert_allclose(found.weights, [0.8, 0.2], rtol=1e-9)
+    assert float(found.value) == centre
+
+    def share_below(x):
+        return 0.8 * norm.cdf(x, centre, error) + 0.2 * norm.cdf(x, 4.0 * centre / 3.0, error)
+
+    expected = [brentq(lambda x, q=q: share_below(x) - q, 0.0, 3.0 * centre) for q in (0.025, 0.975)]
+    np.testing.assert_allclose(found.interval, expected, atol=0.05 * error)
+    assert "of 2 fits weighed 80%, 20%" in str(found)
+
+
+def test_fits_to_other_records_are_not_mixed(wide):
+    other = wide._replace(stats=wide.stats._replace(samples=17))
+    with pytest.raises(ValueError, match="must list fits to the same records, but these count 47408, 17"):
+        ij.uncertainty([wide, other], lambda model: model[STIFFNESS])
+    with pytest.raises(ValueError, match="the list is empty"):
+        ij.uncertainty([], lambda model: model[STIFFNESS])
 
 
 def test_a_function_that_cannot_be_mapped_is_drawn_one_by_one(wide):

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 
 from .._show import Row, brief, shown
 from .._types import check_float64
-from ..models import EndsEstimated, Estimated, Isolator, coefficient_errors
+from ..models import CoefficientErrors, EndsEstimated, Estimated, Isolator, coefficient_errors
 from ._evaluate import evaluate
 
 _BEND = 0.1
@@ -30,6 +30,7 @@ class UncertainQuantity(NamedTuple):
             interval by the delta method differs from that by draws by more than a tenth of its width.
         draws: the quantity at coefficients drawn from their normal distribution, draw first.
         failed: share of the draws that gave no finite number; they count nowhere.
+        weights: of the fits that the answer rests on, in their order.
     """
 
     value: Float[np.ndarray, "..."]
@@ -39,13 +40,16 @@ class UncertainQuantity(NamedTuple):
     curved: np.ndarray
     draws: Float[np.ndarray, "draw ..."]
     failed: float
+    weights: tuple[float, ...] = (1.0,)
 
     def _headline(self) -> str:
         bent = (
             f", curved in {np.count_nonzero(self.curved)} of {self.curved.size}" if self.curved.any() else ""
         )
         lost = f", {self.failed:.0%} of the draws failed" if self.failed else ""
-        return f"{self.confidence:.0%} interval, {len(self.draws)} draws{bent}{lost}"
+        shares = ", ".join(f"{weight:.0%}" for weight in self.weights)
+        several = f", of {len(self.weights)} fits weighed {shares}" if len(self.weights) > 1 else ""
+        return f"{self.confidence:.0%} interval, {len(self.draws)} draws{several}{bent}{lost}"
 
     def _rows(self) -> list[Row]:
         flat = [np.ravel(one) for one in (self.value, self.standard_error, *self.interval)]
@@ -56,7 +60,7 @@ class UncertainQuantity(NamedTuple):
 
 
 def uncertainty(
-    fit: Estimated | EndsEstimated,
+    fit: Estimated | EndsEstimated | list[Any],
     quantity: Callable[[Isolator], Any],
     *,
     confidence: float = 0.95,
@@ -78,14 +82,17 @@ def uncertainty(
         seed: of the draws.
 
     Returns:
-        Value, standard error and interval.
+        Value, standard error and interval; of several fits the value is that of the best.
 
     Raises:
-        ValueError: if the fit failed, the data do not determine a coefficient, the quantity is complex or not
-            finite at the fitted coefficients, or `confidence` or `draws` is out of range.
+        ValueError: if a fit failed, fits are not to the same records, the data do not determine a
+            coefficient, the quantity is complex or not finite at the fitted coefficients, or `confidence` or
+            `draws` is out of range.
         RuntimeError: if JAX is not in 64-bit mode.
 
-    Source: Seber & Wild 1989, Nonlinear Regression, sec. 5.1 (delta method); JCGM 101:2008 (draws).
+    Source: Seber & Wild 1989, Nonlinear Regression, sec. 5.1 (delta method); JCGM 101:2008 (draws); Hoeting
+        et al. 1999, Statistical Science 14:382 (several models), Kass & Raftery 1995, J. Am. Stat. Assoc.
+        90:773 (evidence by BIC).
 
     Example:
         With the fit of `fit`'s example, the amplitude of the motion at 100 N and 5 Hz:
@@ -101,7 +108,47 @@ def uncertainty(
         raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
     if draws < 100:
         raise ValueError(f"Argument `draws` must be at least 100, but is {draws}.")
-    errors = coefficient_errors(fit)
+    fits = fit if isinstance(fit, list) else [fit]
+    if not fits:
+        raise ValueError("Argument `fit` must hold at least one fit, but the list is empty.")
+    weights = _evidence(fits) if len(fits) > 1 else np.ones(1)
+    best = int(np.argmax(weights))
+    counts = np.round(weights * draws).astype(int)
+    parts = [
+        _carried(coefficient_errors(one), quantity, max(1, int(count)), seed + place)
+        for place, (one, count) in enumerate(zip(fits, counts, strict=True))
+        if count or place == best
+    ]
+    value, error = parts[sum(bool(count) for count in counts[:best])][:2]
+    drawn = np.concatenate([part[2] for part in parts])
+    finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
+    if not finite.any():
+        raise ValueError(
+            "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
+        )
+    half = 0.5 * (1.0 - confidence)
+    spread = -float(ndtri(half)) * error
+    straight = np.stack([value - spread, value + spread])
+    ends = np.quantile(drawn[finite], [half, 1.0 - half], axis=0)
+    curved = np.max(np.abs(ends - straight), axis=0) > _BEND * 2.0 * spread
+    # The delta method knows one law.
+    curved = np.asarray(curved | (len(fits) > 1))
+    return UncertainQuantity(
+        value,
+        np.where(curved, np.std(drawn[finite], axis=0), error),
+        np.where(curved, ends, straight),
+        confidence,
+        curved,
+        drawn,
+        float(1.0 - finite.mean()),
+        tuple(weights.tolist()),
+    )
+
+
+def _carried(
+    errors: CoefficientErrors, quantity: Callable[[Isolator], Any], draws: int, seed: int
+) -> tuple[Float[np.ndarray, "..."], Float[np.ndarray, "..."], Float[np.ndarray, "draw ..."]]:
+    """Give value, standard error by the delta method, and draws of the quantity of one fit."""
 
     def at(steps: Float[Array, " step"]) -> Array:
         return jnp.asarray(quantity(errors.moved(steps)))
@@ -112,24 +159,23 @@ def uncertainty(
             "Argument `quantity` must give finite real numbers at the fitted coefficients, but gave "
             f"{brief(value)}."
         )
-    value, error = jnp.asarray(value, dtype=float), jnp.linalg.norm(change, axis=-1)
+    error = np.asarray(np.linalg.norm(np.asarray(change), axis=-1))
     drawn = np.asarray(evaluate(at, errors.draw(draws, seed)), dtype=float)
-    finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
-    if not finite.any():
+    return np.asarray(value, dtype=float), error, drawn
+
+
+def _evidence(fits: list[Any]) -> Float[np.ndarray, " fit"]:
+    """Give the share of the evidence that each fit has, by BIC per max(chi2/dof, 1) of the best."""
+    held = [one if isinstance(one, Estimated) else getattr(one, "after", None) for one in fits]
+    stats = [getattr(one, "stats", None) for one in held]
+    known = [(one.samples, one.bic, one.chi2 / one.dof) for one in stats if one is not None]
+    if len(known) < len(fits) or len({samples for samples, _, _ in known}) > 1:
         raise ValueError(
-            "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
+            "Argument `fit` must list fits to the same records, but these count "
+            f"{', '.join(str(samples) for samples, _, _ in known) or 'no'} samples in "
+            f"{len(known)} of {len(fits)} fits."
         )
-    half = 0.5 * (1.0 - confidence)
-    spread = -float(ndtri(half)) * np.asarray(error)
-    straight = np.stack([np.asarray(value) - spread, np.asarray(value) + spread])
-    ends = np.quantile(drawn[finite], [half, 1.0 - half], axis=0)
-    curved = np.max(np.abs(ends - straight), axis=0) > _BEND * 2.0 * spread
-    return UncertainQuantity(
-        np.asarray(value),
-        np.where(curved, np.std(drawn[finite], axis=0), np.asarray(error)),
-        np.where(curved, ends, straight),
-        confidence,
-        np.asarray(curved),
-        drawn,
-        float(1.0 - finite.mean()),
-    )
+    bic = np.array([one for _, one, _ in known])
+    inflation = max(1.0, min(misfit for _, _, misfit in known))
+    weight = np.exp(-0.5 * (bic - bic.min()) / inflation)
+    return weight / weight.sum()
