@@ -27,6 +27,7 @@ import isojax as ij
 from _set_up_jax import set_up_jax
 from _trial_campaign import Sketch, sketch
 from _trial_judge import wilson
+from _trial_run import crowded
 from isojax import rig
 from isojax.identification import Fit
 from isojax.identification.fitting import invert_information
@@ -165,6 +166,8 @@ def main() -> None:
             with options.out.open("a") as file:
                 file.write(json.dumps(row) + "\n")
             print(f"{seed} {count} records {row['seconds']:.1f} s", flush=True)
+        if crowded():
+            jax.clear_caches()
 
 
 if __name__ == "__main__":
