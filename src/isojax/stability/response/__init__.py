@@ -13,5 +13,9 @@ from ._frequency_response import frequency_response as frequency_response
 from ._resonance import Resonance as Resonance
 from ._resonance import find_resonance as find_resonance
 from ._resonance import resonance_near as resonance_near
+from ._response_curves import CurveFold as CurveFold
+from ._response_curves import ResponseCurve as ResponseCurve
+from ._response_curves import ResponseCurves as ResponseCurves
+from ._response_curves import response_curves as response_curves
 from ._transmissibility import Transmissibility as Transmissibility
 from ._transmissibility import transmissibility as transmissibility

@@ -86,6 +86,7 @@ def impose_motions(
     Returns:
         The orbits, at displacements of equal ratio.
     """
+    errors = errors._replace(values=jnp.asarray(errors.values), root=jnp.asarray(errors.root))
     starts = jax.tree.map(np.asarray, _balances(errors.model, jnp.asarray(frequencies)))
     needed = np.hypot(*starts.drive)
     rows = _rows(needed, min(amplitudes), max(amplitudes))
