@@ -45,11 +45,11 @@ from .response import BackboneCurve as BackboneCurve
 from .response import CurveFold as CurveFold
 from .response import FrequencyResponse as FrequencyResponse
 from .response import Resonance as Resonance
+from .response import ResponseBands as ResponseBands
 from .response import ResponseCurve as ResponseCurve
-from .response import ResponseCurves as ResponseCurves
 from .response import Transmissibility as Transmissibility
 from .response import backbone_curve as backbone_curve
 from .response import find_resonance as find_resonance
 from .response import frequency_response as frequency_response
-from .response import response_curves as response_curves
+from .response import response_bands as response_bands
 from .response import transmissibility as transmissibility

@@ -30,8 +30,8 @@ from ...models import (
 from ..orbit import ascending
 from ._imposed_motion import ImposedMotions, impose_motions
 
-_STEPS = 64
-"""Steps a period where none are asked for: a multiplier is then good to 1e-3, and a curve to less."""
+_STEPS = 64, 256
+"""Steps a period where none are asked for, and where these do not find every orbit."""
 
 _NODES = 25
 """Frequencies of the grid."""
@@ -92,7 +92,7 @@ class ResponseCurve(NamedTuple):
 
 
 @shown
-class ResponseCurves(NamedTuple):
+class ResponseBands(NamedTuple):
     """Sine responses of a fitted model over frequency, with their bands.
 
     Attributes:
@@ -116,13 +116,13 @@ class ResponseCurves(NamedTuple):
         return f"drives of {levels}: largest displacement {amount(largest, 'm')}, {folds} folds"
 
 
-def response_curves(
+def response_bands(
     fit: Estimated | EndsEstimated,
     amplitudes: Any,
     frequencies: Any,
     *,
     integrator: Integrator | None = None,
-) -> ResponseCurves:
+) -> ResponseBands:
     """Give response and transmissibility over frequency at several drive amplitudes, with their bands.
 
     All of them come off one grid of orbits, within seconds, coefficients' errors included: to the accuracy of
@@ -134,7 +134,8 @@ def response_curves(
         fit: a fit, a saved one, or what ends with one.
         amplitudes: of the drive, ascending [N, or m/s^2 for base excitation].
         frequencies: of which the first and the last bound the curves [Hz].
-        integrator: solver and steps; 64 a period if omitted, times what sharp laws ask for.
+        integrator: solver and steps; 64 a period if omitted, times what sharp laws ask for,
+            and more where these do not find every orbit.
 
     Returns:
         The curves.
@@ -150,23 +151,30 @@ def response_curves(
     Example:
         With the fit of `fit`'s example:
 
-        >>> found = ij.response_curves(fitted, [20.0, 60.0], (4.0, 7.0))
+        >>> found = ij.response_bands(fitted, [20.0, 60.0], (4.0, 7.0))
         >>> [f"{curve.amplitude:.0f} N, {len(curve.folds)} folds" for curve in found.curves]
         ['20 N, 0 folds', '60 N, 0 folds']
     """
     check_float64()
     errors = coefficient_errors(fit)
-    forces, ends = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
+    forces, ends = (
+        ascending(name, np.asarray(values, dtype=float))
+        for name, values in (("amplitudes", amplitudes), ("frequencies", frequencies))
+    )
     if ends.size < 2:
         raise ValueError(f"Argument `frequencies` must hold two different ones, but is {frequencies}.")
     nodes = np.geomspace(ends[0], ends[-1], _NODES)
-    integrator = Integrator(steps_per_period=_STEPS) if integrator is None else integrator
-    motions = impose_motions(errors, forces, nodes, integrator)
+    tries = [Integrator(steps_per_period=steps) for steps in _STEPS] if integrator is None else [integrator]
+    motions = impose_motions(errors, forces, nodes, tries[0])
+    for finer in tries[1:]:
+        # Where steps are too long for a stiff law, there are no orbits.
+        if not motions.closed.all():
+            motions = impose_motions(errors, forces, nodes, finer)
     surface = _Surface(motions)
     curves = tuple(curve for force in forces for curve in surface.curves(float(force)))
     lost = 1.0 - float(np.mean(motions.closed))
     band = float(ends[0]), float(ends[-1])
-    return ResponseCurves(errors.model, tuple(map(float, forces)), band, curves, lost)
+    return ResponseBands(errors.model, tuple(map(float, forces)), band, curves, lost)
 
 
 class _Size(NamedTuple):
@@ -234,7 +242,9 @@ class _Surface:
 
         value = read((0, 0))
         slopes = np.array([read((1, 0)), read((0, 1))])
-        change = np.array([own.ev(*at) + 1j * other.ev(*at) for own, other in zip(moves[::2], moves[1::2], strict=True)])
+        change = np.array(
+            [own.ev(*at) + 1j * other.ev(*at) for own, other in zip(moves[::2], moves[1::2], strict=True)]
+        )
         change = change.reshape(-1, value.size)
         size = _Size(np.log(np.abs(value)), (slopes / value).real, (change / value).real)
         return size._replace(value=size.value + at[1], slopes=size.slopes + np.array([[0.0], [1.0]]))
@@ -265,13 +275,19 @@ class _Surface:
         for name, one, size in zip(_NAMES, (displacement, ratio), sizes, strict=True):
             change = np.array([frequency * across[:, 0], size * one.moved(across)])
             bands.append(
-                band_around(("frequency", name), np.array([frequency, size]), np.moveaxis(change, 1, 2), across=True)
+                band_around(
+                    ("frequency", name), np.array([frequency, size]), np.moveaxis(change, 1, 2), across=True
+                )
             )
             errors[name] = size * np.linalg.norm(one.moved(up), axis=0)
         stable = (drive.slopes[1] > 0.0) & (self.margin.ev(*at) > 0.0)
-        return ResponseCurve(amplitude, frequency, *sizes, stable, errors, *bands, self._folds(at, drive.slopes[1]))
+        return ResponseCurve(
+            amplitude, frequency, *sizes, stable, errors, *bands, self._folds(at, drive.slopes[1])
+        )
 
-    def _folds(self, at: Float[np.ndarray, "2 point"], rise: Float[np.ndarray, " point"]) -> tuple[CurveFold, ...]:
+    def _folds(
+        self, at: Float[np.ndarray, "2 point"], rise: Float[np.ndarray, " point"]
+    ) -> tuple[CurveFold, ...]:
         """Give the folds: between two points of a contour, where the drive ceases to rise or to fall."""
         turns = np.flatnonzero(rise[:-1] * rise[1:] < 0.0)
         if not turns.size:
@@ -280,7 +296,13 @@ class _Surface:
         places = at[:, turns] + share * (at[:, turns + 1] - at[:, turns])
         drive, acted, displacement, passed = (self._size(which, places) for which in range(len(self.tables)))
         error = np.linalg.norm(drive.change, axis=0) / np.abs(drive.slopes[0])
-        columns = zip(np.exp(places[0]), np.exp(displacement.value), np.exp(passed.over(acted).value), error, strict=True)
+        columns = zip(
+            np.exp(places[0]),
+            np.exp(displacement.value),
+            np.exp(passed.over(acted).value),
+            error,
+            strict=True,
+        )
         return tuple(
             CurveFold(
                 float(frequency), float(size), float(ratio),
