@@ -79,15 +79,13 @@ def identified_response(loop: Loop) -> IdentifiedResponse:
     bands = response_bands(estimated, sines.amplitudes, sines.frequencies)
     if not bands.curves:
         return IdentifiedResponse(
-            (
-                "The response is not shown: no periodic motion was found at the drive amplitudes of the records.",
-            )
+            ("The response is not shown: no periodic motion was found at the measured drive amplitudes.",)
         )
     lines = (_fold_words(bands), *sines.lines, *lines)
     if bands.lost > _GAPS:
         lines += (
-            f"{100.0 * bands.lost:.0f} % of the motions that were tried do not exist or were not found; curves "
-            "end there.",
+            f"{100.0 * bands.lost:.0f} % of the motions that were tried do not exist or were not found; "
+            "curves end there.",
         )
     return IdentifiedResponse(lines, bands, measured, _captions(bands, measured))
 
@@ -162,7 +160,7 @@ def _fold_words(bands: ResponseBands) -> str:
         return (
             "At these drive amplitudes the model has one steady response per frequency: no fold, so no jump."
         )
-    return f"The response jumps (folds) {'; '.join(words)}, ± 95 % interval; between folds, two stable responses."
+    return f"The response jumps (folds) {'; '.join(words)}; ± is the 95 % interval."
 
 
 def _captions(bands: ResponseBands, measured: tuple[MeasuredResponse, ...]) -> tuple[str, str]:
@@ -173,7 +171,10 @@ def _captions(bands: ResponseBands, measured: tuple[MeasuredResponse, ...]) -> t
     departures = [np.abs(one.force[:, 0] / np.median(np.abs(one.force[:, 0]))) for one in measured]
     worst = max((float(np.max(np.abs(one - 1.0))) for one in departures), default=0.0)
     if worst > _VARIES:
-        response += f" The measured drive departs from its level by up to {100.0 * worst:.0f} %."
+        response += (
+            f" The measured drive departs from its level by up to {100.0 * worst:.0f} %, and so do the "
+            "dwells from their curve."
+        )
     passes = (
         "Absolute motion over that of the base" if based else "Force on the ground over the force on the mass"
     )

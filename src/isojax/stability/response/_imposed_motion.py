@@ -5,7 +5,6 @@ amplitude. One compiled loop closes all of them by Newton's method on the drive,
 their multipliers and how they move with the coefficients.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -24,8 +23,8 @@ _TRIED = np.logspace(-9.0, 1.0, 241)
 _DISPLACEMENTS = 40
 """Displacements of the grid, at equal ratios: one count, so that one compiled loop serves every grid."""
 
-_EXTENSIONS = 3
-"""Grids at most, each higher, until a drive amplitude holds no more motion beyond."""
+_EXTENSIONS = 2
+"""Times that the grid is made higher at most, until a drive amplitude holds no more motion beyond."""
 
 _MARGIN = (0.6, 1.4)
 """Ends of the grid, over the least and the largest displacement that the drive amplitudes need."""
@@ -86,7 +85,7 @@ class _Starts(NamedTuple):
 
 def impose_motions(
     errors: CoefficientErrors,
-    amplitudes: Sequence[float],
+    amplitudes: Float[np.ndarray, " amplitude"],
     frequencies: Float[np.ndarray, " frequency"],
     integrator: Integrator,
 ) -> ImposedMotions:
@@ -105,15 +104,20 @@ def impose_motions(
     errors = errors._replace(values=jnp.asarray(errors.values), root=jnp.asarray(errors.root))
     rest, *parts = jax.tree.map(np.asarray, _balances(errors.model, jnp.asarray(frequencies)))
     balances = _as_far_as_known(np.stack([one for part in parts for one in part]), states)
-    low, high = _ends(np.hypot(*balances[:2]), min(amplitudes), max(amplitudes))
+    low, high = _ends(np.hypot(*balances[:2]), float(np.min(amplitudes)), float(np.max(amplitudes)))
+    most = float(np.max(amplitudes))
+
+    def grid(high: float) -> ImposedMotions:
+        places = np.geomspace(low, high, _DISPLACEMENTS)
+        return _grid(errors, integrator, rest, balances, places, frequencies)
+
+    motions = grid(high)
     for _ in range(_EXTENSIONS):
-        motions = _grid(
-            errors, integrator, rest, balances, np.geomspace(low, high, _DISPLACEMENTS), frequencies
-        )
         drive = motions.displacements[-1] * np.abs(motions.fundamentals[0, :, -1])
-        if not np.any(drive[motions.closed[:, -1]] < max(amplitudes)):
+        if not np.any(drive[motions.closed[:, -1]] < most):
             break
         high *= _MARGIN[1]
+        motions = grid(high)
     return motions
 
 
@@ -121,7 +125,7 @@ def _grid(
     errors: CoefficientErrors,
     integrator: Integrator,
     rest: Float[np.ndarray, ""],
-    balances: Float[np.ndarray, "number displacement frequency"],
+    balances: Float[np.ndarray, "number tried frequency"],
     displacements: Float[np.ndarray, " displacement"],
     frequencies: Float[np.ndarray, " frequency"],
 ) -> ImposedMotions:
@@ -174,28 +178,27 @@ def _balances(model: Isolator, frequencies: Float[Array, " frequency"]) -> _Star
 
 
 def _as_far_as_known(
-    balances: Float[np.ndarray, "number displacement frequency"], states: int
-) -> Float[np.ndarray, "number displacement frequency"]:
+    balances: Float[np.ndarray, "number tried frequency"], states: int
+) -> Float[np.ndarray, "number tried frequency"]:
     """Put in place of balances that ran away the last one before, made as much larger as its displacement.
 
     A stiff law with internal states may need shorter steps than a balance takes: they grow without bound.
     """
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         growth = balances[states:, 1:] / balances[states:, :-1]
-        calm = np.isfinite(balances).all(axis=(0, 2))
-        calm[1:] &= ~np.any(growth > _RUNS_AWAY, axis=(0, 2))
+        away = np.concatenate([[False], np.any(growth > _RUNS_AWAY, axis=(0, 2))])
+        calm = np.all(np.isfinite(balances), axis=(0, 2)) & ~away
     last = np.arange(calm.size).clip(max=max(int(np.logical_and.accumulate(calm).sum()) - 1, 0))
     return balances[:, last] * (_TRIED / _TRIED[last])[:, None]
 
 
-def _ends(
-    needed: Float[np.ndarray, "displacement frequency"], least: float, most: float
-) -> tuple[float, float]:
+def _ends(needed: Float[np.ndarray, "tried frequency"], least: float, most: float) -> tuple[float, float]:
     """Give the ends of the grid: below the least motion, and above the largest that grows from rest."""
     beyond = np.maximum.accumulate(needed >= most, axis=0)
     reached = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(_TRIED) - 1)
     below = np.minimum.accumulate(needed < least, axis=0).sum(axis=0)
-    return _MARGIN[0] * _TRIED[max(int(below.min()) - 1, 0)], _MARGIN[1] * _TRIED[reached.max()]
+    low, high = _TRIED[max(int(below.min()) - 1, 0)], _TRIED[int(reached.max())]
+    return _MARGIN[0] * float(low), _MARGIN[1] * float(high)
 
 
 @eqx.filter_jit

@@ -252,11 +252,11 @@ class _Surface:
 
     def curves(self, amplitude: float) -> list[ResponseCurve]:
         """Give the response curves at a drive amplitude."""
-        fine = [np.linspace(*axis[[0, -1]], count) for axis, count in zip(self.axes, _FINE, strict=True)]
+        fine = [np.linspace(axis[0], axis[-1], count) for axis, count in zip(self.axes, _FINE, strict=True)]
         drive = np.hypot(*(part(*fine) for part in self.tables[0][:2]))
         height = np.log(drive) + fine[1][None] - np.log(amplitude)
         height = np.ma.masked_where(self.known(*fine) < 0.999, height)
-        lines = contourpy.contour_generator(*fine, height.T).lines(0.0)
+        lines = contourpy.contour_generator(fine[0], fine[1], height.T).lines(0.0)
         return [self._curve(amplitude, np.asarray(line).T) for line in lines if len(line) >= _FEWEST]
 
     def _curve(self, amplitude: float, at: Float[np.ndarray, "2 point"]) -> ResponseCurve:
@@ -280,7 +280,9 @@ class _Surface:
             errors[name] = size * np.linalg.norm(one.moved(up), axis=0)
         stable = (drive.slopes[1] > 0.0) & (self.margin.ev(*at) > 0.0)
         folds = self._folds(at, drive.slopes[1])
-        return ResponseCurve(amplitude, frequency, *sizes, stable, errors, *bands, folds)
+        return ResponseCurve(
+            amplitude, frequency, sizes[0], sizes[1], stable, errors, bands[0], bands[1], folds
+        )
 
     def _folds(
         self, at: Float[np.ndarray, "2 point"], rise: Float[np.ndarray, " point"]
