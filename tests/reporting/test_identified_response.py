@@ -45,5 +45,5 @@ def test_without_dwells_the_amplitudes_are_those_of_the_rms(plain):
 
 
 def test_a_failed_fit_says_why_nothing_is_shown(found):
-    failed = dataclasses.replace(found, after=dataclasses.replace(found.after, result=RESULTS.not_converged))
+    failed = dataclasses.replace(found, after=found.after._replace(result=RESULTS.not_converged))
     assert identified_response(failed).lines == ("The response is not shown: the last fit failed.",)

@@ -106,6 +106,6 @@ def _across(values: np.ndarray, change: np.ndarray) -> np.ndarray:
     extent = np.nanmax(values, axis=-1, keepdims=True) - np.nanmin(values, axis=-1, keepdims=True)
     extent = np.where(extent > 0.0, extent, 1.0)
     along = np.gradient(values / extent, axis=-1)
-    normal = np.stack([-along[1], along[0]]) / np.maximum(np.hypot(*along), 1e-300)
+    normal = np.stack([-along[1], along[0]]) / np.maximum(np.hypot(along[0], along[1]), 1e-300)
     size = np.linalg.norm(np.sum(normal[..., None] * change / extent[..., None], axis=0), axis=-1)
     return size * normal * extent

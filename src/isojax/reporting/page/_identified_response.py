@@ -13,10 +13,10 @@ from ...stability import ResponseBands, response_bands
 from ..plots import drive_unit, median_drive, quantity
 from ..words import typeset_number, typeset_with_error
 
-_ALIKE = 1.1
+_ONE_LEVEL_RATIO = 1.1
 """Ratio of drive amplitudes below which they are one level."""
 
-_MOST_LEVELS = 4
+_MOST_CURVES_SHOWN = 4
 """Curves in a picture that can still be told apart."""
 
 _WIDER = 1.05
@@ -122,11 +122,13 @@ def _sines(
             "The records have no dwells: the curves are those of sines with the rms of the measured drives.",
         )
     amplitudes.sort()
-    groups = np.split(np.array(amplitudes), 1 + np.flatnonzero(np.diff(np.log(amplitudes)) > np.log(_ALIKE)))
+    groups = np.split(
+        np.array(amplitudes), 1 + np.flatnonzero(np.diff(np.log(amplitudes)) > np.log(_ONE_LEVEL_RATIO))
+    )
     levels = [float(np.median(group)) for group in groups]
-    if len(levels) > _MOST_LEVELS:
-        lines += (f"{_MOST_LEVELS} of {len(levels)} drive amplitudes are shown.",)
-        places = np.linspace(0, len(levels) - 1, _MOST_LEVELS).round().astype(int)
+    if len(levels) > _MOST_CURVES_SHOWN:
+        lines += (f"{_MOST_CURVES_SHOWN} of {len(levels)} drive amplitudes are shown.",)
+        places = np.linspace(0, len(levels) - 1, _MOST_CURVES_SHOWN).round().astype(int)
         levels = [levels[place] for place in places]
     return _Sines(tuple(levels), band, lines)
 

@@ -29,7 +29,7 @@ _EXTENSIONS = 2
 _MARGIN = (0.6, 1.4)
 """Ends of the grid, over the least and the largest displacement that the drive amplitudes need."""
 
-_MOST_STEPS = 12
+_MOST_DRIVE_STEPS = 12
 """Steps of Newton's method at most, each of at most a third of the unknown."""
 
 _CLOSED_TO = 1e-6
@@ -258,7 +258,7 @@ def _closed(
 
     def unfinished(carry: tuple) -> Array:
         _, (size, *_), count = carry
-        return jnp.any(size > _CLOSED_TO) & (count < _MOST_STEPS)
+        return jnp.any(size > _CLOSED_TO) & (count < _MOST_DRIVE_STEPS)
 
     nodes = displacement.size
     none = (

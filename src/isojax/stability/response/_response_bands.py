@@ -36,13 +36,13 @@ _STEPS = 64, 256
 _FEW_LOST = 0.05
 """Share of the orbits that may be lost without other steps: some do not exist, as past a snap-through."""
 
-_NODES = 25
+_GRID_FREQUENCIES = 25
 """Frequencies of the grid."""
 
 _FINE = 800, 300
 """Frequencies and displacements among which contours are sought, so that they resolve light damping."""
 
-_FEWEST = 3
+_FEWEST_OF_CONTOUR = 3
 """Points of a contour that is kept."""
 
 _NAMES = ("displacement", "transmissibility")
@@ -166,7 +166,7 @@ def response_bands(
     )
     if ends.size < 2:
         raise ValueError(f"Argument `frequencies` must hold two different ones, but is {frequencies}.")
-    nodes = np.geomspace(ends[0], ends[-1], _NODES)
+    nodes = np.geomspace(ends[0], ends[-1], _GRID_FREQUENCIES)
     tries = [Integrator(steps_per_period=steps) for steps in _STEPS] if integrator is None else [integrator]
     motions = impose_motions(errors, forces, nodes, tries[0])
     for finer in tries[1:]:
@@ -257,7 +257,9 @@ class _Surface:
         height = np.log(drive) + fine[1][None] - np.log(amplitude)
         height = np.ma.masked_where(self.known(*fine) < 0.999, height)
         lines = contourpy.contour_generator(fine[0], fine[1], height.T).lines(0.0)
-        return [self._curve(amplitude, np.asarray(line).T) for line in lines if len(line) >= _FEWEST]
+        return [
+            self._curve(amplitude, np.asarray(line).T) for line in lines if len(line) >= _FEWEST_OF_CONTOUR
+        ]
 
     def _curve(self, amplitude: float, at: Float[np.ndarray, "2 point"]) -> ResponseCurve:
         for _ in range(_POLISHING):
