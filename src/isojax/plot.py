@@ -31,6 +31,7 @@ from .reporting.plots import plot_receptance as receptance
 from .reporting.plots import plot_record as record
 from .reporting.plots import plot_remainder_map as remainder_map
 from .reporting.plots import plot_residual as residual
+from .reporting.plots import plot_response_bands as response_bands
 from .reporting.plots import plot_response_curves as response_curves
 from .reporting.plots import plot_response_map as response_map
 from .reporting.plots import plot_restoring_force as restoring_force

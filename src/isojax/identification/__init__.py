@@ -49,6 +49,7 @@ from .fitting import residual as residual
 from .guess import CircleFit as CircleFit
 from .guess import ClassicalGuess as ClassicalGuess
 from .guess import HalfPower as HalfPower
+from .guess import MeasuredResponse as MeasuredResponse
 from .guess import PaperTable as PaperTable
 from .guess import base_model as base_model
 from .guess import classical_guess as classical_guess
@@ -57,6 +58,7 @@ from .guess import find_half_power as find_half_power
 from .guess import fit_circle as fit_circle
 from .guess import invert_equivalent as invert_equivalent
 from .guess import linear_response as linear_response
+from .guess import measured_receptance as measured_receptance
 from .guess import normalised_law as normalised_law
 from .guess import paper_table as paper_table
 from .guess import scales as scales

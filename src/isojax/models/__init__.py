@@ -10,7 +10,9 @@ Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at o
 
 from ._as_isolator import Modelled as Modelled
 from ._as_isolator import as_isolator as as_isolator
+from ._band import HALF_WIDTH as HALF_WIDTH
 from ._band import Band as Band
+from ._band import band_around as band_around
 from ._band import find_band as find_band
 from ._coefficient_errors import CoefficientErrors as CoefficientErrors
 from ._coefficient_errors import EndsEstimated as EndsEstimated

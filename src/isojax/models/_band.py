@@ -15,6 +15,9 @@ from ._isolator import Isolator
 CONFIDENCE = 0.95
 """Chance that each point of a band is meant to hold the truth."""
 
+HALF_WIDTH = -float(ndtri(0.5 * (1.0 - CONFIDENCE)))
+"""Of such an interval, in standard errors."""
+
 
 @shown
 class Band(eqx.Module):
@@ -68,26 +71,41 @@ def find_band(
         ValueError: if the fit failed, leaves a coefficient undetermined, or is of another model.
     """
     values, change = (np.asarray(one) for one in coefficient_errors(fit, model).carry(curve))
+    return band_around(names, values, change, across=across)
+
+
+def band_around(
+    names: tuple[str, ...],
+    values: Float[np.ndarray, "quantity ..."],
+    change: Float[np.ndarray, "quantity ... step"],
+    *,
+    across: bool = False,
+) -> Band:
+    """Give the band around a curve from its change by each independent step of a covariance.
+
+    Args:
+        names: of the quantities of the curve.
+        values: of the curve.
+        change: by each step of one standard deviation.
+        across: whether there are two quantities, and each point moves across the curve through them.
+
+    Returns:
+        The band.
+    """
     sizes = np.linalg.norm(change, axis=-1)
-    sides = _across(values, change) if across else sizes
-    width = -float(ndtri(0.5 * (1.0 - CONFIDENCE)))
+    sides = HALF_WIDTH * (_across(values, change) if across else sizes)
 
     def named(numbers: np.ndarray) -> dict[str, Array]:
         return {name: jnp.asarray(one) for name, one in zip(names, numbers, strict=True)}
 
-    return Band(named(sizes), named(values - width * sides), named(values + width * sides), CONFIDENCE)
+    return Band(named(sizes), named(values - sides), named(values + sides), CONFIDENCE)
 
 
 def _across(values: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Give one standard deviation along the direction in which each point scatters most, on one side."""
+    """Give one standard deviation of the curve along its normal: a shift along itself moves no curve."""
     extent = np.nanmax(values, axis=-1, keepdims=True) - np.nanmin(values, axis=-1, keepdims=True)
     extent = np.where(extent > 0.0, extent, 1.0)
-    first, second = change / extent[..., None]
-    one, both, two = (np.sum(a * b, axis=-1) for a, b in ((first, first), (first, second), (second, second)))
-    angle = 0.5 * np.arctan2(2.0 * both, one - two)
-    size = np.sqrt(0.5 * (one + two) + np.hypot(0.5 * (one - two), both))
-    sides = size * np.stack([np.cos(angle), np.sin(angle)])
-    # The direction is known up to its sign: the same side of the curve all along it.
     along = np.gradient(values / extent, axis=-1)
-    side = np.sign(along[0] * sides[1] - along[1] * sides[0])
-    return np.where(side == 0.0, 1.0, side) * sides * extent
+    normal = np.stack([-along[1], along[0]]) / np.maximum(np.hypot(along[0], along[1]), 1e-300)
+    size = np.linalg.norm(np.sum(normal[..., None] * change / extent[..., None], axis=0), axis=-1)
+    return size * normal * extent

@@ -42,10 +42,14 @@ from .orbit import Orbit as Orbit
 from .orbit import find_periodic_orbit as find_periodic_orbit
 from .orbit import harmonic_balance as harmonic_balance
 from .response import BackboneCurve as BackboneCurve
+from .response import CurveFold as CurveFold
 from .response import FrequencyResponse as FrequencyResponse
 from .response import Resonance as Resonance
+from .response import ResponseBands as ResponseBands
+from .response import ResponseCurve as ResponseCurve
 from .response import Transmissibility as Transmissibility
 from .response import backbone_curve as backbone_curve
 from .response import find_resonance as find_resonance
 from .response import frequency_response as frequency_response
+from .response import response_bands as response_bands
 from .response import transmissibility as transmissibility

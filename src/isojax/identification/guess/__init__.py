@@ -20,6 +20,8 @@ from ._equivalent_coefficients import normalised_law as normalised_law
 from ._half_power import HalfPower as HalfPower
 from ._half_power import find_half_power as find_half_power
 from ._linear_response import linear_response as linear_response
+from ._measured_receptance import MeasuredResponse as MeasuredResponse
+from ._measured_receptance import measured_receptance as measured_receptance
 from ._motion import Motion as Motion
 from ._motion import is_absolute as is_absolute
 from ._motion import measured_motion as measured_motion

@@ -33,6 +33,7 @@ from ..words import (
     verdict_sentence,
 )
 from ..words import typeset_with_error as with_error
+from ._identified_response import identified_response
 from ._pictures import Picture, draw_pictures
 from ._summary import error_rows, parameter_words
 
@@ -108,7 +109,8 @@ def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
         )
         for effect, (upper, unit) in loop.bounds.items()
     ]
-    pictures = draw_pictures(loop, health)
+    response = identified_response(loop)
+    pictures = draw_pictures(loop, health, response)
     return {
         "title": campaign.title,
         "verdict": loop.verdict,
@@ -143,6 +145,7 @@ def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
             for entry in list_parameters(after.model)
         ],
         "contents": _contents(same, remainder is not None, len(bounds), pictures),
+        "response_lines": response.lines,
         "bounds": bounds,
         "remainder": "" if remainder is None else selected_laws_words(remainder.pursuit),
         "remainder_laws": laws,
@@ -172,6 +175,7 @@ def _contents(
     listed = {
         "error": ("Error" if same else "Error before and after", ""),
         "coefficients": ("Coefficients", ""),
+        "response": ("Response of the identified model", ""),
         "residual": ("Unexplained residual", "") if residual else None,
         "limits": ("Limits of this report", ""),
         "evidence": ("Evidence", "scores of the absent effects, errors"),

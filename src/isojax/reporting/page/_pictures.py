@@ -31,6 +31,7 @@ from ..plots import (
     plot_receptance,
     plot_remainder_map,
     plot_residual,
+    plot_response_bands,
     plot_restoring_force,
     plot_stiffness_scatter,
     plot_time_history,
@@ -40,9 +41,10 @@ from ..plots import (
     visited_amplitudes,
     worst_window,
 )
+from ._identified_response import IdentifiedResponse
 from ._png import png_bytes
 
-_THIRD, _WHOLE, _HEIGHT = 3.8, 11.0, 2.9
+_THIRD, _HALF, _WHOLE, _HEIGHT = 3.8, 4.6, 11.0, 2.9
 """Sizes [inch]: on a wide screen three pictures stand side by side, on a telephone one fills the width, and
 the letters can be read on both."""
 
@@ -73,7 +75,9 @@ class Picture(NamedTuple):
         return f"report_{re.sub('[^a-z0-9]+', '_', self.name.lower())}.png"
 
 
-def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture, ...]]:
+def draw_pictures(
+    loop: Loop, health: CampaignHealth, response: IdentifiedResponse
+) -> dict[str, tuple[Picture, ...]]:
     """Draw the pictures of the report.
 
     Where the fit before failed, only those are drawn that need none.
@@ -81,10 +85,11 @@ def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture
     Args:
         loop: the closed loop.
         health: of its campaign.
+        response: of the identified model.
 
     Returns:
-        Section to its pictures: lead_pictures, error_pictures, evidence_pictures, remainder_pictures,
-        record_pictures, force_pictures, health_pictures.
+        Section to its pictures: lead_pictures, response_pictures, error_pictures, evidence_pictures,
+        remainder_pictures, record_pictures, force_pictures, health_pictures.
     """
     before = loop.before if is_successful(loop.before.result) else None
     differs = loop.after is not loop.before and is_successful(loop.after.result)
@@ -92,6 +97,7 @@ def draw_pictures(loop: Loop, health: CampaignHealth) -> dict[str, tuple[Picture
     telling = "damping" if before is None else telling_slice(before, after)
     return {
         "lead_pictures": () if before is None else _lead_pictures(before, after, telling),
+        "response_pictures": _response_pictures(response),
         "error_pictures": () if before is None else _error_pictures(before, after),
         "evidence_pictures": _evidence_pictures(loop),
         "remainder_pictures": _remainder_pictures(loop),
@@ -107,12 +113,12 @@ def _draw(
     plot: Callable[..., Figure],
     *args: Any,
     wide: bool = False,
-    height: float = _HEIGHT,
+    size: tuple[float, float] | None = None,
     **options: Any,
 ) -> tuple[Picture, ...]:
     """Draw one picture, as a row of its own to join to others."""
     step(f"drawing: {name}")
-    size = (_WHOLE if wide else _THIRD, height)
+    size = (_WHOLE if wide else _THIRD, _HEIGHT) if size is None else size
     ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
     return (Picture(name, caption, png_bytes(plot(*args, ax=ax, **options)), wide),)
 
@@ -143,6 +149,25 @@ def _restoring_force(before: Fit, after: Fit | None, what: Slice) -> tuple[Pictu
     return _draw(name, caption, plot_restoring_force, before, after, what=what)
 
 
+def _response_pictures(response: IdentifiedResponse) -> tuple[Picture, ...]:
+    """Draw response and transmissibility of the identified model with their bands."""
+    if response.bands is None:
+        return ()
+    size, captions = (_HALF, 1.1 * _HEIGHT), response.captions
+    shown = {"measured": response.measured, "size": size}
+    return (
+        *_draw("response of the model", captions[0], plot_response_bands, response.bands, **shown),
+        *_draw(
+            "transmissibility of the model",
+            captions[1],
+            plot_response_bands,
+            response.bands,
+            what="transmissibility",
+            size=size,
+        ),
+    )
+
+
 def _error_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
     """Draw the errors before and after."""
     goodness = "Segments restarted, squared error over squared noise. 1 means noise alone."
@@ -164,8 +189,8 @@ def _evidence_pictures(loop: Loop) -> tuple[Picture, ...]:
         if ranking:
             name = "ranking" if effect is None else f"ranking that found {effect}"
             options = {"effect": effect, "indistinguishable": others, "wide": True}
-            height = 1.3 + 0.27 * min(10, max(3, len(ranking)))
-            pictures += _draw(name, caption, plot_ranking, ranking, height=height, **options)
+            size = _WHOLE, 1.3 + 0.27 * min(10, max(3, len(ranking)))
+            pictures += _draw(name, caption, plot_ranking, ranking, size=size, **options)
     return tuple(pictures) + _effect_pictures(loop)
 
 

@@ -47,6 +47,8 @@ from ._residual_plots import plot_correlation as plot_correlation
 from ._residual_plots import plot_cycle_residual as plot_cycle_residual
 from ._residual_plots import plot_residual as plot_residual
 from ._residual_plots import plot_where as plot_where
+from ._response_bands_plot import median_drive as median_drive
+from ._response_bands_plot import plot_response_bands as plot_response_bands
 from ._response_curves_plot import plot_response_curves as plot_response_curves
 from ._sensitivity_plot import plot_sensitivity as plot_sensitivity
 from ._stability_style import drive_unit as drive_unit

@@ -31,6 +31,7 @@ from ...stability import (
     FrequencyResponse,
     Orbit,
     PhasePortrait,
+    ResponseBands,
     ReturnToOrbit,
     Sensitivity,
     StabilityMap,
@@ -48,6 +49,7 @@ from ._map_plots import plot_stability_map
 from ._record_plot import plot_record
 from ._remainder_plots import plot_force_residual_map, plot_remainder_map
 from ._residual_plots import plot_correlation
+from ._response_bands_plot import plot_response_bands
 from ._sensitivity_plot import plot_sensitivity
 from ._style import AFTER, axes_for
 from ._time_history_plots import plot_time_history
@@ -110,6 +112,7 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     Profile: plot_profile,
     Remainder: _remainder,
     Residual: plot_correlation,
+    ResponseBands: plot_response_bands,
     ReturnToOrbit: plot_return,
     Sensitivity: _sensitivity,
     Simulation: _simulation,

@@ -207,12 +207,12 @@ def _receptances(
     return fundamental(path[0], periods) / jax.lax.complex(0.0 * frequency, -amplitude)
 
 
-def fundamental(path: Float[Array, "time ..."], periods: int = 1) -> Complex[Array, "..."]:
+def fundamental(path: Float[Array, "time ..."], periods: float = 1) -> Complex[Array, "..."]:
     """Give the complex amplitude X of the fundamental `X exp(i omega t)`, omega that of the drive.
 
     Args:
         path: a signal at equidistant instants of some drive periods, both ends included.
-        periods: how many.
+        periods: how many; half of one does for a signal whose other half is minus the first.
 
     Returns:
         X, with the modulus of the amplitude.
