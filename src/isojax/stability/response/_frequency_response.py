@@ -207,7 +207,7 @@ def _receptances(
     return fundamental(path[0], periods) / jax.lax.complex(0.0 * frequency, -amplitude)
 
 
-def fundamental(path: Float[Array, "time ..."], periods: float = 1) -> Complex[Array, "..."]:
+def fundamental(path: Float[Array, "time ..."], periods: int | float = 1) -> Complex[Array, "..."]:
     """Give the complex amplitude X of the fundamental `X exp(i omega t)`, omega that of the drive.
 
     Args:
