@@ -104,7 +104,7 @@ def over_repeats(
         MODEL,
         quantity="acceleration",
         hold="linear",
-        noise=noise,
+        noise=(noise,),
         integrator=Integrator(substeps=2),
         whitening=whitening,
         share=share,
@@ -160,7 +160,7 @@ def test_columns_of_absent_effects_are_weighed_as_exact_derivatives_are(integrat
         MODEL,
         quantity="acceleration",
         hold="linear",
-        noise=SIGMA,
+        noise=(SIGMA,),
         integrator=integrator,
         whitening=(-1.1, 0.3),
     )
