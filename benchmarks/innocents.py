@@ -179,6 +179,7 @@ def run_one(seed: int, flaw: str) -> Row:
                 or health.unsettled
                 or health.brief_blows
                 or drive_noise(loop.after)
+                or held.noise.range_words
             ),
             "off": {
                 name: (float(held.model[name]) - float(truth[name])) / error for name, error in errors.items()
