@@ -15,6 +15,7 @@ The campaigns are those of the blind trial that hide nothing, simulated by the r
 - noisy_force: the force channel has 3 N of white noise.
 - nonlinear_sensor: the reading is `y + 0.001 y^2 / max|y|`.
 - jitter: the instants of the samples scatter by 0.2 ms, alike in both channels.
+- noisy_record: the noise differs from record to record: one fitted record has three times that of the others.
 
 The report prints for each flaw: campaigns; those in which something was named; those that ended "unexplained"
 though the report names no flaw of the data; and how many of the 95 % intervals of the declared coefficients
@@ -103,12 +104,15 @@ SHAKEN = Secret(
 """A base that shakes at random and is not measured."""
 
 SPOILT = {"spikes": spiked, "nonlinear_sensor": bent, "jitter": jittered}
-FLAWS = (*COLOURS, "one_level", "two_records", *SPOILT, "noisy_base", "noisy_force")
+FLAWS = (*COLOURS, "one_level", "two_records", *SPOILT, "noisy_record", "noisy_base", "noisy_force")
+
+LOUDER = 3.0
+"""Noise of the one record over that of the others."""
 
 
 def planned(drawn: Sketch, flaw: str) -> Sketch:
     """Give the campaign with the plans and the bench that a flaw asks for."""
-    if flaw in COLOURS:
+    if flaw in COLOURS or flaw == "noisy_record":
         return replace(drawn, bench=replace(drawn.bench, noise=0.0))
     if flaw == "noisy_force":
         return replace(drawn, bench=replace(drawn.bench, force_noise=3.0))
@@ -131,6 +135,8 @@ def filed(drawn: Sketch, flaw: str, folder: Path) -> Path:
     changed = planned(drawn, flaw)
     hidden = (SHAKEN,) if flaw == "noisy_base" else ()
     path = file_campaign(changed, hidden, folder)
+    fitted = [record.name for record in read_campaign(path).fit_records]
+    louder = str(generator(drawn.seed, "flaw", flaw).choice(fitted))
     for place, file in enumerate(sorted(folder.glob("*.npz"))):
         with np.load(file) as held:
             columns = {name: held[name].astype(float) for name in held.files}
@@ -138,6 +144,9 @@ def filed(drawn: Sketch, flaw: str, folder: Path) -> Path:
         output, force = columns["acceleration"], columns["force"]
         if flaw in COLOURS:
             output = output + drawn.bench.noise * COLOURS[flaw](draw, output.size)
+        elif flaw == "noisy_record":
+            sigma = drawn.bench.noise * (LOUDER if file.stem == louder else 1.0)
+            output = output + sigma * draw.standard_normal(output.size)
         elif flaw in SPOILT:
             output, force = SPOILT[flaw](draw, output, force)
         written = {"force": force, "acceleration": output}
@@ -170,6 +179,7 @@ def run_one(seed: int, flaw: str) -> Row:
                 or health.unsettled
                 or health.brief_blows
                 or drive_noise(loop.after)
+                or held.noise.range_words
             ),
             "off": {
                 name: (float(held.model[name]) - float(truth[name])) / error for name, error in errors.items()

@@ -14,6 +14,7 @@ from scipy.signal import lfilter, lsim
 from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness, SensorOffset
 from isojax.identification.fitting._build_problem import build_problem
 from isojax.identification.fitting._elimination import Spread
+from isojax.identification.fitting._fit import simulator_for
 from isojax.identification.fitting._problem import one_hot
 from isojax.identification.fitting._simulator import Simulator
 from isojax.identification.jacobian import find_whitening, whiten
@@ -104,7 +105,7 @@ def over_repeats(
         MODEL,
         quantity="acceleration",
         hold="linear",
-        noise=noise,
+        noise=(noise,),
         integrator=Integrator(substeps=2),
         whitening=whitening,
         share=share,
@@ -160,7 +161,7 @@ def test_columns_of_absent_effects_are_weighed_as_exact_derivatives_are(integrat
         MODEL,
         quantity="acceleration",
         hold="linear",
-        noise=SIGMA,
+        noise=(SIGMA,),
         integrator=integrator,
         whitening=(-1.1, 0.3),
     )
@@ -173,3 +174,16 @@ def test_columns_of_absent_effects_are_weighed_as_exact_derivatives_are(integrat
     size = np.sqrt(np.diag(exact.reduced.matrix))
     difference = (found.reduced.matrix - exact.reduced.matrix) / np.outer(size, size)
     assert np.max(np.abs(difference)) < 1e-3
+
+
+def test_each_record_counts_by_its_own_noise_where_one_is_louder():
+    size, draw = made_record().output.size, np.random.default_rng(3)
+    factors = (1.0, 3.0, 1.0)
+    campaign = made_campaign([SIGMA * factor * draw.standard_normal(size) for factor in factors])
+    campaign = replace(campaign, input=replace(campaign.input, hold="linear"))
+    simulator = simulator_for(MODEL, campaign, estimate_noise(campaign), Integrator(substeps=2))
+    assert np.array(simulator.problem.noise) == pytest.approx(SIGMA * np.array(factors), rel=0.1)
+    start = simulator.settle(None, MODEL, 2, Spread(1e-9))
+    point = simulator.evaluate(MODEL, one_hot(MODEL, (1, 2), (1e3, 10.0)), start)
+    count = point.samples - point.reduced.eliminated
+    np.testing.assert_allclose(point.reduced.by_record[:, -1, -1] / count, 1.0, atol=0.15)

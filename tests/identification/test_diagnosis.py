@@ -222,7 +222,7 @@ def test_a_failed_fit_is_not_diagnosed(simulated):
 
 def test_the_residual_of_an_innocent_model_is_white(innocent):
     left = residual(innocent)
-    assert left.noise_floor == 5e-3
+    assert np.all(left.noise_floor == 5e-3)
     assert len(left.values) == 3
     assert left.whiteness.min() > 0.9
     # Three bands of fifty lags each, one in a hundred outside.

@@ -38,7 +38,7 @@ def reduced_of(dense, spread):
     matrices = np.einsum("rti,rtj->rij", whole, whole)
     lanes = OWNER.size
     nuisances = Nuisances(np.zeros((lanes, 2)), np.zeros(RECORDS), np.zeros(lanes), spread)
-    return eliminate(matrices, 1.0, OWNER, COEFFICIENTS, nuisances)
+    return eliminate(matrices, (1.0,) * (max(OWNER) + 1), OWNER, COEFFICIENTS, nuisances)
 
 
 def test_noise_alone_is_ordinary_least_squares(dense, spread):

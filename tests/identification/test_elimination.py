@@ -6,7 +6,7 @@ import pytest
 from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate, step_nuisances
 from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT
 
-NOISE, SPREAD, WITHIN = 0.3, 2e-3, 1e-3
+NOISE, SPREAD, WITHIN = (0.3, 0.8), 2e-3, 1e-3
 COLUMNS, STATES, SAMPLES = 3, 2, 40
 OWNER = np.array([0, 0, 1, 1, 1, 0])
 USED, RECORDS = 5, 2
@@ -28,7 +28,7 @@ def _dense(blocks, has_scale, nuisances):
     unknowns = COLUMNS + scales + USED * STATES + within
     rows, right, owner = [], [], []
     for lane in range(USED):
-        block = blocks[lane] / NOISE
+        block = blocks[lane] / NOISE[OWNER[lane]]
         part = np.zeros((SAMPLES, unknowns))
         part[:, :COLUMNS] = block[:, :COLUMNS]
         if has_scale:

@@ -172,7 +172,12 @@ def test_settle_samples_set_the_state_and_count_in_no_error(linear, fitted):
 def test_internal_states_begin_a_free_run_at_rest(linear):
     model = START.with_elements(MaxwellBranch(2e5, 0.05))
     problem = build_problem(
-        linear.records, model, quantity="acceleration", hold="band_limited", noise=0.01, integrator=ONE_STEP
+        linear.records,
+        model,
+        quantity="acceleration",
+        hold="band_limited",
+        noise=(0.01,),
+        integrator=ONE_STEP,
     )
     state = find_initial_states(problem, model)
     assert state.shape == (3, 1)
@@ -341,7 +346,12 @@ def _stiff_problem(simulated, model) -> Problem:
     plant = rig.Plant((rig.LinearStiffness(1.4e7), rig.LinearDamping(2e4)))
     campaign = simulated(plant, rig.Multisine((500.0,), 5.0, 40.0, period=1.0, periods=2, lines="full"), 4)
     return build_problem(
-        campaign.records, model, quantity="acceleration", hold="band_limited", noise=1e-3, integrator=ONE_STEP
+        campaign.records,
+        model,
+        quantity="acceleration",
+        hold="band_limited",
+        noise=(1e-3,),
+        integrator=ONE_STEP,
     )
 
 
@@ -359,7 +369,7 @@ def test_the_steps_are_halved_until_their_error_is_small_beside_the_noise(simula
 
 def test_an_element_with_a_sharp_law_keeps_its_own_steps(simulated):
     model = START.with_elements(LugreFriction(1.0, 1e-3, 0.0, 1e-2, 1e-3))
-    problem = _stiff_problem(simulated, model)._replace(noise=1e3)
+    problem = _stiff_problem(simulated, model)._replace(noise=(1e3,))
     assert find_integrator(problem, model).integrator.substeps == LugreFriction.substeps
     # Dry friction is split at its reversals instead.
     model = START.with_elements(CoulombFriction(1.0, 1.0))

@@ -27,7 +27,7 @@ def reduced_of(columns, scale, readings, spread, inflation=1.0):
     )
     matrices = inflation * np.einsum("rti,rtj->rij", whole, whole)
     nuisances = Nuisances(np.zeros((records, 1)), np.zeros(records), np.zeros(records), Spread(spread))
-    return eliminate(matrices, 1.0, np.arange(records), count, nuisances), nuisances
+    return eliminate(matrices, (1.0,) * records, np.arange(records), count, nuisances), nuisances
 
 
 def mean_of(readings, noise, spread, inflation=1.0):

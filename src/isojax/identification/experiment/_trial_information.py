@@ -158,7 +158,8 @@ def trial_point(
 ) -> Point | None:
     """Give the equations of the records of an experiment.
 
-    The noise has the density of the campaign's: records of fewer samples a second have less of it a sample.
+    The noise has the density of the campaign's, the median of its records: records of fewer samples a second
+    have less of it a sample.
     Segments are cut as a fit would cut them.
 
     Args:
@@ -184,12 +185,13 @@ def trial_point(
         probes = tuple(filter(_stays, probes))
     if missing_channels(Isolator(model.mass, (*model.elements, *probes), model.excitation), made.records):
         return None
+    noise = float(np.median(old.noise)) * relative * float(np.sqrt(experiment.rate / rate))
     problem = build_problem(
         made.records,
         model,
         quantity=experiment.quantity,
         hold=old.hold,
-        noise=old.noise * relative * float(np.sqrt(experiment.rate / rate)),
+        noise=(noise,) * len(made.records),
         # The step of `trial_run`, which made the records: another solver's error would pass for information.
         integrator=Integrator(substeps=old.integrator.substeps),
         share=old.share,

@@ -17,7 +17,7 @@ def build_problem(
     *,
     quantity: Quantity,
     hold: Hold,
-    noise: float,
+    noise: tuple[float, ...],
     integrator: Integrator,
     share: float = 1.0,
     whitening: tuple[float, ...] = (),
@@ -33,8 +33,8 @@ def build_problem(
         model: the isolator, for its decay time.
         quantity: what the sensor measures.
         hold: what the drive does between samples.
-        noise: rms of white noise that has the density of the noise inside its band, or of what the whitening
-            filter leaves [SI unit of the output].
+        noise: of each record, rms of white noise that has the density of the noise inside its band, or of
+            what the whitening filter leaves [SI unit of the output].
         integrator: solver and steps.
         share: share of the samples of which the noise is independent.
         whitening: coefficients of the filter that whitens coloured noise; none where it is white.

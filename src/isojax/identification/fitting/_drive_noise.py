@@ -54,7 +54,8 @@ def drive_noise(fit: Fit, rules: Rules = Rules()) -> DriveNoise | None:
     seen = _noise_of(fit, tuple(dataclasses.replace(run.record, output=run.residual) for run in runs))
     if seen.method != fit.noise.method:
         return None
-    if fit.stats.chi2 / fit.stats.dof > rules.good * (seen.white / fit.noise.white) ** 2:
+    own = np.array(fit.estimate.problem.noise)
+    if fit.stats.chi2 / fit.stats.dof > rules.good * np.mean((np.array(seen.whites) / own) ** 2):
         return None
     drive = _noise_of(fit, tuple(dataclasses.replace(run.record, output=run.record.input) for run in runs))
     return DriveNoise(drive.sigma, seen.sigma, fit.noise.sigma)

@@ -5,6 +5,7 @@ the stiffness scales of the records have explained what they can: variable proje
 matrices of `information`.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -156,7 +157,7 @@ class Reduced(NamedTuple):
 
 def eliminate(
     matrices: Float[np.ndarray, "segment column column"],
-    noise: float,
+    noise: Sequence[float],
     owner: Int[np.ndarray, " segment"],
     columns: int,
     nuisances: Nuisances,
@@ -170,7 +171,7 @@ def eliminate(
     Args:
         matrices: from `information`: coefficients, the stiffness scale where the model has one, initial
             states, residual.
-        noise: rms of the noise [SI unit of the output].
+        noise: rms of the noise of each record [SI unit of the output].
         owner: record of each segment.
         columns: count of coefficient columns.
         nuisances: where they stand, and their priors; lanes beyond the segments are padding.
@@ -179,8 +180,9 @@ def eliminate(
     Returns:
         The reduced equations.
     """
-    matrices = matrices / noise**2
-    heads = None if heads is None else heads / noise**2
+    power = np.array([own**2 for own in noise])[owner, None, None]
+    matrices = matrices / power
+    heads = None if heads is None else heads / power
     offset, spread = nuisances.states[: owner.size], nuisances.spread
     has_scale = matrices.shape[1] > columns + offset.shape[1] + 1
     left, states_map, taken = _without_states(matrices, heads, columns + int(has_scale), offset)

@@ -49,10 +49,17 @@ class Evaluation:
     A search of coefficients does not need it, and it costs a good part of one; hence it waits.
     """
 
-    def __init__(self, found: Estimate, campaign: Campaign):
-        """Keep what is to be compared; nothing is simulated yet."""
+    def __init__(self, found: Estimate, campaign: Campaign, noise: tuple[float, ...]):
+        """Keep what is to be compared; nothing is simulated yet.
+
+        Args:
+            found: the estimate.
+            campaign: the measurements.
+            noise: of each of their records, as in `Problem`.
+        """
         self._found = found
         self._campaign = campaign
+        self._noise = noise
 
     @cached_property
     def _everything(self) -> Problem:
@@ -63,7 +70,7 @@ class Evaluation:
             self._found.model,
             quantity=fitted.quantity,
             hold=fitted.hold,
-            noise=fitted.noise,
+            noise=self._noise,
             share=fitted.share,
             whitening=fitted.whitening,
             integrator=fitted.integrator,

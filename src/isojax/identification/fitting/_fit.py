@@ -93,8 +93,7 @@ def fit(
         # A delay or a skew that the model stands for contradicts nothing.
         named = tuple(element.name for element in model.elements)
         refuse_contradictions(dataclasses.replace(campaign, elements=named))
-    # Held-out records must not even weigh the others.
-    noise = estimate_noise(dataclasses.replace(campaign, records=campaign.fit_records))
+    noise = estimate_noise(campaign)
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
         raise ValueError(
             f"{campaign.file}: the noise of the output must be above 0, but the records, so short or so "
@@ -156,7 +155,9 @@ def simulator_for(
         model,
         quantity=campaign.output.quantity,
         hold=campaign.input.hold,
-        noise=noise.white,
+        noise=tuple(
+            own for own, record in zip(noise.whites, campaign.records, strict=True) if record.role == "fit"
+        ),
         share=noise.share,
         whitening=noise.whitening,
         integrator=Integrator() if integrator is None else integrator,
@@ -200,5 +201,5 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         noise,
         found.result,
         found,
-        Evaluation(found, campaign),
+        Evaluation(found, campaign, noise.whites),
     )

@@ -234,6 +234,7 @@ def _statistics(fit: Fit) -> list[str]:
     scatter = f"{100 * stats.stiffness_scatter:.2g} % between records"
     if stats.segment_scatter > 0.0:
         scatter += f", {100 * stats.segment_scatter:.2g} % within them"
+    noise = ", ".join(filter(None, (f"from {fit.noise.method.replace('_', ' ')}", fit.noise.range_words)))
     rows = [
         ("samples", f"{stats.samples}"),
         ("coefficients", f"{stats.coefficients}"),
@@ -243,7 +244,7 @@ def _statistics(fit: Fit) -> list[str]:
         ("reduced chi-square", f"{stats.chi2 / stats.dof:.5g}"),
         ("AIC", f"{stats.aic:.8g}"),
         ("BIC", f"{stats.bic:.8g}"),
-        ("noise", f"{fit.noise.sigma:.4g} {unit} rms, from {fit.noise.method.replace('_', ' ')}"),
+        ("noise", f"{fit.noise.sigma:.4g} {unit} rms, {noise}"),
         ("stiffness scatter", scatter),
         ("integration", fit.integration),
     ]

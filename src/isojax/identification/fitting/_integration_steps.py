@@ -28,7 +28,10 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     Returns:
         Error over noise; infinite where a simulation diverged.
     """
-    loudest = max(range(len(problem.records)), key=lambda place: float(np.std(problem.records[place].output)))
+    loudest = max(
+        range(len(problem.records)),
+        key=lambda place: float(np.std(problem.records[place].output)) / problem.noise[place],
+    )
     own = [segment for segment in problem.segments if segment.record == loudest]
     few = tuple(own[:: max(1, len(own) // SEGMENTS_TRIED)][:SEGMENTS_TRIED])
     outcomes = []
@@ -46,7 +49,7 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     if prepared.sampling.whitening is not None:
         rows = whiten(jnp.asarray(difference)[:, None], jnp.asarray(weight), prepared.sampling.whitening)
         difference = np.asarray(rows[:, 0])
-    return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise)
+    return float(np.sqrt(np.sum(difference**2) / np.sum(weight) / problem.share) / problem.noise[loudest])
 
 
 def find_integrator(problem: Problem, model: Isolator) -> Problem:

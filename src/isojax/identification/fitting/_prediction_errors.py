@@ -71,21 +71,22 @@ def prediction_errors(fit: Fit | Fitted, horizons: Sequence[float] = (0.1, 1.0, 
 
 def _error(fit: Fit, role: str, horizon: float) -> float:
     """Give the rms error over the windows of one role's records."""
-    windows = tuple(
-        window
-        for record in fit.campaign.records
+    cut = [
+        (window, noise)
+        for record, noise in zip(fit.campaign.records, fit.noise.whites, strict=True)
         if record.role == role
         for window in windows_of(record, horizon, _MOST_WINDOWS)
-    )
-    if not windows:
+    ]
+    if not cut:
         return float("nan")
+    windows, noise = zip(*cut, strict=True)
     fitted = fit.estimate.problem
     problem = build_problem(
         windows,
         fit.model,
         quantity=fitted.quantity,
         hold=fitted.hold,
-        noise=fitted.noise,
+        noise=noise,
         integrator=fitted.integrator,
     )
     runs = run_freely(problem, fit.model)

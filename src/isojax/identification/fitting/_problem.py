@@ -24,8 +24,8 @@ class Problem(NamedTuple):
         segments: pieces of them.
         quantity: what the sensor measures.
         hold: what the drive does between samples.
-        noise: rms of white noise that has the density of the noise inside its band, or of what the whitening
-            filter leaves [SI unit of the output].
+        noise: of each record, rms of white noise that has the density of the noise inside its band, or of
+            what the whitening filter leaves [SI unit of the output].
         integrator: solver and steps.
         heads: the first samples of each record, where records are left whole and only these may set the
             initial states; empty where every segment settles its own.
@@ -38,7 +38,7 @@ class Problem(NamedTuple):
     segments: tuple[Segment, ...]
     quantity: Quantity
     hold: Hold
-    noise: float
+    noise: tuple[float, ...]
     integrator: Integrator
     heads: tuple[Segment, ...] = ()
     step_error: float = float("nan")

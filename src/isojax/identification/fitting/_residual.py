@@ -19,7 +19,7 @@ class Residual(NamedTuple):
 
     Attributes:
         values: measured less simulated of each fitting record, segments restarted [SI unit of the output].
-        noise_floor: rms of the noise [SI unit of the output].
+        noise_floor: rms of the noise of each record [SI unit of the output].
         whiteness: share of lags within +-25 (0 left out) whose autocorrelation stays in the 99 % band, a
             record each.
         lags: the lags [samples].
@@ -30,7 +30,7 @@ class Residual(NamedTuple):
     """
 
     values: tuple[Float[np.ndarray, " time"], ...]
-    noise_floor: float
+    noise_floor: Float[np.ndarray, " record"]
     whiteness: Float[np.ndarray, " record"]
     lags: Float[np.ndarray, " lag"]
     autocorrelation: Float[np.ndarray, "record lag"]
@@ -96,6 +96,8 @@ def residual(fit: Fit | Fitted) -> Residual:
         cross.append(_correlate(left, drive))
         band.append(float(stats.norm.ppf(0.995)) / np.sqrt(left.size))
         white.append(np.mean(np.abs(np.delete(own[-1], MOST_LAGS)) <= band[-1]))
+    levels = zip(fit.noise.levels, fit.campaign.records, strict=True)
+    floor = np.array([level for level, record in levels if record.role == "fit"])
     return Residual(
-        tuple(values), fit.noise.sigma, np.array(white), lags, np.array(own), np.array(cross), np.array(band)
+        tuple(values), floor, np.array(white), lags, np.array(own), np.array(cross), np.array(band)
     )

@@ -79,7 +79,7 @@ def dwell_remainders(fit: Fit, residuals: tuple[ForceResidual, ...]) -> tuple[Dw
         One per dwell whose integrals are reliable; none without dwells.
     """
     dwells = []
-    for one, run in zip(residuals, fit.restarts.runs, strict=True):
+    for one, run, noise in zip(residuals, fit.restarts.runs, fit.noise.levels, strict=True):
         for dwell in one.record.dwells:
             window = _window(one, dwell)
             orders = min(HARMONICS, int(one.highest / dwell.frequency))
@@ -87,7 +87,7 @@ def dwell_remainders(fit: Fit, residuals: tuple[ForceResidual, ...]) -> tuple[Dw
                 continue
             own = slice(dwell.start, dwell.stop)
             counted = max(1.0, float(np.sum(run.counted[own] > 0.0)))
-            chi2 = float(np.sum(run.residual[own] ** 2)) / fit.noise.sigma**2 / counted
+            chi2 = float(np.sum(run.residual[own] ** 2)) / noise**2 / counted
             dwells.append(_dwell_remainder(one, dwell.frequency, window, orders, chi2))
     if not dwells:
         return ()

@@ -15,7 +15,7 @@ from ..._parameters import list_parameters
 from ...elements import Channels
 from ...excitations import Hold
 from ...models import RK4, Instant, Isolator, State, share_internal
-from ...records import Campaign, ExcitedBand, NoiseEstimate, Record, measured_state
+from ...records import Campaign, ExcitedBand, Record, measured_state
 from ...records.spectrum import shift_order
 from ..fitting import Fit, Run
 from ..guess import Motion, is_absolute, measured_motion
@@ -164,7 +164,7 @@ def force_residuals(fit: Fit) -> tuple[ForceResidual, ...]:
 
 
 def _force_residual(
-    fit: Fit, run: Run, scale: Float[np.ndarray, " time"], seed: int, common: float
+    fit: Fit, run: Run, scale: Float[np.ndarray, " time"], place: int, common: float
 ) -> ForceResidual:
     model, campaign, record = fit.model, fit.campaign, run.record
     hold: Hold = campaign.input.hold
@@ -200,7 +200,7 @@ def _force_residual(
     # The share of the noise: the same computation with noise of the same density added to the motion.
     noise = []
     for draw in range(_NOISE_DRAWS):
-        stray = _noise_motion(campaign, record, motion, fit.noise, (seed, draw))
+        stray = _noise_motion(fit, record, motion, place, draw)
         shaken = missing(x + stray[0], v + stray[1], a + stray[2]) - force
         noise.append(_filter_to_band(np.asarray(shaken), record.rate, lowest, highest))
     return ForceResidual(
@@ -240,16 +240,14 @@ def _filter_to_band(
     return sosfiltfilt(butter(_STEEP, lowest, "highpass", fs=rate, output="sos"), low)
 
 
-def _noise_motion(
-    campaign: Campaign, record: Record, motion: Motion, noise: NoiseEstimate, seed: tuple[int, int]
-) -> tuple[Array, ...]:
+def _noise_motion(fit: Fit, record: Record, motion: Motion, place: int, draw: int) -> tuple[Array, ...]:
     """Give displacement, velocity and acceleration of simulated noise of the output alone.
 
     Its density is that by which the fit weighs the samples.
     """
-    values = noise.white * np.random.default_rng(seed).standard_normal(record.output.size)
-    values = np.asarray(lfilter([1.0], [1.0, *noise.whitening], values))
+    white = np.random.default_rng((place, draw)).standard_normal(record.output.size)
+    values = np.asarray(lfilter([1.0], [1.0, *fit.noise.whitening], fit.noise.whites[place] * white))
     alone = dataclasses.replace(record, output=values)
     band = motion.band
-    stray = measured_state(alone, campaign.output.quantity, band.lowest, band.highest)
+    stray = measured_state(alone, fit.campaign.output.quantity, band.lowest, band.highest)
     return tuple(jnp.asarray(values) for values in stray)

@@ -2,8 +2,8 @@
 
 In: a `Campaign`. Out: the rms and colour of its output noise, and what the reader must know of the
 data: dwells that never settled, brief blows, differences between repeats, a resonance peak in the scatter,
-spikes. Read `_noise.py` first, then `_colour.py` and `_repeats.py`; `_noise_peak.py`, `_spike_counts.py`,
-`_clipped_share.py` and `_health.py` after them.
+spikes. Read `_noise.py` first, then `_scatter.py`, `_levels.py`, `_colour.py`, `_spectral_noise.py` and
+`_repeats.py`; `_noise_peak.py`, `_spike_counts.py`, `_clipped_share.py` and `_health.py` after them.
 """
 
 from ._clipped_share import clipped_share as clipped_share

@@ -44,6 +44,10 @@ class Piece(NamedTuple):
         """Degrees of freedom of the mean square."""
         return self.kept * self.rest.signal.size - self.rest.taken.size
 
+    def scaled(self, scale: float) -> "Piece":
+        """Gives the same noise, so many times as large."""
+        return self._replace(rest=self.rest._replace(signal=scale * self.rest.signal))
+
 
 @shown
 class Colour(NamedTuple):

@@ -2,47 +2,52 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
-import scipy
-from jaxtyping import Bool, Float
 
 from ..._show import number, shown
-from .._blow import ring_down
 from .._campaign import Campaign
-from .._record import Dwell, Record
-from ..spectrum import NoiseBand, Rest, dwell_rest, dwell_window, hum_lines, spectral_floor
-from ._colour import Colour, Piece, noise_colour, whitened_square
-from ._repeats import repeat_difference, repeat_groups
+from .._record import Record, Role
+from ..spectrum import NoiseBand
+from ._colour import Colour, noise_colour
+from ._levels import differ, record_levels, words_of_levels
+from ._repeats import repeat_groups
+from ._scatter import Scatter, cycle_scatter, innovation_scatter, period_scatter, settled_pieces
+from ._spectral_noise import high_frequency_floor, repeat_scatter
 
 NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency"]
-_SETTLED_QUANTILE = 0.25
-"""Quantile of the dwells' scatters that is taken for noise: up to three quarters of them may be unsettled."""
 
-_FEWEST_DWELLS = 4
-"""Dwells without which the median is taken instead."""
-
-_UNSETTLED = 1e-3
-"""Chance that a settled dwell scatters so much that it is left out."""
-
-_TRANSIENT = 1.2
-"""The first period is left out where it raises the scatter of the others by this factor."""
-
-_FLOOR_SPANS = ((0.35, 0.5), (0.5, 0.65), (0.65, 0.8), (0.8, 0.95))
-"""Sections of the noise band, as shares of it, whose spectral floors are compared."""
-
-_WHOLE_SPAN = (0.4, 0.95)
-"""The section for a record that is too short for these."""
-
-_EQUAL_FLOORS = 3.0
-"""Standard errors within which two floors count as equal."""
+_BETTER: tuple[NoiseMethod, ...] = ("cycle_scatter", "periods", "repeats")
+"""Methods that show the noise itself. The floor of a spectrum may be response."""
 
 _SELECTIONS = 3
 """Times that the settled dwells are chosen anew with the colour that the last choice showed."""
 
 _TRIMMED = 6
 """From so many records on, the pooled noise comes from the inner half: one bad record does not count."""
+
+
+class _Seen(NamedTuple):
+    """What one record shows of the noise.
+
+    Attributes:
+        record: The record.
+        counts: Whether it may weigh the others: a held-out record may not.
+        sigma: rms; NaN where it shows nothing.
+        method: How it was estimated.
+        scatter: Where noise alone shows, its mean square with degrees of freedom; else None.
+    """
+
+    record: Record
+    counts: bool
+    sigma: float
+    method: NoiseMethod
+    scatter: Scatter | None = None
+
+    def shows(self, *methods: NoiseMethod) -> bool:
+        """Whether it shows the noise by one of these methods."""
+        return bool(np.isfinite(self.sigma)) and self.method in methods
 
 
 @shown
@@ -57,6 +62,7 @@ class NoiseEstimate:
         methods: The method of each record.
         bandwidth_hz: Frequency up to which the noise reaches [Hz]: half the rate, or the [filter]'s cut-off.
         note: What the reader must know, or "".
+        levels: rms by which each record weighs: its own where records differ significantly, else `sigma`.
         share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
             independent. Of coloured noise it is `Colour.share`.
         colour: The law of coloured noise; None where the noise is not significantly coloured.
@@ -68,6 +74,7 @@ class NoiseEstimate:
     methods: tuple[NoiseMethod, ...]
     bandwidth_hz: float
     note: str = ""
+    levels: tuple[float, ...] = ()
     share: float = 1.0
     colour: Colour | None = None
 
@@ -82,6 +89,17 @@ class NoiseEstimate:
         return self.sigma / float(np.sqrt(self.share)) if self.colour is None else self.colour.level
 
     @property
+    def whites(self) -> tuple[float, ...]:
+        """`white` of each record, by its level."""
+        return tuple(level / self.sigma * self.white for level in self.levels)
+
+    @property
+    def range_words(self) -> str:
+        """How much the records differ, such as "0.003 to 0.009 by record"; "" where they do not."""
+        low, high = min(self.levels, default=0.0), max(self.levels, default=0.0)
+        return "" if low == high else f"{number(low)} to {number(high)} by record"
+
+    @property
     def whitening(self) -> tuple[float, ...]:
         """The coefficients of the filter that weighs the samples of coloured noise, see `Colour`."""
         return () if self.colour is None else self.colour.whitening
@@ -93,7 +111,7 @@ class NoiseEstimate:
 
     def _headline(self) -> str:
         known = f"{number(self.sigma)} rms up to {number(self.bandwidth_hz)} Hz"
-        return f"{known}, from {self.method.replace('_', ' ')}"
+        return ", ".join(filter(None, (f"{known}, from {self.method.replace('_', ' ')}", self.range_words)))
 
 
 def estimate_noise(campaign: Campaign) -> NoiseEstimate:
@@ -109,6 +127,11 @@ def estimate_noise(campaign: Campaign) -> NoiseEstimate:
     Settled dwells and periods also show the spectrum of the noise. Where it is significantly coloured, the
     estimate holds its law and the filter that weighs the samples. Declared noise and noise behind a [filter]
     count as white inside their band; repeats and the floor of a spectrum show no colour.
+
+    Where the scatter of dwells or periods differs from record to record by more than chance (Bartlett's test
+    at 0.001), each record weighs with its own, else all weigh with the pooled one. Coloured noise has one
+    law, and a level in each record. Held-out records change nothing of the others; such a record weighs with
+    its own noise where that differs from theirs.
 
     Args:
         campaign: The campaign.
@@ -135,81 +158,74 @@ def _estimate(campaign: Campaign) -> NoiseEstimate:
         declared *= float(np.sqrt(band.share / band.as_filed.share))
         methods: tuple[NoiseMethod, ...] = ("declared",) * len(records)
         each = (declared,) * len(records)
-        return NoiseEstimate(declared, "declared", each, methods, band.highest, note, band.share)
-    found = _estimate_each(records, band)
-    seen: list[NoiseMethod] = [
-        method for value, method in found if np.isfinite(value) and method != "high_frequency"
-    ]
-    common: NoiseMethod = max(dict.fromkeys(seen), key=seen.count) if seen else "high_frequency"
-    sigma = _pool([value for value, method in found if method == common and np.isfinite(value)])
-    # All records share one channel: a spectral floor does not count where other records show the noise
-    # itself.
-    kept = [np.isfinite(value) and method in (*seen, common) for value, method in found]
-    colour = None
+        return NoiseEstimate(declared, "declared", each, methods, band.highest, note, each, band.share)
+    found = _estimate_each(records, "fit" if campaign.fit_records else "holdout", band)
+    better: list[NoiseMethod] = [one.method for one in found if one.counts and one.shows(*_BETTER)]
+    common: NoiseMethod = max(dict.fromkeys(better), key=better.count) if better else "high_frequency"
+    sigma = _pool([one.sigma for one in found if one.counts and one.shows(common)])
+    colour, scatters = None, [one.scatter for one in found]
     if campaign.filter is None:
-        chosen = [record for record, (_, method) in zip(records, found, strict=True) if method == common]
-        colour = _common_colour(chosen, common, band)
+        colour, scatters = _coloured(found, common, sigma, band)
     if colour is not None:
         sigma, note = colour.sigma, _words_of(colour)
+    levels = record_levels(sigma, scatters, [one.counts for one in found])
+    # All records share one channel: a spectral floor does not count where other records show the noise
+    # itself.
+    kept = [one.shows(common, *_BETTER) for one in found]
     return NoiseEstimate(
         sigma=sigma,
         method=common,
-        per_record=tuple(value if keep else sigma for (value, _), keep in zip(found, kept, strict=True)),
-        methods=tuple(method if keep else common for (_, method), keep in zip(found, kept, strict=True)),
+        per_record=tuple(one.sigma if keep else sigma for one, keep in zip(found, kept, strict=True)),
+        methods=tuple(one.method if keep else common for one, keep in zip(found, kept, strict=True)),
         bandwidth_hz=band.highest,
-        note=note,
+        note="; ".join(filter(None, (note, words_of_levels(records, levels)))),
+        levels=levels,
         share=band.share if colour is None else colour.share,
         colour=colour,
     )
 
 
-def _common_colour(records: list[Record], method: NoiseMethod, band: NoiseBand) -> Colour | None:
-    """Gives the autoregressive law of the noise that records show; None where it is white or unknown."""
-    if method == "periods":
-        periods = [_settled_periods(record) for record in records]
-        return noise_colour(
-            [
-                Piece(Rest(row, np.zeros(0), np.zeros(row.size // 2 + 1)), 1.0 - 1.0 / len(rows))
-                for rows in periods
-                for row in rows - np.mean(rows, axis=0)
-            ],
-            band.rate,
-        )
-    if method != "cycle_scatter":
-        return None
-    pieces = [
-        [piece for dwell in record.dwells if (piece := _dwell_piece(record, dwell))] for record in records
-    ]
-    colour: Colour | None = None
-    # Which dwells have settled is judged by white innovations: the scatter of coloured noise itself varies
-    # more, and with the frequency of the dwell.
-    for _ in range(_SELECTIONS):
-        settled = []
-        for own in pieces:
-            scatters = np.array([_piece_scatter(piece, colour) for piece in own]).reshape(-1, 2)
-            if scatters.size:
-                kept = _settled_level(*scatters.T)[1]
-                settled += [piece for piece, keep in zip(own, kept, strict=True) if keep]
-        colour = noise_colour(settled, band.rate)
-        if colour is None:
+def _coloured(
+    found: list[_Seen], common: NoiseMethod, sigma: float, band: NoiseBand
+) -> tuple[Colour | None, list[Scatter | None]]:
+    """Gives the law of coloured noise, one for all records, and the scatter of each record by it."""
+    law = _common_colour(found, [1.0] * len(found), common, band)
+    scatters = _scatters(found, law)
+    if differ([own for one, own in zip(found, scatters, strict=True) if one.counts and own]):
+        # The loudest record must not set the law.
+        scales = [sigma / float(np.sqrt(own.square)) if own else 1.0 for own in scatters]
+        law = _common_colour(found, scales, common, band)
+        scatters = _scatters(found, law)
+    return law, scatters
+
+
+def _scatters(found: list[_Seen], law: Colour | None) -> list[Scatter | None]:
+    """Gives the scatter of each record; where the noise is coloured, by that of its innovations."""
+    if law is None:
+        return [one.scatter for one in found]
+    scale = (law.sigma / law.innovation) ** 2
+    innovations = [one.scatter and innovation_scatter(one.record, one.method, law) for one in found]
+    return [own and own._replace(square=scale * own.square) for own in innovations]
+
+
+def _common_colour(
+    found: list[_Seen], scales: list[float], common: NoiseMethod, band: NoiseBand
+) -> Colour | None:
+    """Gives the autoregressive law of the noise, each record times its scale; None where it is white, or
+    where the records do not show its spectrum.
+    """
+    law: Colour | None = None
+    for _ in range(_SELECTIONS if common == "cycle_scatter" else 1):
+        pieces = [
+            piece.scaled(scale)
+            for one, scale in zip(found, scales, strict=True)
+            if one.counts and one.shows(common)
+            for piece in settled_pieces(one.record, common, law)
+        ]
+        law = noise_colour(pieces, band.rate)
+        if law is None:
             return None
-    return colour
-
-
-def _dwell_piece(record: Record, dwell: Dwell) -> Piece | None:
-    """Gives what the end of a dwell leaves; None if it is too short."""
-    window = dwell_window(record, dwell)
-    if window is None:
-        return None
-    piece = Piece(dwell_rest(record, dwell, window, tuple(line.frequency for line in hum_lines(record))))
-    return None if piece.freedom < piece.rest.taken.size else piece
-
-
-def _piece_scatter(piece: Piece, colour: Colour | None) -> tuple[float, float]:
-    """Gives mean square and degrees of freedom of a window's noise, or of its innovations."""
-    if colour is not None:
-        return whitened_square(piece, colour)
-    return float(piece.rest.signal @ piece.rest.signal) / piece.freedom, piece.freedom
+    return law
 
 
 def _words_of(colour: Colour) -> str:
@@ -220,159 +236,31 @@ def _words_of(colour: Colour) -> str:
     )
 
 
-def _estimate_each(records: tuple[Record, ...], band: NoiseBand) -> list[tuple[float, NoiseMethod]]:
+def _estimate_each(records: tuple[Record, ...], weighing: Role, band: NoiseBand) -> list[_Seen]:
+    """Gives what each record shows of the noise; those of one role may weigh the others."""
     partners = repeat_groups(records)
-    found = []
-    for record in records:
-        group = [one for one in partners.get(record.name, ()) if one.kind != "stepped_sine"]
-        tries: list[tuple[NoiseMethod, Callable[[], float]]] = [
-            ("cycle_scatter", lambda record=record: cycle_scatter(record, band)),
-            ("periods", lambda record=record: period_scatter(record)),
-            ("repeats", lambda record=record, group=group: _repeat_scatter(record, group, band)),
-        ]
-        if record.floor is not None:
-            # A measured floor also causes scatter from cycle to cycle, but a model can explain that: no
-            # noise.
-            tries = []
-        for method, estimate in tries:
-            value = estimate()
-            if np.isfinite(value):
-                found.append((value, method))
-                break
-        else:
-            found.append((high_frequency_floor(record, band), "high_frequency"))
-    return found
+    scatters: tuple[tuple[NoiseMethod, Callable[[Record, NoiseBand], Scatter | None]], ...] = (
+        ("cycle_scatter", cycle_scatter),
+        ("periods", period_scatter),
+    )
 
+    def seen(record: Record) -> _Seen:
+        counts = record.role == weighing
+        if record.floor is None:
+            for method, scatter_of in scatters:
+                scatter = scatter_of(record, band)
+                if scatter is not None:
+                    return _Seen(record, counts, float(np.sqrt(scatter.square)), method, scatter)
+            group = [
+                one for one in partners[record.name] if one.kind != "stepped_sine" and one.role == weighing
+            ]
+            sigma = repeat_scatter(record, group, band)
+            if np.isfinite(sigma):
+                return _Seen(record, counts, sigma, "repeats")
+        # A measured floor also causes scatter from cycle to cycle, but a model can explain that: no noise.
+        return _Seen(record, counts, high_frequency_floor(record, band), "high_frequency")
 
-def cycle_scatter(record: Record, band: NoiseBand) -> float:
-    """Gives the rms about the harmonics of the last quarter of each dwell, at least four cycles; NaN if none
-    is long.
-
-    Up to 120 harmonics below 0.45 of the rate are removed, also beyond a filter's cut-off, where they can
-    exceed the noise; the fundamental may drift linearly. Significant lines of the mains are removed as well:
-    a model can explain them. Dwells that never settle, near a fold or in modulation, are left out: those
-    whose scatter exceeds the level of the lower quartile by more than chance (1e-3, chi-square) allows.
-
-    Args:
-        record: The record.
-        band: The band that the noise fills.
-
-    Returns:
-        rms per sample in the output's unit.
-    """
-    found = [dwell_scatter(record, dwell, band) for dwell in record.dwells]
-    scatters = np.array([one for one in found if one is not None]).reshape(-1, 2)
-    if not scatters.size:
-        return float("nan")
-    return float(np.sqrt(_settled_level(*scatters.T)[0]))
-
-
-def _settled_level(
-    squares: Float[np.ndarray, " dwell"], freedom: Float[np.ndarray, " dwell"]
-) -> tuple[float, Bool[np.ndarray, " dwell"]]:
-    """Gives the mean square of the dwells that have settled, and which ones have."""
-    quantile = _SETTLED_QUANTILE if squares.size >= _FEWEST_DWELLS else 0.5
-    level = np.quantile(squares * freedom / scipy.stats.chi2.ppf(quantile, freedom), quantile)
-    limit = scipy.stats.chi2.isf(_UNSETTLED, freedom)
-    for _ in range(3):
-        settled = squares * freedom <= level * limit
-        level = np.average(squares[settled], weights=freedom[settled]) if np.any(settled) else level
-    return float(level), squares * freedom <= level * limit
-
-
-def dwell_scatter(record: Record, dwell: Dwell, band: NoiseBand) -> tuple[float, float] | None:
-    """Gives mean square about the harmonics of a dwell's end and its degrees of freedom; None if it is too
-    short.
-    """
-    window = dwell_window(record, dwell)
-    if window is None:
-        return None
-    lines = tuple(line.frequency for line in hum_lines(record))
-    rest, frequencies, _ = dwell_rest(record, dwell, window, lines)
-    taken = float(np.sum(band.power_gain(frequencies)))
-    # Noise of a narrow band has fewer degrees of freedom than samples, and the harmonics use some of them.
-    freedom = window * band.share - taken
-    if freedom < taken:
-        return None
-    return float(rest @ rest) * band.share / freedom, float(freedom)
-
-
-def period_scatter(record: Record) -> float:
-    """Gives the rms of what does not repeat from period to period; NaN without two periods.
-
-    Only whole periods after the settle samples count. With three and more the first ones are left out as long
-    as they scatter clearly more than the others (a transient).
-    """
-    periods = _settled_periods(record)
-    return float(np.sqrt(_variance_of_periods(periods))) if len(periods) else float("nan")
-
-
-def _settled_periods(record: Record) -> Float[np.ndarray, "period time"]:
-    """Gives the periods that count; none without two."""
-    periods = record.periods
-    if len(periods) < 2:
-        return periods[:0]
-    squares = [_variance_of_periods(periods[first:]) for first in range(max(1, len(periods) - 1))]
-    chosen = len(squares) - 1
-    for first in range(len(squares) - 1, -1, -1):
-        chosen = first if squares[first] < _TRANSIENT * squares[chosen] else chosen
-    return periods[chosen:]
-
-
-def high_frequency_floor(record: Record, band: NoiseBand) -> float:
-    """Gives the rms of noise that has the density of the spectrum's quietest upper section.
-
-    The smallest of four estimates is biased low, so the sections that agree with the quietest are averaged
-    with it. Where the response fills the lower sections, the quietest one remains alone and has no such bias.
-    Of a record that rings down only what follows the release or the blow counts, since the spectrum of a
-    release or a blow itself has no upper end.
-
-    Args:
-        record: The record.
-        band: The band that the noise fills.
-
-    Returns:
-        rms per sample in the output's unit.
-    """
-    output = ring_down(record)
-    whole, *spans = [(low * band.highest, high * band.highest) for low, high in (_WHOLE_SPAN, *_FLOOR_SPANS)]
-    found = [(*spectral_floor(output, band, span), span) for span in spans]
-    known = sorted(one for one in found if np.isfinite(one[0]))
-    if not known:  # a short record has too few lines for narrow sections
-        density, _ = spectral_floor(output, band, whole)
-    else:
-        density, error, quietest = known[0]
-        alike = [quietest]
-        for level, own, span in known[1:]:
-            if level <= density * (1.0 + _EQUAL_FLOORS * np.hypot(own, error)):
-                alike.append(span)
-                density, error = spectral_floor(output, band, *alike)
-    return _rms_of_density(density, band)
-
-
-def _rms_of_density(density: float, band: NoiseBand) -> float:
-    """Gives the rms per sample of noise whose white density [per Hz] is known."""
-    return float(np.sqrt(density * band.share * 0.5 * band.rate))
-
-
-def _variance_of_periods(periods: Float[np.ndarray, "period time"]) -> float:
-    rest = periods - np.mean(periods, axis=0)
-    return float(np.mean(rest**2)) * periods.shape[0] / (periods.shape[0] - 1)
-
-
-def _repeat_scatter(record: Record, group: list[Record], band: NoiseBand) -> float:
-    """Gives the rms noise of a record from the unexplained difference to its repeats; NaN without any.
-
-    The median over the band counts, because a drift changes only a minority of the lines.
-    """
-    squares = []
-    for other in group:
-        difference = repeat_difference(record, other)
-        if difference is not None:
-            density, _ = spectral_floor(difference, band, (0.0, _WHOLE_SPAN[1] * band.highest))
-            squares.append(0.5 * _rms_of_density(density, band) ** 2)
-    known = [one for one in squares if np.isfinite(one)]
-    return float(np.sqrt(np.mean(known))) if known else float("nan")
+    return [seen(record) for record in records]
 
 
 def _pool(values: list[float]) -> float:

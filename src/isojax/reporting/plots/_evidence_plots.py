@@ -130,7 +130,15 @@ def plot_errors(
 def _noise_share(fit: Fit, role: str) -> float:
     """Give the NRMSE that the channel's noise alone leaves on the records of a role."""
     errors = fit.errors[role]
-    return float("nan") if errors is None else fit.noise.sigma * errors.nrmse / errors.rmse
+    if errors is None:
+        return float("nan")
+    own = [
+        (level**2, run.counted.sum())
+        for level, run in zip(fit.noise.levels, fit.free_runs, strict=True)
+        if run.record.role == role
+    ]
+    squares, counted = np.array(own).T
+    return float(np.sqrt(np.average(squares, weights=counted))) * errors.nrmse / errors.rmse
 
 
 @fits_meant

@@ -53,7 +53,7 @@ def plot_residual(
             values = np.convolve(values, np.ones(length) / length, mode="same")
             label = f"{label}, smoothed"
         draw_signal(ax, time, values, colour=colour, label=label, width=1.6)
-    sigma = before.noise.sigma
+    sigma = before.noise.levels[place]
     ax.axhspan(-2 * sigma, 2 * sigma, color=BAND, zorder=0, label="noise, ±2σ")
     finish_time_axes(ax, low, high, "residual", OUTPUT_UNITS[before.campaign.output.quantity])
     entitle(ax, f"residual of {chosen.name} ({ROLES[chosen.role]}), segments restarted")
@@ -110,12 +110,12 @@ def plot_where(before: Fit, after: Fit | None = None, *, ax: Axes | None = None)
     dwelling = all(run.record.dwells for run in before.restarts.runs)
     for label, fit, colour in pair(before, after):
         for role, marker in (("fit", "o"), ("holdout", "D")):
-            runs = tuple(run for run in fit.restarts.runs if run.record.role == role)
-            points = [point for run in runs for point in _sizes(run, dwelling)]
+            own = zip(fit.restarts.runs, before.noise.levels, strict=True)
+            runs = [(run, noise) for run, noise in own if run.record.role == role]
+            points = [point for run, noise in runs for point in _sizes(run, dwelling, noise)]
             if points:
-                x, rms = np.array(points).T
+                x, size = np.array(points).T
                 name = f"{label}, {ROLES[role]}"
-                size = rms / before.noise.sigma
                 ax.plot(
                     x, size, marker, color=colour, markersize=3.5, markeredgewidth=0, alpha=0.65, label=name
                 )
@@ -162,7 +162,7 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
         values = fit.restarts.runs[place].residual[dwell.start : dwell.stop]
         mean = np.bincount(part, values, minlength=_PHASE_BINS) / count
         ax.plot(degrees, mean, "o-", color=colour, markersize=3, linewidth=1.0, label=label)
-    band = 2.0 * before.noise.sigma / np.sqrt(count)
+    band = 2.0 * before.noise.levels[place] / np.sqrt(count)
     ax.fill_between(degrees, -band, band, color=BAND, zorder=0, label="noise of the mean, ±2σ")
     quantity = before.campaign.output.quantity
     ax.set_xlabel("phase in the cycle of the drive [°]")
@@ -173,8 +173,10 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
     return figure
 
 
-def _sizes(run: Run, dwelling: bool) -> list[tuple[float, float]]:
-    """Give frequency (or time in the middle) and rms residual of each dwell (or of forty windows)."""
+def _sizes(run: Run, dwelling: bool, noise: float) -> list[tuple[float, float]]:
+    """Give frequency (or time in the middle) and rms residual over the noise of each dwell (or of forty
+    windows).
+    """
     if dwelling:
         pieces = [(dwell.start, dwell.stop, dwell.frequency) for dwell in run.record.dwells]
     else:
@@ -183,7 +185,7 @@ def _sizes(run: Run, dwelling: bool) -> list[tuple[float, float]]:
         pieces = list(zip(edges[:-1], edges[1:], middle, strict=True))
     residual = run.residual
     return [
-        (float(place), float(np.sqrt(np.mean(residual[start:stop][kept] ** 2))))
+        (float(place), float(np.sqrt(np.mean(residual[start:stop][kept] ** 2)) / noise))
         for start, stop, place in pieces
         if np.any(kept := run.counted[start:stop] > 0.0)
     ]
