@@ -79,6 +79,13 @@ def test_the_band_is_that_of_a_single_orbit(paper):
     np.testing.assert_allclose(curve.standard_error["displacement"][place], np.linalg.norm(change), rtol=0.01)
 
 
+def test_the_picture_marks_both_folds_of_the_curve_that_has_them(paper):
+    (ax,) = ij.plot.response_bands(paper[1]).axes
+    marked = [line for line in ax.get_lines() if line.get_marker() not in ("None", "none", "", None)]
+    assert sum(len(np.atleast_1d(line.get_xdata())) for line in marked) >= 2
+    assert ax.get_xlabel() == "frequency [Hz]"
+
+
 def test_frequencies_that_are_none_are_refused(paper):
     with pytest.raises(ValueError, match="`frequencies` must hold two different ones"):
         ij.response_bands(paper[0], [100.0], [5.0])
