@@ -338,7 +338,7 @@ def test_an_interrupted_loop_keeps_what_it_did_and_resumes_with_the_same_result(
 def test_what_contradicts_is_fitted_anyway_and_the_doubt_stands_first(
     command, calm_loop, tmp_path, capsys, monkeypatch
 ):
-    kinds = ("lead", "error", "evidence", "remainder", "record", "force", "health")
+    kinds = ("lead", "response", "error", "evidence", "remainder", "record", "force", "health")
     without = {f"{kind}_pictures": () for kind in kinds}
     monkeypatch.setattr("isojax.reporting.page._page.draw_pictures", lambda *_: without)
     campaign, out = cut_demo(tmp_path / "campaign", dwells=4), tmp_path / "out"

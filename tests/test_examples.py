@@ -19,10 +19,8 @@ README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 SCRIPTS = re.findall(r"^## ([^\n]+)\n+```python\n(.*?)^```$", README, flags=re.MULTILINE | re.DOTALL)
 
 JOURNEY = """
-    read_campaign classical_guess fit load_fit uncertainty profile residual explain_remainder diagnose extend
-    find_separating_experiment close_loop
-    read_campaign classical_guess fit load_fit uncertainty next_test residual explain_remainder diagnose
-    extend find_separating_experiment close_loop design
+    read_campaign classical_guess fit load_fit uncertainty next_record profile next_test residual
+    explain_remainder diagnose extend find_separating_experiment close_loop design
 """.split()
 """Examples that go on with what the one before has made, so that one test runs them in a row."""
 

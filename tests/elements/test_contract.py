@@ -390,7 +390,7 @@ def test_an_orbit_of_the_isolator_with_the_effect_has_finite_multipliers(kind):
 
 def test_the_catalogue_holds_every_element_file():
     folder = Path(inspect.getfile(AbstractElement)).parent
-    contracts = {"_init__", "base", "effect", "force", "instrument", "follower"}
+    contracts = {"_init__", "element", "effect", "force", "instrument", "follower"}
     files = {path.stem[1:] for path in folder.glob("_*.py")} - contracts
     assert files == set(CATALOGUE)
 

@@ -43,7 +43,7 @@ from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT, Unkno
 from isojax.models import Integrator, Isolator, simulate
 from isojax.records import Record
 from isojax.rig._motion_equation import EquationOfMotion
-from isojax.rig._solver import Integrator as RigIntegrator
+from isojax.rig._solver import PlantIntegrator
 
 RATE = 500.0
 SPRING = (LinearStiffness(1.08e6), CubicStiffness(2.5e11), LinearDamping(1.0e4))
@@ -131,7 +131,7 @@ def _exact(model: Isolator, drive: np.ndarray, start: list[float]) -> np.ndarray
     strengths = [getattr(element, element.strength) for element in model.elements]
     plant = rig.Plant(tuple(law(float(f)) for law, f in zip(laws, strengths, strict=True)), float(model.mass))
     balance = EquationOfMotion(plant)
-    path = RigIntegrator(balance, 1e-11).run(pieces, [float(s) for s in start])
+    path = PlantIntegrator(balance, 1e-11).run(pieces, [float(s) for s in start])
     states, sides, held = path.at(times)
     found = np.asarray(balance.acceleration(times, states, drive, sides, held))
     for before, (at, _, state, _, *after) in itertools.pairwise(path._steps):

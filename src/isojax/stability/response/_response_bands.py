@@ -51,6 +51,7 @@ _POLISHING = 2
 """Steps of Newton's method from a contour between points to the contour of the splines."""
 
 
+@shown
 class CurveFold(NamedTuple):
     """A fold of a response curve: where two orbits of it meet and vanish.
 
@@ -67,6 +68,7 @@ class CurveFold(NamedTuple):
     interval: tuple[float, float]
 
 
+@shown
 class ResponseCurve(NamedTuple):
     """One piece of the response at one drive amplitude, in the order of the curve.
 
