@@ -8,9 +8,9 @@ from jaxtyping import Float
 from .._parameters import list_parameters
 from .._results import RESULTS, is_successful
 from .._show import Row, shown
-from ..identification.fitting import Fit, as_fit, scatter_of_next
+from ..identification.fitting import Fit, Fitted, as_fit, scatter_of_next
 from ..identification.jacobian import stiffness_place
-from ..models import EndsEstimated, Estimated, Isolator
+from ..models import Isolator
 
 
 @shown
@@ -47,7 +47,7 @@ class NextRecord(NamedTuple):
         ]
 
 
-def next_record(fit: Estimated | EndsEstimated, *, calibration: float = 0.0) -> NextRecord:
+def next_record(fit: Fit | Fitted, *, calibration: float = 0.0) -> NextRecord:
     """Give a fit the errors of answers about a further record.
 
     The errors of a fit are those of its coefficients, which belong to the mean of all records. A further

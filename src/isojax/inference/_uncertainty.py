@@ -112,14 +112,13 @@ def uncertainty(
     if not fits:
         raise ValueError("Argument `fit` must hold at least one fit, but the list is empty.")
     weights = _evidence(fits) if len(fits) > 1 else np.ones(1)
-    best = int(np.argmax(weights))
-    counts = np.round(weights * draws).astype(int)
+    counts = np.maximum(np.round(weights * draws), weights == weights.max()).astype(int)
     parts = [
-        _carried(coefficient_errors(one), quantity, max(1, int(count)), seed + place)
-        for place, (one, count) in enumerate(zip(fits, counts, strict=True))
-        if count or place == best
+        _carried(coefficient_errors(fits[place]), quantity, int(counts[place]), seed + int(place))
+        for place in np.argsort(-weights, kind="stable")
+        if counts[place]
     ]
-    value, error = parts[sum(bool(count) for count in counts[:best])][:2]
+    value, error, _ = parts[0]
     drawn = np.concatenate([part[2] for part in parts])
     finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
     if not finite.any():

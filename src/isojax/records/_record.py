@@ -14,8 +14,8 @@ _Answer = TypeVar("_Answer")
 
 Direction = Literal["forward", "backward", "none"]
 Role = Literal["fit", "holdout"]
-CONDITIONS = ("pressure", "temperature")
-"""Operating conditions that a record may state: fields of `Record`, and of [[record]]."""
+CONDITIONS = {"pressure": "Pa", "temperature": "K"}
+"""Operating conditions that a record may state, with their units: fields of `Record`, and of [[record]]."""
 
 ExcitationKind = Literal["stepped_sine", "periodic", "swept", "free_decay", "impulse", "broadband"]
 

@@ -8,7 +8,7 @@ from ..._progress import step
 from ..._results import is_successful
 from ...identification import ClassicalGuess, Loop, MeasuredResponse, measured_receptance
 from ...models import HALF_WIDTH, Estimated, fit_at
-from ...records import Campaign, excited_band
+from ...records import CONDITIONS, Campaign, excited_band
 from ...stability import ResponseBands, response_bands
 from ..plots import drive_unit, median_drive, quantity
 from ..words import typeset_number, typeset_with_error
@@ -140,8 +140,7 @@ def _at_conditions(fit: Estimated, campaign: Campaign) -> tuple[Estimated, tuple
         return fit, ()
     stated = [dict(record.conditions) for record in campaign.records]
     middle = {name: float(np.median([one[name] for one in stated if name in one])) for name in followed}
-    units = {"pressure": "Pa", "temperature": "K"}
-    words = " and ".join(f"{name} {quantity(value, units[name])}" for name, value in middle.items())
+    words = " and ".join(f"{name} {quantity(value, CONDITIONS[name])}" for name, value in middle.items())
     return fit_at(fit, **middle), (
         f"Coefficients follow {' and '.join(followed)}; the curves are at {words}.",
     )
@@ -154,7 +153,9 @@ def _fold_words(bands: ResponseBands) -> str:
         folds = [fold for one in bands.curves if one.amplitude == amplitude for fold in one.folds]
         if folds:
             places = [
-                typeset_with_error(one.frequency, 0.5 * (one.interval[1] - one.interval[0]), "Hz")
+                typeset_with_error(
+                    one.frequency, 0.5 * (one.interval[1] - one.interval[0]) / HALF_WIDTH, "Hz"
+                )
                 for one in sorted(folds)
             ]
             words.append(f"at {quantity(amplitude, unit)} at {' and '.join(places)}")
@@ -162,7 +163,7 @@ def _fold_words(bands: ResponseBands) -> str:
         return (
             "At these drive amplitudes the model has one steady response per frequency: no fold, so no jump."
         )
-    return f"The response jumps (folds) {'; '.join(words)}; ± is the 95 % interval."
+    return f"The response jumps (folds) {'; '.join(words)}."
 
 
 def _captions(bands: ResponseBands, measured: tuple[MeasuredResponse, ...]) -> tuple[str, str]:

@@ -18,6 +18,7 @@ from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
 from ...models import CoefficientErrors, Isolator
+from ..orbit import margin_beside_folds
 from ._sought import Sought
 from ._surface import Surface
 
@@ -181,12 +182,8 @@ class _MapOrbits:
         """Read them off."""
         self.response = np.log(np.asarray(smap.response))
         roots = np.asarray(smap.multipliers)
-        first, second = np.triu_indices(roots.shape[-1], 1)
         self.fold = np.prod(1.0 - roots, axis=-1).real
-        self.others = np.minimum(
-            np.prod(1.0 + roots, axis=-1).real,
-            np.prod(1.0 - roots[..., first] * roots[..., second], axis=-1).real,
-        )
+        self.others = margin_beside_folds(roots)
         self.stable = np.asarray(smap.spectral_radius) < 1.0
         self.force = np.broadcast_to(np.log(np.asarray(smap.amplitudes))[:, None], self.stable.shape)
 

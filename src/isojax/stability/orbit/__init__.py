@@ -13,6 +13,7 @@ from ._describing_function import response_amplitudes as response_amplitudes
 from ._describing_function import response_start as response_start
 from ._describing_function import rest_displacement as rest_displacement
 from ._floquet import Floquet as Floquet
+from ._floquet import margin_beside_folds as margin_beside_folds
 from ._floquet import modulus as modulus
 from ._floquet import multipliers as multipliers
 from ._floquet import stable_words as stable_words

@@ -101,3 +101,19 @@ def multipliers(matrix: Float[Array, "*cells state state"]) -> Complex[Array, "*
     order = jnp.argsort(-jnp.abs(values), axis=-1)
     ordered = jnp.take_along_axis(values, order, axis=-1)
     return jnp.where(finite[..., None], ordered, jnp.nan + 0j)
+
+
+def margin_beside_folds(values: Complex[np.ndarray, "*cells multiplier"]) -> Float[np.ndarray, "*cells"]:
+    """Give what vanishes where an orbit loses its stability otherwise than by a fold.
+
+    Args:
+        values: Floquet multipliers.
+
+    Returns:
+        The least of two products over the multipliers: of one plus each (a period doubling), and of one minus
+        each pair's product (a pair on the unit circle). Positive where the orbit is stable.
+    """
+    first, second = np.triu_indices(values.shape[-1], 1)
+    doubling = np.prod(1.0 + values, axis=-1).real
+    pair = np.prod(1.0 - values[..., first] * values[..., second], axis=-1).real
+    return np.minimum(doubling, pair)

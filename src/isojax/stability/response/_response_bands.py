@@ -27,7 +27,7 @@ from ...models import (
     band_around,
     coefficient_errors,
 )
-from ..orbit import ascending
+from ..orbit import ascending, margin_beside_folds
 from ._imposed_motion import ImposedMotions, impose_motions
 
 _STEPS = 64, 256
@@ -228,11 +228,7 @@ class _Surface:
     def _margins(self, motions: ImposedMotions, drive: np.ndarray) -> np.ndarray:
         """Give how far each node is from any loss of stability but a fold; negative where it is lost."""
         roots = motions.multipliers
-        first, second = np.triu_indices(roots.shape[-1], 1)
-        margin = np.minimum(
-            np.prod(1.0 + roots, axis=-1).real,
-            np.prod(1.0 - roots[..., first] * roots[..., second], axis=-1).real,
-        )
+        margin = margin_beside_folds(roots)
         rises = np.gradient(np.log(np.abs(drive)) + self.axes[1], self.axes[1], axis=1) > 0.0
         # What is unstable though neither says so, such as where two multipliers left through one point.
         left = rises & (np.max(np.abs(roots), axis=-1) >= 1.0)
