@@ -53,6 +53,14 @@ def test_the_chance_of_several_orbits_is_that_of_the_scaled_folds(smap):
         np.testing.assert_allclose(found, expected, atol=0.01)
 
 
+def test_so_it_is_where_the_lens_is_lower_than_a_row():
+    found = scaled_map(PAPER, np.linspace(140.0, 212.0, 9), [4.0, 4.2])
+    several = np.asarray(found.probability_coexisting)
+    for column, frequency in enumerate((4.0, 4.2)):
+        expected = scaled_folds(np.asarray(found.amplitudes), frequency)
+        np.testing.assert_allclose(several[:, column], expected, atol=0.01)
+
+
 def test_so_it_is_where_orbits_cannot_be_read_off_a_surface():
     # A branch of 1 N/m moves no fold, but gives the model an internal state.
     branch = ij.elements.MaxwellBranch(stiffness=1.0, time_constant=0.1)
