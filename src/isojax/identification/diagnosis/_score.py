@@ -10,9 +10,16 @@ from scipy import stats
 
 from ...elements import CATALOGUE, AbstractElement, Scales
 from ...models import Isolator
-from ..fitting import Estimate, Nuisances, Search, step_nuisances
+from ..fitting import (
+    Estimate,
+    Nuisances,
+    ScatteredScores,
+    Search,
+    scores_over_scatters,
+    step_nuisances,
+)
 from ..jacobian import effects_without_signal, line_coherence
-from ._projection import project
+from ._projection import Projection, project
 
 NULL_DRAWS = 20_000
 """Draws for a family-wise p-value."""
@@ -87,7 +94,8 @@ def score_test(
 
     With r the whitened residual, J the columns of fitted coefficients and nuisances, P = I - Q Q' and g = P
     g_j: `z = g.r / |g|`, strength `g.r / |g|^2 +- 1 / |g|`, visibility `|g| / |g_j|`, likeness `cos(g_i,
-    g_j)`.
+    g_j)`. The p-value is the mean over all scatters of the stiffness that the records allow, which the error
+    bars are summed over as well.
 
     Args:
         fitted: the estimate to test.
@@ -99,7 +107,8 @@ def score_test(
     Returns:
         The scores.
 
-    Source: Rao 1948; Davies 1977 for parameters that mean nothing under the null; Westfall & Young 1993.
+    Source: Rao 1948; Davies 1977 for parameters that mean nothing under the null; Westfall & Young 1993;
+    Bayarri & Berger 2000, J. Am. Stat. Assoc. 95:1127 (p-values averaged over what a nuisance may be).
     """
     pointless = effects_without_signal(fitted.problem.records)
     probes = tuple(probe for probe in probes if probe.name not in pointless)
@@ -112,8 +121,7 @@ def score_test(
     safe = np.where(seen, np.maximum(size, 1e-300), np.inf)
     z = score / safe
     chosen = np.array([probe.phased for probe in probes], dtype=bool)
-    lengths = [record.output.size for record in fitted.problem.records]
-    mean, deviation = chosen_phase_law(lengths)
+    mean, deviation = chosen_phase_law([record.output.size for record in fitted.problem.records])
     inflation = np.sqrt(fitted.inflation)
     z = np.where(chosen & seen, (z - mean * inflation) / deviation, z)
 
@@ -128,8 +136,8 @@ def score_test(
     order = sorted(best.values(), key=lambda column: -abs(z[column]))
     correlation = information / np.outer(safe, safe)
     either = np.array([probe.signed for probe in probes], dtype=bool)
-    sizes = np.where(either, np.abs(z), z)[order] / inflation
-    family = _family_wise(correlation[np.ix_(seen, seen)], sizes, either[seen], seed)
+    shift = np.where(chosen, mean, 0.0), np.where(chosen, deviation, 1.0)
+    family = _family_wise(_laws(fitted, traces, seen, shift), order, seen, either, seed)
     scores, steps, moved = [], [], []
     owner = fitted.simulator.prepared(traces.model, carried).record
     for column, p_value in zip(order, family, strict=True):
@@ -176,22 +184,80 @@ def chosen_phase_law(lengths: Sequence[int]) -> tuple[float, float]:
     return float(mean / math.sqrt(len(lengths))), float(np.sqrt(variance))
 
 
+class _Law(NamedTuple):
+    """Law of the scores without any effect at one scatter of the stiffness, and the scores.
+
+    Attributes:
+        weight: chance of this scatter, given the data.
+        correlation: of the scores that are seen.
+        z: scores over their standard deviations, of all probes.
+    """
+
+    weight: float
+    correlation: Float[np.ndarray, "seen seen"]
+    z: Float[np.ndarray, " score"]
+
+
+def _laws(
+    fitted: Estimate,
+    traces: Projection,
+    seen: Bool[np.ndarray, " score"],
+    shift: tuple[Float[np.ndarray, " score"], Float[np.ndarray, " score"]],
+) -> list[_Law]:
+    """Give the laws at all scatters of the stiffness that the records allow, or at the one that is known.
+
+    Args:
+        fitted: the estimate that is tested.
+        traces: of the probes beside it.
+        seen: which of them the data can show.
+        shift: mean and standard deviation of each score where there is nothing but noise.
+    """
+    inflation, reduced = fitted.inflation, traces.point.reduced
+    all_scatters = None
+    if fitted.shows_scatter:
+        all_scatters = scores_over_scatters(reduced, fitted.point.nuisances, inflation, len(fitted.places))
+    if all_scatters is None:
+        own = traces.information[None] / inflation, traces.score[None] / inflation
+        all_scatters = ScatteredScores(np.ones(1), *own)
+    laws = []
+    for weight, information, score in zip(*all_scatters, strict=True):
+        size = np.where(seen, np.sqrt(np.maximum(np.diag(information), 1e-300)), np.inf)
+        correlation = (information / np.outer(size, size))[np.ix_(seen, seen)]
+        laws.append(_Law(float(weight), correlation, (score / size - shift[0]) / shift[1]))
+    return laws
+
+
 def _family_wise(
-    correlation: Float[np.ndarray, "score score"],
-    sizes: Float[np.ndarray, " family"],
+    laws: list[_Law],
+    order: list[int],
+    seen: Bool[np.ndarray, " score"],
     either: Bool[np.ndarray, " score"],
     seed: int,
 ) -> Float[np.ndarray, " family"]:
-    """Give the chance that the largest score exceeds each size: by drawing, and by Bonferroni far out.
+    """Give the chance that the largest score exceeds each that was found: by drawing, by Bonferroni far out.
 
-    Of an effect that has but one sign only that sign counts.
+    Both are means over the laws. Of an effect that has but one sign only that sign counts.
+
+    Args:
+        laws: of the scores.
+        order: which scores are judged.
+        seen: which scores the laws are about.
+        either: which effects have either sign.
+        seed: of the draws.
     """
-    if sizes.size == 0:
-        return sizes
-    values, vectors = np.linalg.eigh(correlation)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = np.random.default_rng(seed).standard_normal((NULL_DRAWS, root.shape[0])) @ root.T
-    draws = np.where(either, np.abs(draws), draws).max(axis=1)
-    drawn = np.mean(draws[:, None] >= sizes, axis=0)
-    bound = np.minimum(1.0, (either.size + either.sum()) * stats.norm.sf(sizes))
+    if not order:
+        return np.zeros(0)
+    random = np.random.default_rng(seed)
+    share = np.round(NULL_DRAWS * np.cumsum([law.weight for law in laws])).astype(int)
+    drawn, bound = np.zeros(len(order)), np.zeros(len(order))
+    for law, count in zip(laws, np.diff(share, prepend=0), strict=True):
+        sizes = np.where(either, np.abs(law.z), law.z)[order]
+        bound += law.weight * stats.norm.sf(sizes)
+        if count:
+            values, vectors = np.linalg.eigh(law.correlation)
+            root = vectors * np.sqrt(np.maximum(values, 0.0))
+            draws = random.standard_normal((count, root.shape[0])) @ root.T
+            largest = np.where(either[seen], np.abs(draws), draws).max(axis=1)
+            drawn += np.sum(largest[:, None] >= sizes, axis=0) / NULL_DRAWS
+    bound = np.minimum(1.0, (np.sum(seen) + np.sum(either[seen])) * bound)
     return np.where(drawn > FEWEST_EXCEEDANCES / NULL_DRAWS, drawn, bound)

@@ -1,4 +1,4 @@
-"""Error bars that allow for the scatter of the stiffness being known from few records only."""
+"""Error bars and scores that allow for the scatter of the stiffness being known from few records only."""
 
 from typing import NamedTuple
 
@@ -120,6 +120,57 @@ def scatter_of_next(reduced: Reduced, nuisances: Nuisances, inflation: float) ->
         return float("nan")
     deviation = _SCATTERS[:, None]
     return float(_half_width(weight, np.zeros_like(deviation), deviation)[0]) / _WIDTH
+
+
+class ScatteredScores(NamedTuple):
+    """Scores of absent effects at each scatter of the stiffness; noise scaled to one.
+
+    Attributes:
+        weight: of each scatter, given the data without any of the effects; they add up to one.
+        information: g' g, with g the trace of an effect that the coefficients leave.
+        score: g' r, with r the whitened residual.
+    """
+
+    weight: Float[np.ndarray, " scatter"]
+    information: Float[np.ndarray, "scatter effect effect"]
+    score: Float[np.ndarray, "scatter effect"]
+
+
+def scores_over_scatters(
+    reduced: Reduced, nuisances: Nuisances, inflation: float, coefficients: int
+) -> ScatteredScores | None:
+    """Give the scores of absent effects at all scatters that the records allow.
+
+    Args:
+        reduced: equations at the solution: of the fitted coefficients, then of the effects.
+        nuisances: that the equations are about.
+        inflation: factor on the squared noise: max(1, chi2/dof).
+        coefficients: how many columns are fitted.
+
+    Returns:
+        The scores; None where the equations of the coefficients are singular at some scatter.
+    """
+    matrix = reduced.matrix
+    if not np.all(np.isfinite(matrix)):
+        return None
+    known = find_determined(matrix[:coefficients, :coefficients])
+    absent = matrix.shape[0] - 1 - coefficients
+    basis = np.asarray(block_diag(known.vectors / known.size[:, None], np.eye(absent)))
+    whole, logarithm = _scattered(_with_scales(reduced, nuisances, basis, inflation), _SCATTERS)
+    count = known.vectors.shape[1]
+    base, cross = whole[:, :count, :count], whole[:, :count, count:]
+    try:
+        left = whole[:, count:, count:] - np.swapaxes(cross, 1, 2) @ np.linalg.solve(base, cross)
+    except np.linalg.LinAlgError:
+        return None
+    weight = _weights(logarithm - 0.5 * (left[:, -1, -1] + np.linalg.slogdet(base)[1]))
+    return ScatteredScores(weight, left[:, :-1, :-1], left[:, :-1, -1])
+
+
+def _weights(logarithm: Float[np.ndarray, " scatter"]) -> Float[np.ndarray, " scatter"]:
+    """Give weights that add up to one from their logarithms."""
+    weight = np.exp(logarithm - logarithm.max())
+    return weight / weight.sum()
 
 
 def expect_uncertainty(
@@ -256,9 +307,8 @@ def _at(records: _Records, scatters: Float[np.ndarray, " scatter"]) -> _Mixture:
     covariance = np.linalg.inv(whole[:, :-1, :-1])
     step = np.einsum("tij,tj->ti", covariance, score)
     chi2 = whole[:, -1, -1] - np.sum(step * score, axis=1)
-    logarithm = logarithm - 0.5 * (chi2 + np.linalg.slogdet(whole[:, :-1, :-1])[1])
-    weight = np.exp(logarithm - logarithm.max())
-    return _Mixture(weight / weight.sum(), step, covariance)
+    weight = _weights(logarithm - 0.5 * (chi2 + np.linalg.slogdet(whole[:, :-1, :-1])[1]))
+    return _Mixture(weight, step, covariance)
 
 
 def log_likelihood(
