@@ -46,7 +46,6 @@ from _trial_run import crowded
 from blind_trial import commit, read
 from isojax import rig
 from isojax.identification import close_loop, read_campaign
-from isojax.identification.fitting import drive_noise
 from isojax.records import data_health
 
 Row = dict[str, Any]
@@ -178,7 +177,7 @@ def run_one(seed: int, flaw: str) -> Row:
                 or health.noise_peak
                 or health.unsettled
                 or health.brief_blows
-                or drive_noise(loop.after)
+                or held.noise.method == "residual"
                 or held.noise.range_words
             ),
             "off": {

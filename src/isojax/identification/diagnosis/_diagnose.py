@@ -15,9 +15,7 @@ from ..fitting import (
     Search,
     as_fit,
     complete,
-    drive_noise,
     lack_of_fit,
-    plain_unit,
     search_of,
 )
 from ._bounds import upper_bounds
@@ -38,10 +36,10 @@ def is_good(fit: Fit, rules: Rules) -> bool:
         rules: when that is so.
 
     Returns:
-        Whether chi2/dof is near one and what is left is no more locked to the drive than noise and the
-        declared error of the response are.
+        Whether chi2/dof is near one, by the noise that the output and the drive channel show, and what is
+        left is no more locked to the drive than noise and the declared error of the response are.
     """
-    return _ratio(fit) <= rules.good and not is_locked(fit, rules)
+    return _ratio(fit) * max(1.0, fit.noise.excess) <= rules.good and not is_locked(fit, rules)
 
 
 def is_locked(fit: Fit, rules: Rules) -> bool:
@@ -152,24 +150,11 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if not good and not is_locked(case.fit, rules):
-        words = _words_of_noise(case.fit, rules)
-    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
-
-
-def _words_of_noise(fit: Fit, rules: Rules) -> str:
-    """Word what exceeds the noise without coming back with the drive."""
-    seen = drive_noise(fit, rules)
-    if seen is None:
-        return (
+        words = (
             "What exceeds the noise is not locked to the drive: the noise is larger than it was measured, or "
             "something drifts, modulates or disturbs; "
         )
-    drive, output = (plain_unit(f"SI unit of the {one}", fit.campaign) for one in ("input", "output"))
-    return (
-        f"The drive channel carries noise of {seen.drive:.3g} {drive} rms. The simulation brings it into the "
-        f"residual, whose noise is {seen.residual:.3g} {output} rms where the output has {seen.output:.3g}. "
-        f"This explains chi2/dof {fit.stats.chi2 / fit.stats.dof:.3g}; "
-    )
+    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
 
 
 def _too_little(best: Refit, gain: float, case: Case) -> str:

@@ -1,7 +1,6 @@
 """Coefficients, error bars and errors of a model, straight from time histories.
 
-In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget` and
-`drive_noise` describe it.
+In: a start model and a campaign. Out: a `Fit`; `residual` and `drift_budget` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
 What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture` and `_fit_result`.
@@ -17,8 +16,6 @@ from ._covariance import invert_information as invert_information
 from ._drift_budget import DriftBudget as DriftBudget
 from ._drift_budget import Share as Share
 from ._drift_budget import drift_budget as drift_budget
-from ._drive_noise import DriveNoise as DriveNoise
-from ._drive_noise import drive_noise as drive_noise
 from ._elimination import Nuisances as Nuisances
 from ._elimination import Spread as Spread
 from ._elimination import step_nuisances as step_nuisances

@@ -120,20 +120,33 @@ def restart_records(
     """
     problem = simulator.problem
     point = best_nuisances(simulator, model, spread, known, places)
-    simulated = [np.full(record.output.size, np.nan) for record in problem.records]
-    counted = [np.zeros(record.output.size) for record in problem.records]
     deviations = [
         np.full(record.output.size, own)
         for record, own in zip(problem.records, stiffness_deviation(point.nuisances), strict=True)
     ]
-    lanes = _simulate_lanes(simulator, model, point.nuisances)
-    beside = STIFFNESS_SCALE_UNIT * point.nuisances.segments[: len(lanes)]
-    for part, values, more in zip(problem.segments, lanes, beside, strict=True):
+    for part, more in zip(problem.segments, point.nuisances.segments, strict=False):
+        deviations[part.record][part.start : part.stop] += STIFFNESS_SCALE_UNIT * more
+    return Restarts(restarted_runs(simulator, model, point.nuisances), point, tuple(deviations))
+
+
+def restarted_runs(simulator: Simulator, model: Isolator, nuisances: Nuisances) -> tuple[Run, ...]:
+    """Simulate every record, each segment from its best initial state.
+
+    Args:
+        simulator: the records.
+        model: the isolator.
+        nuisances: that belong to it.
+
+    Returns:
+        The records against their simulations, segments joined.
+    """
+    problem = simulator.problem
+    simulated = [np.full(record.output.size, np.nan) for record in problem.records]
+    counted = [np.zeros(record.output.size) for record in problem.records]
+    for part, values in zip(problem.segments, _simulate_lanes(simulator, model, nuisances), strict=True):
         simulated[part.record][part.start : part.stop] = values
         counted[part.record][part.counted : part.stop] = 1.0
-        deviations[part.record][part.start : part.stop] += more
-    runs = tuple(Run(*entry) for entry in zip(problem.records, simulated, counted, strict=True))
-    return Restarts(runs, point, tuple(deviations))
+    return tuple(Run(*entry) for entry in zip(problem.records, simulated, counted, strict=True))
 
 
 def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._parameters import element_names, list_parameters, replace_parameters
 from ..._progress import silent
-from ..._results import RESULTS
+from ..._results import RESULTS, is_successful
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator, check_integrator
 from ...records import Campaign, NoiseEstimate, estimate_noise, refuse_contradictions
@@ -20,6 +20,7 @@ from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
 from ._fit_result import Fit
 from ._integration_steps import find_integrator
+from ._noise_left import noise_left
 from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, search_of
 from ._simulator import Simulator
@@ -109,6 +110,12 @@ def fit(
         progress("the simulation from the start values diverges: again from their linear part")
         again = fit_from(_linear_part(model, places))
         found = found if again.result == RESULTS.not_finite else again
+    left = noise_left(found, campaign, noise, rules)
+    if left is not None:
+        progress("what the fit leaves is coloured noise: again, weighted by its spectrum")
+        again = estimate(simulator_for(found.model, campaign, left, integrator), found.model, places, search)
+        if is_successful(again.result):
+            return complete(again._replace(steps=found.steps + again.steps), model, campaign, left)
     return complete(found, model, campaign, noise)
 
 

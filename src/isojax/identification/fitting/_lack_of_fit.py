@@ -73,6 +73,17 @@ def lack_of_fit(fit: Fit) -> LackOfFit:
     return locked_power(runs, len(fit.free), fit.campaign.output.relative_error)
 
 
+def shows_noise(record: Record) -> bool:
+    """Say whether noise and what repeats with the drive are told apart in a record: not in a free decay.
+
+    Args:
+        record: the record.
+    """
+    if record.period is not None and not record.dwells:
+        return record.output.size - record.settle >= 2 * record.period
+    return next(_whole_cycles(record), None) is not None
+
+
 def locked_power(runs: Iterable[Run], coefficients: int, tolerance: float) -> LackOfFit:
     """Test records against their simulation, as `lack_of_fit` does.
 

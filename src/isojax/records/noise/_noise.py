@@ -5,18 +5,19 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from ..._show import number, shown
 from .._campaign import Campaign
 from .._record import Record, Role
 from ..spectrum import NoiseBand
-from ._colour import Colour, noise_colour
+from ._colour import Colour, Piece, noise_colour
 from ._levels import differ, record_levels, words_of_levels
 from ._repeats import repeat_groups
 from ._scatter import Scatter, cycle_scatter, innovation_scatter, period_scatter, settled_pieces
 from ._spectral_noise import high_frequency_floor, repeat_scatter
 
-NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency"]
+NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_frequency", "residual"]
 
 _BETTER: tuple[NoiseMethod, ...] = ("cycle_scatter", "periods", "repeats")
 """Methods that show the noise itself. The floor of a spectrum may be response."""
@@ -66,6 +67,8 @@ class NoiseEstimate:
         share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
             independent. Of coloured noise it is `Colour.share`.
         colour: The law of coloured noise; None where the noise is not significantly coloured.
+        excess: Mean square of what a good fit leaves, over that of the noise which the output and the drive
+            channel show by themselves: above 1 something else disturbs. 1 where the residual was not asked.
     """
 
     sigma: float
@@ -77,6 +80,7 @@ class NoiseEstimate:
     levels: tuple[float, ...] = ()
     share: float = 1.0
     colour: Colour | None = None
+    excess: float = 1.0
 
     @property
     def white(self) -> float:
@@ -159,15 +163,17 @@ def _estimate(campaign: Campaign) -> NoiseEstimate:
         methods: tuple[NoiseMethod, ...] = ("declared",) * len(records)
         each = (declared,) * len(records)
         return NoiseEstimate(declared, "declared", each, methods, band.highest, note, each, band.share)
-    found = _estimate_each(records, "fit" if campaign.fit_records else "holdout", band)
+    found = _estimate_each(records, _weighing(campaign), band)
     better: list[NoiseMethod] = [one.method for one in found if one.counts and one.shows(*_BETTER)]
     common: NoiseMethod = max(dict.fromkeys(better), key=better.count) if better else "high_frequency"
     sigma = _pool([one.sigma for one in found if one.counts and one.shows(common)])
     colour, scatters = None, [one.scatter for one in found]
     if campaign.filter is None:
-        colour, scatters = _coloured(found, common, sigma, band)
+        shown = [one.counts and one.shows(common) for one in found]
+        colour, innovations = coloured(lambda law: _pieces(found, law), shown, sigma, band)
+        scatters = innovations or scatters
     if colour is not None:
-        sigma, note = colour.sigma, _words_of(colour)
+        sigma, note = colour.sigma, words_of_colour(colour)
     levels = record_levels(sigma, scatters, [one.counts for one in found])
     # All records share one channel: a spectral floor does not count where other records show the noise
     # itself.
@@ -185,54 +191,87 @@ def _estimate(campaign: Campaign) -> NoiseEstimate:
     )
 
 
-def _coloured(
-    found: list[_Seen], common: NoiseMethod, sigma: float, band: NoiseBand
+def _pieces(found: list[_Seen], law: Colour | None) -> list[list[Piece]]:
+    """Gives the windows of each record that hold noise alone, as a law shows them."""
+    return [settled_pieces(one.record, one.method, law) if one.scatter else [] for one in found]
+
+
+def coloured(
+    pieces_of: Callable[[Colour | None], list[list[Piece]]], counts: list[bool], sigma: float, band: NoiseBand
 ) -> tuple[Colour | None, list[Scatter | None]]:
-    """Gives the law of coloured noise, one for all records, and the scatter of each record by it."""
-    law = _common_colour(found, [1.0] * len(found), common, band)
-    scatters = _scatters(found, law)
-    if differ([own for one, own in zip(found, scatters, strict=True) if one.counts and own]):
+    """Gives the law of coloured noise, one for all records, and the scatter of each record by it.
+
+    Args:
+        pieces_of: The windows of each record that hold noise alone, as a law shows them; which windows these
+            are may depend on it.
+        counts: Which records set the law.
+        sigma: Pooled rms.
+        band: The band that the noise fills.
+
+    Returns:
+        The law, None where it is white or no record shows it; the scatters, None of a record that shows none.
+    """
+    law = _common_colour(pieces_of, counts, np.ones(len(counts)), band)
+    if law is None:
+        return None, []
+    scatters = _innovations(pieces_of(law), law)
+    if differ([own for own, counted in zip(scatters, counts, strict=True) if counted and own]):
         # The loudest record must not set the law.
-        scales = [sigma / float(np.sqrt(own.square)) if own else 1.0 for own in scatters]
-        law = _common_colour(found, scales, common, band)
-        scatters = _scatters(found, law)
+        scales = np.array([sigma / np.sqrt(own.square) if own else 1.0 for own in scatters])
+        law = _common_colour(pieces_of, counts, scales, band)
+        scatters = [] if law is None else _innovations(pieces_of(law), law)
     return law, scatters
 
 
-def _scatters(found: list[_Seen], law: Colour | None) -> list[Scatter | None]:
-    """Gives the scatter of each record; where the noise is coloured, by that of its innovations."""
-    if law is None:
-        return [one.scatter for one in found]
+def output_scatters(campaign: Campaign, law: Colour) -> list[Scatter | None]:
+    """Gives the scatter of each record's output, by its innovations under a law.
+
+    Args:
+        campaign: The campaign.
+        law: Of its noise.
+    """
+    found = _estimate_each(campaign.records, _weighing(campaign), NoiseBand(campaign.rate, None))
+    return _innovations(_pieces(found, law), law)
+
+
+def _weighing(campaign: Campaign) -> Role:
+    """Gives the role of the records that set the noise."""
+    return "fit" if campaign.fit_records else "holdout"
+
+
+def _innovations(pieces: list[list[Piece]], law: Colour) -> list[Scatter | None]:
+    """Gives the scatter of each record by that of its innovations."""
     scale = (law.sigma / law.innovation) ** 2
-    innovations = [one.scatter and innovation_scatter(one.record, one.method, law) for one in found]
-    return [own and own._replace(square=scale * own.square) for own in innovations]
+    found = [innovation_scatter(own, law) for own in pieces]
+    return [own and own._replace(square=scale * own.square) for own in found]
 
 
 def _common_colour(
-    found: list[_Seen], scales: list[float], common: NoiseMethod, band: NoiseBand
+    pieces_of: Callable[[Colour | None], list[list[Piece]]],
+    counts: list[bool],
+    scales: Float[np.ndarray, " record"],
+    band: NoiseBand,
 ) -> Colour | None:
     """Gives the autoregressive law of the noise, each record times its scale; None where it is white, or
     where the records do not show its spectrum.
     """
     law: Colour | None = None
-    for _ in range(_SELECTIONS if common == "cycle_scatter" else 1):
-        pieces = [
-            piece.scaled(scale)
-            for one, scale in zip(found, scales, strict=True)
-            if one.counts and one.shows(common)
-            for piece in settled_pieces(one.record, common, law)
-        ]
-        law = noise_colour(pieces, band.rate)
-        if law is None:
-            return None
+    for _ in range(_SELECTIONS):
+        each = zip(pieces_of(law), scales, counts, strict=True)
+        pieces = [piece.scaled(scale) for own, scale, counted in each if counted for piece in own]
+        found = noise_colour(pieces, band.rate)
+        if found is None or found == law:
+            return found
+        law = found
     return law
 
 
-def _words_of(colour: Colour) -> str:
-    """Gives what a reader must know of the colour of the noise."""
+def words_of_colour(colour: Colour, source: str = "") -> str:
+    """Gives what a reader must know of the colour of the noise, and of what it was seen in."""
     return (
         "the noise is coloured: its samples are correlated, and its spectrum (an autoregressive law of order "
-        f"{len(colour.law)}) weighs the residual; no band counts more than under white noise of that rms"
+        f"{len(colour.law)}{source}) weighs the residual; no band counts more than under white noise of that "
+        "rms"
     )
 
 

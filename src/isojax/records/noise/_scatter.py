@@ -137,19 +137,18 @@ def settled_pieces(record: Record, method: str, colour: Colour | None) -> list[P
     pieces = _noise_pieces(record, method)
     if not pieces:
         return []
-    settled = _settled_level(*np.array([_piece_scatter(piece, colour) for piece in pieces]).T)[1]
+    settled = _settled_level(*np.array([piece_scatter(piece, colour) for piece in pieces]).T)[1]
     return [piece for piece, kept in zip(pieces, settled, strict=True) if kept]
 
 
-def innovation_scatter(record: Record, method: str, colour: Colour) -> Scatter | None:
-    """Gives the scatter of the innovations of coloured noise; None where the record shows no noise by itself.
+def innovation_scatter(pieces: list[Piece], colour: Colour) -> Scatter | None:
+    """Gives the scatter of the innovations of coloured noise; None without windows.
 
     Args:
-        record: The record.
-        method: As of `settled_pieces`.
+        pieces: Windows that hold noise alone.
         colour: The law of the noise.
     """
-    found = [_piece_scatter(piece, colour) for piece in settled_pieces(record, method, colour)]
+    found = [piece_scatter(piece, colour) for piece in pieces]
     freedom = sum(one.freedom for one in found)
     return Scatter(sum(one.square * one.freedom for one in found) / freedom, freedom) if found else None
 
@@ -175,8 +174,8 @@ def _dwell_piece(record: Record, dwell: Dwell) -> Piece | None:
     return None if piece.freedom < piece.rest.taken.size else piece
 
 
-def _piece_scatter(piece: Piece, colour: Colour | None) -> Scatter:
-    """Gives the scatter of a window's noise, or of its innovations."""
+def piece_scatter(piece: Piece, colour: Colour | None = None) -> Scatter:
+    """Gives the scatter of a window's noise, or of its innovations where its law is known."""
     if colour is not None:
         return Scatter(*whitened_square(piece, colour))
     return Scatter(float(piece.rest.signal @ piece.rest.signal) / piece.freedom, piece.freedom)
