@@ -8,7 +8,8 @@ import pytest
 from scipy.signal import freqz, lsim, welch
 
 from isojax.elements import LinearDamping, LinearStiffness
-from isojax.identification import fit
+from isojax.identification import diagnose, fit
+from isojax.identification.fitting import drive_noise, fit_by_output
 from isojax.models import Isolator
 from isojax.records import Dwell, Record
 
@@ -63,7 +64,7 @@ def noisy_record(seed, measured, acting, period=None):
     )
 
 
-def fitted(campaign_of, records):
+def fitted(campaign_of, records, fit=fit):
     campaign = campaign_of(records, stiffness=("linear",), damping=("linear",), input={"hold": "linear"})
     return fit(Isolator(MASS, (LinearStiffness(0.97e6), LinearDamping(5e3))), campaign)
 
@@ -88,6 +89,21 @@ def test_noise_of_the_force_channel_weighs_the_residual(campaign_of, period):
     assert np.mean(density[near]) > 3.0 * np.median(density)
     assert np.mean(seen[near]) == pytest.approx(np.mean(density[near]), rel=0.2)
     assert np.median(seen) == pytest.approx(np.median(density), rel=0.1)
+
+
+@pytest.mark.parametrize("period", [None, 1250])
+def test_noise_of_the_force_channel_is_named_as_the_cause(campaign_of, period):
+    records = tuple(noisy_record(place, FORCE, 0.0, period) for place in range(2))
+    found = fitted(campaign_of, records, fit_by_output)
+    assert found.stats.chi2 / found.stats.dof > 1.2
+    seen = drive_noise(found)
+    assert seen is not None
+    assert seen.drive == pytest.approx(FORCE, rel=0.05)
+    assert seen.output == pytest.approx(SENSOR, rel=0.05)
+    if period is None:
+        verdict = diagnose(fitted(campaign_of, records))
+        assert verdict.verdict == "unexplained"
+        assert "The drive channel carries noise of" in verdict.reason
 
 
 def test_error_bars_under_noise_of_the_force_channel_hold_the_truth(campaign_of):

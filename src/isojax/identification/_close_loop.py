@@ -30,7 +30,17 @@ from .diagnosis import (
     is_good,
 )
 from .experiment import with_separating_experiment
-from .fitting import DEFAULT_SOLVER, Fit, Fitted, Search, as_fit, complete, fit, search_of
+from .fitting import (
+    DEFAULT_SOLVER,
+    Fit,
+    Fitted,
+    Search,
+    as_fit,
+    complete,
+    fit_by_output,
+    search_of,
+    weighted_by_residual,
+)
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Alternatives, Remainder, explain_remainder, find_alternatives
 
@@ -210,7 +220,7 @@ def _loop(
     progress(Stage("classical guess", _GUESS, LOOP_SHARES[1:]))
     guess = classical_guess(campaign)
     progress(Stage("fit of the declared model", _FIT, LOOP_SHARES[2:]))
-    before = fit(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
+    before = fit_by_output(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     search = search_of(campaign, rules, solver, progress)
     extensions, verdict = search_effects(before, search, max_iterations, excluded)
@@ -228,6 +238,10 @@ def _loop(
     if names and is_successful(after.result):
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
         alternatives = find_alternatives(after.estimate, names, search)
+    judged = overall_verdict(before, after, len(names), verdict, rules, alternatives)
+    if after is before:
+        # Where nothing was added there are no two fits whose errors must be comparable.
+        before = after = weighted_by_residual(before, search)
     # Asked for here, so that the time of the loop counts it.
     progress(Stage("free runs of every record", _RUNS))
     if is_successful(before.result) and is_successful(after.result):
@@ -238,7 +252,7 @@ def _loop(
         before,
         extensions,
         after,
-        overall_verdict(before, after, len(names), verdict, rules, alternatives),
+        judged,
         verdict,
         verdict.bounds,
         time.perf_counter() - start,

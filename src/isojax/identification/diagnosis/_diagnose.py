@@ -15,8 +15,11 @@ from ..fitting import (
     Search,
     as_fit,
     complete,
+    drive_noise,
     lack_of_fit,
+    plain_unit,
     search_of,
+    weighted_by_output,
 )
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
@@ -36,10 +39,10 @@ def is_good(fit: Fit, rules: Rules) -> bool:
         rules: when that is so.
 
     Returns:
-        Whether chi2/dof is near one, by the noise that the output and the drive channel show, and what is
-        left is no more locked to the drive than noise and the declared error of the response are.
+        Whether chi2/dof, by the noise that the output shows, is near one and what is left is no more locked
+        to the drive than noise and the declared error of the response are.
     """
-    return _ratio(fit) * max(1.0, fit.noise.excess) <= rules.good and not is_locked(fit, rules)
+    return max(_ratio(fit), fit.noise.excess) <= rules.good and not is_locked(fit, rules)
 
 
 def is_locked(fit: Fit, rules: Rules) -> bool:
@@ -82,7 +85,7 @@ def diagnose(
     """
     fit = as_fit(fit)
     search = search_of(fit.campaign, rules, solver, progress, max_steps)
-    return diagnose_with(search, fit, significance, excluded)
+    return diagnose_with(search, weighted_by_output(fit, search), significance, excluded)
 
 
 def diagnose_with(
@@ -95,7 +98,7 @@ def diagnose_with(
 
     Args:
         search: how to search.
-        fit: see `diagnose`.
+        fit: see `diagnose`; weighted by the noise that the output shows.
         significance: see `diagnose`.
         excluded: see `diagnose`.
 
@@ -150,11 +153,24 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if not good and not is_locked(case.fit, rules):
-        words = (
+        words = _words_of_noise(case.fit, rules)
+    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
+
+
+def _words_of_noise(fit: Fit, rules: Rules) -> str:
+    """Word what exceeds the noise without coming back with the drive."""
+    seen = drive_noise(fit, rules)
+    if seen is None:
+        return (
             "What exceeds the noise is not locked to the drive: the noise is larger than it was measured, or "
             "something drifts, modulates or disturbs; "
         )
-    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
+    drive, output = (plain_unit(f"SI unit of the {one}", fit.campaign) for one in ("input", "output"))
+    return (
+        f"The drive channel carries noise of {seen.drive:.3g} {drive} rms. The simulation brings it into the "
+        f"residual, whose noise is {seen.residual:.3g} {output} rms where the output has {seen.output:.3g}. "
+        f"This explains chi2/dof {fit.stats.chi2 / fit.stats.dof:.3g}; "
+    )
 
 
 def _too_little(best: Refit, gain: float, case: Case) -> str:

@@ -1,6 +1,7 @@
 """Coefficients, error bars and errors of a model, straight from time histories.
 
-In: a start model and a campaign. Out: a `Fit`; `residual` and `drift_budget` describe it.
+In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget` and
+`drive_noise` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
 What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture` and `_fit_result`.
@@ -16,6 +17,8 @@ from ._covariance import invert_information as invert_information
 from ._drift_budget import DriftBudget as DriftBudget
 from ._drift_budget import Share as Share
 from ._drift_budget import drift_budget as drift_budget
+from ._drive_noise import DriveNoise as DriveNoise
+from ._drive_noise import drive_noise as drive_noise
 from ._elimination import Nuisances as Nuisances
 from ._elimination import Spread as Spread
 from ._elimination import step_nuisances as step_nuisances
@@ -26,6 +29,9 @@ from ._estimate import Estimate as Estimate
 from ._estimate import estimate as estimate
 from ._fit import complete as complete
 from ._fit import fit as fit
+from ._fit import fit_by_output as fit_by_output
+from ._fit import weighted_by_output as weighted_by_output
+from ._fit import weighted_by_residual as weighted_by_residual
 from ._fit_result import Fit as Fit
 from ._fit_result import fit_report as fit_report
 from ._held_fit import fit_held as fit_held

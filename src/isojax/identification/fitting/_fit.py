@@ -22,7 +22,7 @@ from ._fit_result import Fit
 from ._integration_steps import find_integrator
 from ._noise_left import noise_left
 from ._saved_fit import Statistics
-from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, search_of
+from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
 from ._simulator import Simulator
 
 
@@ -43,7 +43,8 @@ def fit(
 
     Least squares on the measured samples, weighted by the channel's noise, with exact forward-mode
     derivatives. Dwells and windows start from states of their own, and the linear stiffness may differ from
-    record to record by as much as repeats show; both are eliminated before optimistix sees the residual.
+    record to record by as much as repeats show; both are eliminated before optimistix sees the residual. A
+    good fit whose residual shows other noise than the output does is repeated, weighted by that.
 
     Args:
         model: start, such as `classical_guess(campaign)` or its `.model`; a campaign by itself, or its path,
@@ -81,6 +82,25 @@ def fit(
         >>> fitted.parameters["k1"].unit, fitted.parameters["k1"].standard_error < 1e4
         ('N/m', True)
     """
+    found = fit_by_output(
+        model, campaign, free, fixed, solver, integrator, max_steps, progress, rules, anyway
+    )
+    return weighted_by_residual(found, search_of(found.campaign, rules, solver, progress, max_steps))
+
+
+def fit_by_output(
+    model: Isolator | Modelled | Campaign | str | Path,
+    campaign: Campaign | str | Path | None = None,
+    free: tuple[str, ...] | None = None,
+    fixed: tuple[str, ...] = (),
+    solver: Any = DEFAULT_SOLVER,
+    integrator: Integrator | None = None,
+    max_steps: int = MOST_EVALUATIONS,
+    progress: Callable[[str], None] = silent,
+    rules: Rules = Rules(),
+    anyway: bool = False,
+) -> Fit:
+    """Fit as `fit` does, weighted by the noise that the output shows; the arguments are its own."""
     check_float64()
     if campaign is None and isinstance(model, Campaign | str | Path):
         campaign = as_campaign(model)
@@ -110,13 +130,57 @@ def fit(
         progress("the simulation from the start values diverges: again from their linear part")
         again = fit_from(_linear_part(model, places))
         found = found if again.result == RESULTS.not_finite else again
-    left = noise_left(found, campaign, noise, rules)
-    if left is not None:
-        progress("what the fit leaves is coloured noise: again, weighted by its spectrum")
-        again = estimate(simulator_for(found.model, campaign, left, integrator), found.model, places, search)
-        if is_successful(again.result):
-            return complete(again._replace(steps=found.steps + again.steps), model, campaign, left)
     return complete(found, model, campaign, noise)
+
+
+def weighted_by_residual(found: Fit, search: Search) -> Fit:
+    """Fit again by the noise that a good fit leaves, where that is another than the output shows.
+
+    Args:
+        found: a fit weighted by the noise that the output shows.
+        search: how to search.
+
+    Returns:
+        The fit; `found` itself where its residual is locked to the drive or shows the same noise.
+    """
+    left = noise_left(found.estimate, found.campaign, found.noise, search.rules)
+    if left is None:
+        return found
+    search.progress("what the fit leaves is other noise than the output shows: again, weighted by that")
+    return _weighted_by(found, left, search)
+
+
+def weighted_by_output(found: Fit, search: Search) -> Fit:
+    """Undo `weighted_by_residual`: what is missing is judged by the noise that the output shows.
+
+    Args:
+        found: a fit.
+        search: how to search.
+
+    Returns:
+        The fit, weighted by the noise that the output shows.
+    """
+    if found.noise.method != "residual":
+        return found
+    return _weighted_by(found, estimate_noise(found.campaign), search)
+
+
+def _weighted_by(found: Fit, noise: NoiseEstimate, search: Search) -> Fit:
+    """Fit again by other noise; the fit itself where that fails."""
+    problem = found.estimate.problem._replace(
+        noise=_whites_fitted(noise, found.campaign), share=noise.share, whitening=noise.whitening
+    )
+    again = estimate(Simulator(problem), found.model, found.estimate.places, search)
+    if not is_successful(again.result):
+        return found
+    steps = found.stats.steps + again.steps
+    return complete(again._replace(steps=steps), found.start, found.campaign, noise)
+
+
+def _whites_fitted(noise: NoiseEstimate, campaign: Campaign) -> tuple[float, ...]:
+    return tuple(
+        own for own, record in zip(noise.whites, campaign.records, strict=True) if record.role == "fit"
+    )
 
 
 def _linear_part(model: Isolator, places: tuple[int, ...]) -> Isolator:
@@ -162,9 +226,7 @@ def simulator_for(
         model,
         quantity=campaign.output.quantity,
         hold=campaign.input.hold,
-        noise=tuple(
-            own for own, record in zip(noise.whites, campaign.records, strict=True) if record.role == "fit"
-        ),
+        noise=_whites_fitted(noise, campaign),
         share=noise.share,
         whitening=noise.whitening,
         integrator=Integrator() if integrator is None else integrator,

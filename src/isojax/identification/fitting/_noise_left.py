@@ -1,4 +1,4 @@
-"""The noise that a good fit leaves: that of the output, and what comes through the drive channel."""
+"""The noise that a good fit leaves: the output's over whole records, and what the drive channel adds."""
 
 import dataclasses
 
@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._results import is_successful
-from ...records import Campaign, NoiseEstimate, estimate_noise, residual_noise
+from ...records import Campaign, NoiseEstimate, residual_noise
 from .._rules import Rules
-from ._errors import Run, restarted_runs
+from ._errors import restarted_runs
 from ._estimate import Estimate
 from ._lack_of_fit import locked_power, shows_noise
 
@@ -42,23 +42,4 @@ def noise_left(
         if shows_noise(run.record):
             windows[run.record.name].append(run.residual[part.counted : part.stop])
     left = residual_noise(campaign, noise, [windows[record.name] for record in campaign.records])
-    if left is None:
-        return None
-    return dataclasses.replace(
-        left, excess=found.chi2 / found.dof / _through_the_drive(found, runs, campaign, noise)
-    )
-
-
-def _through_the_drive(
-    found: Estimate, runs: tuple[Run, ...], campaign: Campaign, noise: NoiseEstimate
-) -> float:
-    """Give the mean square of the residual's noise over that of the output's, as the same windows show both.
-
-    The output shows the noise of its sensor and the response to all real forces. What the residual holds
-    beyond it without coming back with the drive came through the simulation, from the drive channel.
-    """
-    residuals = tuple(dataclasses.replace(run.record, output=run.residual) for run in runs)
-    seen = estimate_noise(dataclasses.replace(campaign, records=residuals))
-    if seen.method != noise.method or noise.method not in ("cycle_scatter", "periods"):
-        return 1.0
-    return max(1.0, float(np.mean((np.array(seen.whites) / np.array(found.problem.noise)) ** 2)))
+    return None if left is None else dataclasses.replace(left, excess=found.chi2 / found.dof)

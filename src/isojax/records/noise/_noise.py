@@ -67,8 +67,8 @@ class NoiseEstimate:
         share: Noise bandwidth over half the rate, 1 for white noise: of so many of the samples the noise is
             independent. Of coloured noise it is `Colour.share`.
         colour: The law of coloured noise; None where the noise is not significantly coloured.
-        excess: Mean square of what a good fit leaves, over that of the noise which the output and the drive
-            channel show by themselves: above 1 something else disturbs. 1 where the residual was not asked.
+        excess: chi2/dof of the fit by the noise that the output shows, where the residual's is in its place:
+            above 1 the drive channel or something else disturbs. 1 elsewhere.
     """
 
     sigma: float
