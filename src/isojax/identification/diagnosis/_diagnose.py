@@ -20,6 +20,7 @@ from ..fitting import (
     plain_unit,
     search_of,
     weighted_by_output,
+    weighted_by_residual,
 )
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
@@ -111,9 +112,11 @@ def diagnose_with(
         return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
     probes = absent_effects(fitted.model, search.scales, excluded)
     search.progress(f"score test of {len({probe.name for probe in probes})} absent effects")
+    # Noise that only the residual shows imitates effects: slow noise an offset, that of a shaken base a mode.
+    seen = weighted_by_residual(fit, search).estimate
     case = Case(
         fit,
-        score_test(fitted, search, probes),
+        score_test(seen, search, probes)._replace(fitted=fitted),
         search.rules.significance if significance is None else significance,
         search,
         is_good(fit, search.rules),
