@@ -179,8 +179,10 @@ def test_every_kind_of_bifurcation_has_a_mark_of_its_own():
 
 def test_fold_curve_shows_both_cusps():
     angle = np.linspace(0.0, 2.0 * np.pi, 9)
+    good = ij.RESULTS.promote(diffrax.RESULTS.successful)
     cusps = tuple(
-        ij.stability.Cusp(jnp.array(a), jnp.array(f), jnp.zeros(2)) for a, f in ((5.0, 3.0), (5.0, 5.0))
+        ij.CodimensionTwoPoint("cusp", jnp.array(a), jnp.array(f), jnp.zeros(2), jnp.ones(2) + 0j, good)
+        for a, f in ((5.0, 3.0), (5.0, 5.0))
     )
     curve = ij.FoldCurve(
         jnp.asarray(5.0 + np.sin(angle)),

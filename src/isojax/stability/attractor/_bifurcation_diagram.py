@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
@@ -202,7 +203,7 @@ def _seen(
     return (seen.state, seen.tangent), (path, seen.growth.T)
 
 
-@eqx.filter_jit
+@quick_jit
 def _swept(
     model: Isolator, how: Watch, points: Points, legs: tuple[str, ...], begin: State
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
@@ -222,7 +223,7 @@ def _swept(
     return jnp.concatenate(parts[0], axis=1), jnp.concatenate(parts[1], axis=1)
 
 
-@eqx.filter_jit
+@quick_jit
 def _anew(
     model: Isolator, how: Watch, points: Points, begin: State
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
@@ -233,7 +234,7 @@ def _anew(
     return path.reshape(count, runs, how.periods, -1), growth.reshape(count, runs, how.periods)
 
 
-@eqx.filter_jit
+@quick_jit
 def _classify_motions(
     frequencies: Float[Array, " point"],
     path: Float[Array, "point run sample state"],

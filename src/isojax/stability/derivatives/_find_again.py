@@ -1,6 +1,6 @@
 """A known answer found again for another model: what JAX can trace, batch and differentiate."""
 
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import jax
 import numpy as np
@@ -9,7 +9,7 @@ from jax.core import Tracer
 from ..._types import Scalar, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Isolator, Modelled, as_isolator
-from ..branch import ParameterFamily, PointGuess, SpecialPoint, special_point
+from ..branch import BifurcationKind, ParameterFamily, PointGuess, SpecialPoint, special_point
 from ..map import StabilityMap, found_again
 from ..orbit import Orbit, find_periodic_orbit
 from ..response import Resonance, resonance_near
@@ -98,6 +98,11 @@ def _closed_by_half(orbit: Orbit) -> bool:
 
 def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequency: Any) -> SpecialPoint:
     known = point.family
+    if point.kind not in get_args(BifurcationKind):
+        raise ValueError(
+            f"Argument `answer` must be a bifurcation where it is a special point, but is the event "
+            f"{point.kind!r}."
+        )
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if value is not None and name in known.names:
             raise ValueError(

@@ -5,13 +5,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._cores import usable_cores
+from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator
 from ..orbit import (
@@ -117,7 +117,7 @@ def node_starts(
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _starts(
     model: Isolator, integrator: Integrator, half: bool, rest: Array, amplitude: Array, frequency: Array
 ) -> tuple[Array, Crossings]:
@@ -196,7 +196,7 @@ def kinks_between(sides: Float[np.ndarray, "piece kink"]) -> Int[np.ndarray, " c
     return np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
 
 
-@eqx.filter_jit
+@quick_jit
 def _closed(
     model: Isolator,
     method: MapMethod,
@@ -297,7 +297,7 @@ def node_responses(
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _responses(
     model: Isolator,
     integrator: Integrator,

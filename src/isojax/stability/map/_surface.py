@@ -8,12 +8,12 @@ any force, with the invariants of their period map, from which the multipliers f
 import math
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
+from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
 from ..orbit import response_amplitudes, rest_displacement
 from ._map_method import MapMethod
@@ -134,7 +134,7 @@ class _Grid(NamedTuple):
         return rows @ (self.tables @ columns.T)
 
 
-@eqx.filter_jit
+@quick_jit
 def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:
     rest = rest_displacement(model)
     return rest, response_amplitudes(model, frequencies, amplitudes, rest)

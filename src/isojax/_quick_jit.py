@@ -1,0 +1,44 @@
+"""Functions that JAX compiles quickly where they are called outside any other compiled function."""
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+from jax.core import Tracer
+
+from ._compiling import quick_options
+
+
+def quick_jit(function: Callable[..., Any], options: Mapping[str, Any] | None = None) -> Callable[..., Any]:
+    """Give a function that is compiled on its first call, without XLA's fusion emitters.
+
+    It is `eqx.filter_jit` with compiler options for this function alone, so that no flag of the process is
+    set. XLA takes options only of what is compiled by itself: inside another compiled function this is plain
+    `eqx.filter_jit`.
+
+    Args:
+        function: what is compiled.
+        options: further options of the compiler.
+
+    Returns:
+        The compiled function.
+    """
+    inside = eqx.filter_jit(function)
+    chosen: dict[str, Any] = {**quick_options(), **(options or {})}
+    alone = eqx.filter_jit(function, compiler_options=chosen) if chosen else inside  # pyright: ignore[reportCallIssue]
+
+    @functools.wraps(function)
+    def called(*arguments: Any, **named: Any) -> Any:
+        return (inside if _is_being_compiled() else alone)(*arguments, **named)
+
+    return called
+
+
+def _is_being_compiled() -> bool:
+    """Whether a caller is being traced in order to be compiled: then even numbers that are known are traced,
+    which they are not where a caller is only differentiated or mapped.
+    """
+    return isinstance(jax.lax.neg(np.float32(1.0)), Tracer)
