@@ -64,6 +64,30 @@ class BifurcationDiagram(eqx.Module):
     result: RESULTS
 
     @property
+    def quasi_periodic(self) -> Bool[Array, "*run point"]:
+        """Whether the motion repeats nowhere up to the bound and is not chaotic: it runs on a torus, or has a
+        longer period.
+        """
+        return (self.period == 0) & ~self.chaotic & jnp.isfinite(self.samples[..., 0, 0])
+
+    @property
+    def rotation_number(self) -> Float[Array, "*run point"]:
+        """Turns a drive period of the samples around their mean, of displacement and velocity, up to whole
+        turns and their sense: from 0 to 1/2; NaN where the motion is not quasi-periodic.
+        """
+        plane = self.samples[..., :2] - jnp.mean(self.samples[..., :2], axis=-2, keepdims=True)
+        size = jnp.std(plane, axis=-2, keepdims=True)
+        plane = plane / jnp.where(size > 0.0, size, 1.0)
+        place = jax.lax.complex(plane[..., 0], plane[..., 1])
+        # Of the steps from sample to sample: their sum around a closed curve counts its turns.
+        ahead = jnp.angle(place[..., 1:] * jnp.conj(place[..., :-1]))
+        share = jnp.mean(ahead, axis=-1) / (2.0 * math.pi)
+        one_way = jnp.mean(jnp.where(ahead < 0.0, ahead + 2.0 * math.pi, ahead), axis=-1) / (2.0 * math.pi)
+        # Steps of half a turn change their sign at random: counted one way round they do not.
+        turns = jnp.where(jnp.abs(share) < 0.25, jnp.abs(share), jnp.minimum(one_way, 1.0 - one_way))
+        return jnp.where(self.quasi_periodic, turns, jnp.nan)
+
+    @property
     def displacement(self) -> Float[Array, "*run point sample"]:
         """[m]."""
         return self.samples[..., 0]
@@ -78,7 +102,9 @@ class BifurcationDiagram(eqx.Module):
         counts = zip(*np.unique(period, return_counts=True), strict=True)
         words = ", ".join(f"{count} of period {value}" for value, count in counts if value)
         runs = ", ".join(dict.fromkeys(self.runs))
-        return f"along {self.parameter} ({runs}): {words or 'no periodic motion'}, {chaotic} chaotic"
+        torus = (period == 0) & ~np.asarray(self.chaotic) & np.isfinite(np.asarray(self.samples)[..., 0, 0])
+        more = f", {int(torus.sum())} quasi-periodic" if torus.any() else ""
+        return f"along {self.parameter} ({runs}): {words or 'no periodic motion'}{more}, {chaotic} chaotic"
 
     def _rows(self) -> list[str]:
         return ["model", "amplitudes", "frequencies", "samples", "period", "lyapunov", "result"]
