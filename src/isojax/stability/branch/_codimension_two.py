@@ -170,9 +170,10 @@ def neimark_sacker_curve(
     followed = curve.follow()
     followed, found = _between_resonances(followed, curve.polished(followed))
     special = curve.special_points(followed, found)
-    ends = [is_successful(point.result) for point in special if point.kind in _ENDS]
-    followed = followed._replace(ended=(all(followed.ended) and all(ends),) * 2)
-    inside = np.abs(found.cosine) <= 1.0
+    # Where the curve was cut there must be a resonance.
+    ends = sum(is_successful(point.result) for point in special if point.kind in _ENDS)
+    inside = ~(np.abs(found.cosine) > 1.0)
+    followed = followed._replace(ended=(all(followed.ended) and ends >= np.sum(~inside),) * 2)
     points = curve.numbers(jax.tree.map(lambda own: own[inside], found))
     closed, result = jnp.array(followed.closed), followed.result(points.found)
     method = curve.method
@@ -187,7 +188,7 @@ def _between_resonances(whole: Whole, found: Polished) -> tuple[Whole, Polished]
     """Give the part of a curve around its start on which the pair is on the unit circle, and one point more
     where it ends there.
     """
-    inside = np.abs(found.cosine) <= 1.0
+    inside = ~(np.abs(found.cosine) > 1.0)
     if inside.all():
         return whole, found
     count, start = inside.size, whole.start
@@ -263,8 +264,8 @@ def _meet(model: Isolator, search: _Search, integrator: Integrator) -> CurveStar
     scale, followed = follow_branches(family, method, None, search.stride)
     found = np.asarray(followed.found)
     room = room_for(found, search.stride.most)
-    curves = (values[:, :room] for values in (followed.unknowns, followed.tangents))
-    met = locate(family, method, BranchCurves(scale, *curves, found))
+    curves = BranchCurves(scale, followed.unknowns[:, :room], followed.tangents[:, :room], found)
+    met = locate(family, method, curves)
     for point in met:
         if point.kind == search.kind:
             force = low + float(point.guess.shares[0]) * (high - low)

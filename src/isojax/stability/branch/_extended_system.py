@@ -274,7 +274,7 @@ class _Search(NamedTuple):
     right: Float[Array, "component state"]
     steps: Int[Array, ""]
     trial: Float[Array, "state state"]
-    count: Int[Array, ""]
+    evaluations: Int[Array, ""]
     last: Bool[Array, ""]
     done: Bool[Array, ""]
     mismatch: Float[Array, ""]
@@ -325,21 +325,21 @@ def polish(
         own = eqx.tree_at(lambda one: one.split.steps, system, search.steps)
         beside = _expand(own, family, search.unknown, search.right)
         residual, step = _newton(own, beside, search.unknown)
-        trying = search.count < _TRIALS
+        trying = search.evaluations < _TRIALS
         trials = jnp.stack([search.trial, beside.matrix])
         wanted = steps_wanted(least, trials, tolerance, doublings=0, most=most)
-        steps = jnp.where(search.count == 0, 2 * least, jnp.where(trying, wanted, search.steps))
+        steps = jnp.where(search.evaluations == 0, 2 * least, jnp.where(trying, wanted, search.steps))
         sane = jnp.all(jnp.isfinite(step))
         moves = ~trying & ~search.last & sane
         unknown = search.unknown - jnp.where(moves, step, 0.0)
         short = jnp.max(jnp.abs(step) / (1.0 + jnp.abs(unknown))) < goal
-        last = ~trying & (short | ~sane | (search.count >= _MOST_STEPS - 2))
+        last = ~trying & (short | ~sane | (search.evaluations >= _MOST_STEPS - 2))
         return _Search(
             unknown,
             beside.right,
             steps,
             jnp.where(trying, beside.matrix, search.trial),
-            search.count + 1,
+            search.evaluations + 1,
             last,
             search.last | (~trying & ~sane),
             jnp.max(jnp.abs(residual)),

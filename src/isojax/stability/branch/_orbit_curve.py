@@ -170,7 +170,7 @@ class OrbitCurve(eqx.Module):
     def special_points(self, whole: Whole, found: Polished) -> tuple[CodimensionTwoPoint, ...]:
         """Give the special points along a curve, in its order."""
         met = []
-        for name, values in self.tests(found, found.direction[0]).items():
+        for name, values in self.tests(found, np.asarray(found.direction[0])).items():
             for place in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0.0):
                 low, high = whole.unknowns[place : place + 2]
                 if np.linalg.norm(high - low) > 0.0:
@@ -188,7 +188,7 @@ class OrbitCurve(eqx.Module):
 
         shares = np.linspace(0.0, 1.0, _POLISHED_AT_ONCE)
         section = points(shares)
-        values = self.tests(section, section.direction[0])[name]
+        values = self.tests(section, np.asarray(section.direction[0]))[name]
         change = np.flatnonzero(values[:-1] * values[1:] <= 0.0)
         at = int(change[0]) if change.size else 0
         (a, b), (before, after) = shares[at : at + 2], values[at : at + 2]

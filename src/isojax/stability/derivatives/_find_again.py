@@ -98,9 +98,10 @@ def _closed_by_half(orbit: Orbit) -> bool:
 
 def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequency: Any) -> SpecialPoint:
     known = point.family
-    if point.kind not in get_args(BifurcationKind):
+    kind = next((name for name in get_args(BifurcationKind) if name == point.kind), None)
+    if kind is None:
         raise ValueError(
-            f"Argument `answer` must be a bifurcation where it is a special point, but is the event "
+            "Argument `answer` must be a bifurcation where it is a special point, but is the event "
             f"{point.kind!r}."
         )
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
@@ -114,7 +115,7 @@ def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequen
     )
     family = ParameterFamily(model, *fixed, known.start, known.stop, known.names)
     guess = PointGuess(point.y0, known.shares(point.value[None]))
-    return special_point(family, point.method, point.kind, point.branch, guess, _MOVED_WITHIN)
+    return special_point(family, point.method, kind, point.branch, guess, _MOVED_WITHIN)
 
 
 def _map(smap: StabilityMap, model: Isolator, amplitude: Any, frequency: Any) -> StabilityMap:

@@ -43,6 +43,9 @@ _START_CLOSED_TO = 1e-6
 _MOST_NODE_CROSSINGS = 16
 """Kinks an orbit to make room for."""
 
+_ANY_STEPS = 8
+"""Steps of an integrator that are of no consequence."""
+
 _NODES_A_BLOCK = 544
 """Nodes solved at once: one compiled batch serves grids of any size, and each core runs its own."""
 
@@ -184,6 +187,9 @@ def closed_nodes(
         The orbits.
     """
     kinks = kinks_between(np.asarray(method.sides))
+    # The steps are a number on the device: with those of the integrator each count would be compiled anew.
+    integrator = method.integrator.with_steps(_ANY_STEPS)
+    method = MapMethod(integrator, method.half, method.sides, method.steps)
 
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
         return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *map(jnp.asarray, rows))

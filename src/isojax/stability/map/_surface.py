@@ -227,7 +227,9 @@ def _start_grid(
     """Find orbits that are not split, without their invariants, and the kinks that most of them pass."""
     logarithms, band = _axes(ends, frequencies, 0)
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
-    coarse = integrator.with_steps(2 * (integrator.steps_per_period // 4 + 2))
+    # Starts need no more steps where the map takes more, and what is compiled for one grid serves the next.
+    steps = min(integrator.steps_per_period, Integrator().steps_per_period)
+    coarse = integrator.with_steps(2 * (steps // 4 + 2))
     starts = node_starts(model, coarse, half, rest, amplitude, frequency)
     shape = len(band), len(logarithms)
     kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
