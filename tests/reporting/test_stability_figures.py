@@ -204,6 +204,28 @@ def test_fold_curve_shows_both_cusps():
     assert entries(figure) == ["fold", "several orbits", "cusp"]
 
 
+def test_curves_of_other_bifurcations_show_their_resonances():
+    good = ij.RESULTS.promote(diffrax.RESULTS.successful)
+    turned = jnp.exp(1j * jnp.array([[0.1, -0.1], [1.0, -1.0], [3.0, -3.0]]))
+    values = jnp.array([4.0, 5.0, 6.0])
+    ends = tuple(
+        ij.CodimensionTwoPoint(kind, value, value, jnp.zeros(2), turned[0], good)
+        for kind, value in (("resonance_1_1", values[0]), ("resonance_1_2", values[2]))
+    )
+    curve = ij.NeimarkSackerCurve(
+        values, values, jnp.zeros((3, 2)), turned, ends, jnp.array(False), 1, False, good
+    )
+    figure = ij.plot.bifurcation_curve(curve)
+    ax = figure.axes[0]
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), values)
+    assert [line.get_xdata()[0] for line in ax.lines[1:3]] == [4.0, 6.0]
+    assert entries(figure) == ["Neimark-Sacker", "1:1 resonance", "1:2 resonance"]
+    doublings = ij.PeriodDoublingCurve(
+        values, values, jnp.zeros((3, 2)), turned, (), jnp.array(True), 1, good
+    )
+    assert entries(ij.plot.bifurcation_curve(doublings)) == ["period doubling"]
+
+
 @pytest.mark.slow
 def test_phase_portrait_basins_diagram_and_return_draw_what_they_hold(model):
     drive = ij.Harmonic(amplitude=175.0, frequency=4.2)
