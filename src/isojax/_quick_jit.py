@@ -32,7 +32,9 @@ def quick_jit(function: Callable[..., Any], options: Mapping[str, Any] | None = 
 
     @functools.wraps(function)
     def called(*arguments: Any, **named: Any) -> Any:
-        return (inside if _is_being_compiled() else alone)(*arguments, **named)
+        leaves = jax.tree.leaves((arguments, named))
+        by_itself = not _is_being_compiled() and all(map(_is_known_or_forward, leaves))
+        return (alone if by_itself else inside)(*arguments, **named)
 
     return called
 
@@ -42,3 +44,15 @@ def _is_being_compiled() -> bool:
     which they are not where a caller is only differentiated or mapped.
     """
     return isinstance(jax.lax.neg(np.float32(1.0)), Tracer)
+
+
+def _is_known_or_forward(leaf: Any) -> bool:
+    """Whether a number is known, or is only mapped or differentiated forwards.
+
+    Backwards, JAX keeps the function for later inside a compiled one.
+    """
+    if not isinstance(leaf, Tracer):
+        return True
+    kind = type(leaf).__name__
+    parts = {"JVPTracer": ("primal", "tangent"), "BatchTracer": ("val",)}.get(kind, ())
+    return bool(parts) and all(_is_known_or_forward(getattr(leaf, part, leaf)) for part in parts)

@@ -33,6 +33,9 @@ MOST_PLACES = 1000
 LOCATED_WITHIN = 0.02
 """Distance from a start located on a branch, over the range of a parameter, up to which a point counts."""
 
+_DIFFERENCE = 1e-4
+"""Shift of an unknown for second derivatives: their error is then a hundred-millionth."""
+
 _TRIALS, _MOST_STEPS = 2, 22
 """Motions by which the steps are chosen, and evaluations at most, those included."""
 
@@ -233,18 +236,26 @@ class _Expansion(NamedTuple):
 
 
 def _expand(system: _System, family: ParameterFamily, unknown: Array, right: Array) -> _Expansion:
-    """Give the motion beside a point; `right` is that of a point nearby."""
-    states, whole = system.states, system.whole
+    """Give the motion beside a point; `right` is that of a point nearby.
 
-    def along(u: Array) -> tuple[tuple[Array, Array], Array]:
-        def stretched(column: Array) -> tuple[Array, Array]:
-            direction = jnp.concatenate([column, jnp.zeros(u.size - whole)])
-            return jax.jvp(lambda v: system.image(family, v), (u,), (direction,))
+    Second derivatives are central differences of first ones: a nest of derivatives takes twice as long to
+    compile, and these steer Newton's method and a test for its zero alone.
+    """
+    states, whole, size = system.states, system.whole, unknown.size
+    units = jnp.eye(size)
+    columns = jnp.concatenate([right, jnp.zeros((size - whole, states))]).T
+    shifts = _DIFFERENCE * jnp.stack([units, -units], axis=1)
+    beside = (unknown + jnp.broadcast_to(shifts[:, :, None], (size, 2, states, size))).reshape(-1, size)
+    places = jnp.concatenate([jnp.broadcast_to(unknown, (size, size)), beside])
+    along = jnp.broadcast_to(columns, (size, 2, states, size)).reshape(-1, size)
 
-        moved, columns = jax.vmap(stretched, in_axes=1, out_axes=(None, 0))(right)
-        return (moved, columns), moved
+    def stretched(place: Array, direction: Array) -> tuple[Array, Array]:
+        return jax.jvp(lambda u: system.image(family, u), (place,), (direction,))
 
-    (slope, curved), moved = jax.jacfwd(along, has_aux=True)(unknown)
+    images, moves = jax.vmap(stretched)(places, jnp.concatenate([units, along]))
+    moved, slope = images[0], moves[:size].T
+    ahead, behind = jnp.moveaxis(moves[size:].reshape(size, 2, states, -1), 1, 0)
+    curved = jnp.moveaxis((ahead - behind) / (2.0 * _DIFFERENCE), 0, -1)
     upper, lower = slope[:states, :whole], slope[states:, :whole]
     phases = -jnp.linalg.solve(lower[:, states:], lower[:, :states])
     answer = -jnp.linalg.solve(lower[:, states:].T, upper[:, states:].T).T
