@@ -245,8 +245,9 @@ def _expand(system: _System, family: ParameterFamily, unknown: Array, right: Arr
     units = jnp.eye(size)
     columns = jnp.concatenate([right, jnp.zeros((size - whole, states))]).T
     shifts = _DIFFERENCE * jnp.stack([units, -units], axis=1)
-    beside = (unknown + jnp.broadcast_to(shifts[:, :, None], (size, 2, states, size))).reshape(-1, size)
-    places = jnp.concatenate([jnp.broadcast_to(unknown, (size, size)), beside])
+    beside = jnp.broadcast_to(shifts[:, :, None], (size, 2, states, size)).reshape(-1, size)
+    moves = jnp.concatenate([jnp.zeros((size, size)), beside])
+    places = moves + jnp.broadcast_to(unknown, moves.shape)
     along = jnp.broadcast_to(columns, (size, 2, states, size)).reshape(-1, size)
 
     def stretched(place: Array, direction: Array) -> tuple[Array, Array]:
