@@ -69,7 +69,7 @@ class BranchEvent(eqx.Module):
             and smooth where its derivative is wanted.
 
     Example:
-        >>> BranchEvent("5 mm", lambda orbit: orbit.response - 5e-3).name
+        >>> ij.BranchEvent("5 mm", lambda orbit: orbit.response - 5e-3).name
         '5 mm'
     """
 
