@@ -54,9 +54,9 @@ def time_case(case: str) -> None:
     imported = time.perf_counter() - begun
     compiled: list[tuple[float, str]] = []
 
-    def heard(event: str, seconds: float, **named: Any) -> None:
+    def heard(event: str, duration_secs: float, **kwargs: str | int) -> None:
         if event.endswith("backend_compile_duration"):
-            compiled.append((seconds, str(named.get("fun_name", "?"))))
+            compiled.append((duration_secs, str(kwargs.get("fun_name", "?"))))
 
     jax.monitoring.register_event_duration_secs_listener(heard)
     times = []

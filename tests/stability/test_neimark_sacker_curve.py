@@ -7,7 +7,7 @@ import pytest
 import scipy_map
 
 import isojax as ij
-from isojax.stability.branch._criticality import criticality, null_direction, pair_cosine
+from isojax.stability.branch._criticality import BifurcationKind, criticality, null_direction, pair_cosine
 
 ONE = 1.0 / (2.0 * np.pi)
 STRENGTH, SKEW = 0.3, 0.1
@@ -95,7 +95,7 @@ def test_what_vanishes_of_a_matrix_is_what_its_eigenvalues_say():
         matrix = random.standard_normal((size, size))
         values = np.linalg.eigvals(matrix)
         first, second = np.triu_indices(size, 1)
-        expected = {
+        expected: dict[BifurcationKind, complex] = {
             "fold": np.prod(values - 1.0),
             "period_doubling": np.prod(values + 1.0),
             "neimark_sacker": np.prod(values[first] * values[second] - 1.0),
@@ -137,7 +137,8 @@ def test_a_branch_says_where_quasi_periodic_motion_begins_and_where_its_events_a
         for kind in ("response 1.5", "neimark_sacker")
     )
     scipys = scipy_map.van_der_pol_law(STRENGTH)
-    _, matrix, _ = scipy_map.after(scipys, 1.0, float(torus.amplitude), omega * ONE, torus.y0, 1.0)
+    y0 = np.asarray(torus.y0)
+    _, matrix, _ = scipy_map.after(scipys, 1.0, float(torus.amplitude), omega * ONE, y0, 1.0)
     turns = abs(np.angle(np.linalg.eigvals(matrix)[0])) / (2.0 * np.pi)
     assert float(torus.rotation_number) == pytest.approx(turns, abs=1e-7)
     assert np.isnan(float(event.rotation_number))
