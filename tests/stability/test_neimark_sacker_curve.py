@@ -7,7 +7,7 @@ import pytest
 import scipy_map
 
 import isojax as ij
-from isojax.stability.branch._criticality import BifurcationKind, criticality, null_direction, pair_cosine
+from isojax.stability.branch._criticality import criticality, null_direction, pair_cosine
 
 ONE = 1.0 / (2.0 * np.pi)
 STRENGTH, SKEW = 0.3, 0.1
@@ -95,7 +95,7 @@ def test_what_vanishes_of_a_matrix_is_what_its_eigenvalues_say():
         matrix = random.standard_normal((size, size))
         values = np.linalg.eigvals(matrix)
         first, second = np.triu_indices(size, 1)
-        expected: dict[BifurcationKind, complex] = {
+        expected = {
             "fold": np.prod(values - 1.0),
             "period_doubling": np.prod(values + 1.0),
             "neimark_sacker": np.prod(values[first] * values[second] - 1.0),
