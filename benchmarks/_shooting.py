@@ -13,19 +13,21 @@ TOLERANCE = 1e-12
 
 @dataclass(frozen=True)
 class Law:
-    """`m x'' + k1 x + k2 |x|x + k3 x^3 + c1 v + c2 |v|v + c3 v^3 + p x^2 v = F0 sin(2 pi f t)`.
+    """`m x'' + k1 x + q x^2 + k2 |x|x + k3 x^3 + c1 v + c2 |v|v + c3 v^3 + p x^2 v = F0 sin(2 pi f t)`.
 
     Attributes:
         k: k1, k2, k3 [N/m, N/m^2, N/m^3].
         c: c1, c2, c3 [N s/m, N s^2/m^2, N s^3/m^3].
         position: p [N s/m^3].
         mass: m [kg].
+        even: q [N/m^2].
     """
 
     k: tuple[float, float, float] = (0.0, 0.0, 0.0)
     c: tuple[float, float, float] = (0.0, 0.0, 0.0)
     position: float = 0.0
     mass: float = 1.0
+    even: float = 0.0
 
 
 def flow(
@@ -46,15 +48,15 @@ def flow(
         The state at the end, its derivative by `y0`, and the largest modulus of the displacement at start,
         cuts and end (over the whole motion, where the law has a kink in the velocity).
     """
-    (k1, k2, k3), (c1, c2, c3), p, mass = law.k, law.c, law.position, law.mass
+    (k1, k2, k3), (c1, c2, c3), p, mass, q = law.k, law.c, law.position, law.mass, law.even
     omega = 2.0 * math.pi * frequency
     sides = [1.0 if value >= 0.0 else -1.0 for value in y0]
 
     def rates(t: float, y: np.ndarray) -> tuple[float, ...]:
         x, v, a, b, c, d = y.tolist()
         kx, kv = k2 * sides[0], c2 * sides[1]
-        force = x * (k1 + x * (kx + x * k3)) + v * (c1 + v * (kv + v * c3) + p * x * x)
-        by_x = k1 + x * (2.0 * kx + 3.0 * k3 * x) + 2.0 * p * x * v
+        force = x * (k1 + x * (q + kx + x * k3)) + v * (c1 + v * (kv + v * c3) + p * x * x)
+        by_x = k1 + x * (2.0 * (q + kx) + 3.0 * k3 * x) + 2.0 * p * x * v
         by_v = c1 + v * (2.0 * kv + 3.0 * c3 * v) + p * x * x
         push = (amplitude * math.sin(omega * t) - force) / mass
         return v, push, c, d, -(by_x * a + by_v * c) / mass, -(by_x * b + by_v * d) / mass

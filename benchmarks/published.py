@@ -30,7 +30,7 @@ import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
 
 import isojax as ij  # noqa: E402
-from _shooting import Law, bifurcation, largest_exponent, symmetric_orbit  # noqa: E402
+from _shooting import Law, bifurcation, flow, largest_exponent, symmetric_orbit  # noqa: E402
 
 ONE = 1.0 / (2.0 * np.pi)
 """Frequency of sin t [Hz]."""
@@ -165,6 +165,52 @@ def torus() -> None:
         if strength < 0.1:
             # The theory is of first order in e.
             mark("off the averaged equations", abs(force / averaged - 1.0), 0.25 * strength)
+
+
+def torus_curves() -> None:
+    print("Curves of Neimark-Sacker bifurcations of the forced van der Pol oscillator, and their resonances")
+    for strength, skew, band, push, step in (
+        (0.02, 0.0, (1.002, 1.02), (0.005, 0.06), 0.05),
+        (0.3, 0.1, (1.02, 2.4), (0.05, 8.0), 0.02),
+    ):
+        spring = (ij.LinearDamping(-strength), ij.PositionDamping(strength), ij.LinearStiffness(1.0))
+        model = ij.Isolator(1.0, (*spring, ij.QuadraticStiffness(skew)) if skew else spring)
+        law = Law(k=(1.0, 0.0, 0.0), c=(-strength, 0.0, 0.0), position=strength, even=skew)
+        curve = ij.neimark_sacker_curve(
+            model, amplitude_range=push, frequency_range=(band[0] * ONE, band[1] * ONE), step=step
+        )
+        omega, force = np.asarray(curve.frequency) / ONE, np.asarray(curve.amplitude)
+        print(
+            f"  e = {strength}, {skew} x^2: {force.size} points, w = {omega.min():.5f} to {omega.max():.5f}, "
+            f"rotation number {float(curve.rotation_number.min()):.4f} to "
+            f"{float(curve.rotation_number.max()):.4f}"
+        )
+        same("followed to its ends", bool(ij.is_successful(curve.result)), True)
+        off = 0.0
+        for place in range(0, force.size, 8):
+            y0 = np.asarray(curve.y0[place])
+            end, matrix, _ = flow(law, float(force[place]), float(curve.frequency[place]), y0, 1.0)
+            angle = abs(np.angle(np.linalg.eigvals(matrix)[0]))
+            gaps = [np.abs(end - y0).max(), abs(np.linalg.det(matrix) - 1.0)]
+            off = max(off, *gaps, abs(angle - float(curve.angle[place])))
+        mark("every eighth point: orbit, det M = 1 and angle, off SciPy", off, 1e-7)
+        if not skew:
+            detuned = (1.0 - omega**2) / (strength * omega)
+            averaged = 2.0 * strength * omega * np.sqrt(0.5) * np.hypot(0.5, detuned)
+            worst = float(np.max(np.abs(force / averaged - 1.0)))
+            mark("curve off the averaged equations", worst, 0.25 * strength)
+        for point in curve.special_points:
+            turns = 0.5 if curve.symmetric else 1.0
+            y0, push_there = np.asarray(point.y0), float(point.amplitude)
+            _, matrix, _ = flow(law, push_there, float(point.frequency), y0, turns)
+            matrix = -matrix if curve.symmetric else matrix
+            cosine = {"1_1": 1.0, "1_2": -1.0, "1_3": -0.5, "1_4": 0.0}[point.kind[-3:]]
+            gap = max(abs(np.linalg.det(matrix) - 1.0), abs(0.5 * np.trace(matrix) - cosine))
+            words = f"{point.kind} at w = {float(point.frequency) / ONE:.7f}, F = {push_there:.7f}: off SciPy"
+            mark(words, float(gap), 1e-7)
+            if not skew:
+                mean = strength * float(point.frequency) / ONE
+                mark("its force off e w (averaged)", abs(push_there / mean - 1.0), strength)
 
 
 PAPER = {"k": (1.0805e6, -6.974e8, 2.51667e11), "c": (1.027e4, -3.6880e5, 5.3753e6), "mass": 800.0}
@@ -347,7 +393,7 @@ def spread() -> None:
 
 def main() -> None:
     begun = time.perf_counter()
-    for part in (cascade, chaos, torus, orbit_slopes, fold_slopes, spread):
+    for part in (cascade, chaos, torus, torus_curves, orbit_slopes, fold_slopes, spread):
         part()
     missed = verdicts.count(False)
     print(f"{len(verdicts) - missed} of {len(verdicts)} marks met in {time.perf_counter() - begun:.0f} s")

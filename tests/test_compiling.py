@@ -5,11 +5,13 @@ import subprocess
 import sys
 
 import jax
+import jax.numpy as jnp
 import jaxlib.version
 import pytest
 
 import isojax as ij
 from isojax._compiling import compiled_code_folder
+from isojax._quick_jit import quick_jit
 
 FLAG = "--xla_cpu_use_fusion_emitters"
 
@@ -88,3 +90,23 @@ def test_where_nothing_can_be_written_nothing_is_kept(settings, monkeypatch, tmp
     (tmp_path / "file").touch()
     monkeypatch.setenv("ISOJAX_CACHE", str(tmp_path / "file" / "below"))
     assert compiled_code_folder() is None
+
+
+def test_a_function_compiled_quickly_may_be_compiled_mapped_and_differentiated_by_others():
+    # An option that the flag of the process does not hold already.
+    cube = quick_jit(lambda x: x * x * x, {"xla_cpu_prefer_vector_width": 256})
+    ways = {
+        "alone": (cube, 8.0),
+        "compiled": (jax.jit(cube), 8.0),
+        "forwards": (jax.jacfwd(cube), 12.0),
+        "backwards": (jax.grad(cube), 12.0),
+        "twice": (jax.jacfwd(jax.grad(cube)), 12.0),
+        "backwards over forwards": (jax.grad(jax.jacfwd(cube)), 12.0),
+        "backwards by the direction": (jax.grad(lambda v: jax.jvp(cube, (2.0,), (v,))[1]), 12.0),
+        "compiled derivative": (jax.jit(jax.grad(cube)), 12.0),
+        "mapped": (lambda x: jax.vmap(cube)(jnp.stack([x, x]))[1], 8.0),
+        "mapped derivative": (lambda x: jax.vmap(jax.grad(cube))(jnp.stack([x, x]))[1], 12.0),
+        "in a loop": (lambda x: jax.lax.fori_loop(0, 1, lambda _, y: cube(y), x), 8.0),
+    }
+    for words, (way, expected) in ways.items():
+        assert float(way(jnp.asarray(2.0))) == pytest.approx(expected), words

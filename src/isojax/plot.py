@@ -7,6 +7,7 @@ Figure, shown nowhere.
 
 from .reporting.plots import plot_backbone as backbone
 from .reporting.plots import plot_basins as basins
+from .reporting.plots import plot_bifurcation_curve as bifurcation_curve
 from .reporting.plots import plot_bifurcation_diagram as bifurcation_diagram
 from .reporting.plots import plot_branch as branch
 from .reporting.plots import plot_correlation as correlation

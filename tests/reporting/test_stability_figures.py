@@ -179,8 +179,10 @@ def test_every_kind_of_bifurcation_has_a_mark_of_its_own():
 
 def test_fold_curve_shows_both_cusps():
     angle = np.linspace(0.0, 2.0 * np.pi, 9)
+    good = ij.RESULTS.promote(diffrax.RESULTS.successful)
     cusps = tuple(
-        ij.stability.Cusp(jnp.array(a), jnp.array(f), jnp.zeros(2)) for a, f in ((5.0, 3.0), (5.0, 5.0))
+        ij.CodimensionTwoPoint("cusp", jnp.array(a), jnp.array(f), jnp.zeros(2), jnp.ones(2) + 0j, good)
+        for a, f in ((5.0, 3.0), (5.0, 5.0))
     )
     curve = ij.FoldCurve(
         jnp.asarray(5.0 + np.sin(angle)),
@@ -200,6 +202,28 @@ def test_fold_curve_shows_both_cusps():
     assert {text.get_text() for text in ax.texts} == {"3 Hz, 5 m/s²", "5 Hz, 5 m/s²"}
     assert "m/s²" in ax.get_ylabel()
     assert entries(figure) == ["fold", "several orbits", "cusp"]
+
+
+def test_curves_of_other_bifurcations_show_their_resonances():
+    good = ij.RESULTS.promote(diffrax.RESULTS.successful)
+    turned = jnp.exp(1j * jnp.array([[0.1, -0.1], [1.0, -1.0], [3.0, -3.0]]))
+    values = jnp.array([4.0, 5.0, 6.0])
+    ends = tuple(
+        ij.CodimensionTwoPoint(kind, value, value, jnp.zeros(2), turned[0], good)
+        for kind, value in (("resonance_1_1", values[0]), ("resonance_1_2", values[2]))
+    )
+    curve = ij.NeimarkSackerCurve(
+        values, values, jnp.zeros((3, 2)), turned, ends, jnp.array(False), 1, False, good
+    )
+    figure = ij.plot.bifurcation_curve(curve)
+    ax = figure.axes[0]
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), values)
+    assert [line.get_xdata()[0] for line in ax.lines[1:3]] == [4.0, 6.0]
+    assert entries(figure) == ["Neimark-Sacker", "1:1 resonance", "1:2 resonance"]
+    doublings = ij.PeriodDoublingCurve(
+        values, values, jnp.zeros((3, 2)), turned, (), jnp.array(True), 1, good
+    )
+    assert entries(ij.plot.bifurcation_curve(doublings)) == ["period doubling"]
 
 
 @pytest.mark.slow

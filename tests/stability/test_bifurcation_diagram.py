@@ -205,3 +205,17 @@ def test_many_starts_are_as_each_alone():
     )
     assert together.samples.shape == (3, 2, 32, 2)
     np.testing.assert_allclose(together.samples[1], alone.samples, atol=1e-12)
+
+
+def test_quasi_periodic_motion_turns_as_often_as_the_two_frequencies_say():
+    # x'' - e (1 - x^2) x' + x = F sin(w t), far from its lock: the free motion has the frequency 1 - e^2/16
+    # of van der Pol's equation (Nayfeh & Mook 1979, sec. 3.3.4), little changed by a weak drive.
+    strength, omega = 0.1, 1.37
+    spring = (ij.LinearDamping(-strength), ij.PositionDamping(strength), ij.LinearStiffness(1.0))
+    diagram = ij.bifurcation_diagram(
+        ij.Isolator(1.0, spring), [0.02], frequency=omega / TURN, starts=(2.0, 0.0), settle=100, samples=512
+    )
+    assert bool(diagram.quasi_periodic[0])
+    turns = (1.0 - strength**2 / 16.0) / omega
+    assert float(diagram.rotation_number[0]) == pytest.approx(1.0 - turns, abs=3e-3)
+    assert "1 quasi-periodic" in str(diagram)

@@ -135,7 +135,7 @@ def test_doublings_along_the_curve_carry_minus_one_by_scipy():
         ({"most": 0}, "`most` must be positive"),
     ],
 )
-@pytest.mark.parametrize("follow", [ij.fold_curve, ij.period_doubling_curve])
+@pytest.mark.parametrize("follow", [ij.fold_curve, ij.period_doubling_curve, ij.neimark_sacker_curve])
 def test_bad_arguments_are_refused(follow, options, words):
     with pytest.raises(ValueError, match=words):
         follow(MODEL, **{**WINDOW, **options})

@@ -225,7 +225,7 @@ def test_a_broken_branch_that_comes_back_meets_no_fold_where_it_crosses(monkeypa
         UEDA, parameter="amplitude", frequency=0.3 * ONE, start=0.05, stop=1.0, step=0.05, other_periods=()
     )
     breaks = [point for point in branch.special_points if point.kind == "symmetry_breaking"][:2]
-    monkeypatch.setattr("isojax.stability.branch._special_points._BISECTIONS", 3)
+    monkeypatch.setattr("isojax.stability.branch._locating._BISECTIONS", 3)
     loop = ij.switch_branch(branch, breaks[0])
     assert bool(loop.closed)
     kinds = [point.kind for point in loop.special_points]

@@ -9,6 +9,8 @@ from ._attractor_plots import plot_basins as plot_basins
 from ._attractor_plots import plot_bifurcation_diagram as plot_bifurcation_diagram
 from ._attractor_plots import plot_phase_portrait as plot_phase_portrait
 from ._attractor_plots import plot_return as plot_return
+from ._bifurcation_curve_plots import plot_bifurcation_curve as plot_bifurcation_curve
+from ._bifurcation_curve_plots import plot_fold_curve as plot_fold_curve
 from ._branch_plots import plot_backbone as plot_backbone
 from ._branch_plots import plot_branch as plot_branch
 from ._branch_plots import plot_frequency_response as plot_frequency_response
@@ -25,7 +27,6 @@ from ._dwell_stability_plots import plot_dwell_stability as plot_dwell_stability
 from ._evidence_plots import plot_errors as plot_errors
 from ._evidence_plots import plot_ranking as plot_ranking
 from ._evidence_plots import plot_stiffness_scatter as plot_stiffness_scatter
-from ._fold_curve_plot import plot_fold_curve as plot_fold_curve
 from ._force_cycles import trace_cycles as trace_cycles
 from ._force_plots import Slice as Slice
 from ._force_plots import effect_on_its_own as effect_on_its_own

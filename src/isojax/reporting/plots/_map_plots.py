@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from ...stability import FoldCurve, StabilityMap
-from ._fold_curve_plot import draw_lens
+from ._bifurcation_curve_plots import draw_lens
 from ._stability_style import MILLIMETRES, drive_words
 from ._style import axes_for, entitle
 

@@ -29,7 +29,9 @@ from ...stability import (
     Branch,
     FoldCurve,
     FrequencyResponse,
+    NeimarkSackerCurve,
     Orbit,
+    PeriodDoublingCurve,
     PhasePortrait,
     ResponseBands,
     ReturnToOrbit,
@@ -38,12 +40,12 @@ from ...stability import (
     Transmissibility,
 )
 from ._attractor_plots import plot_basins, plot_bifurcation_diagram, plot_phase_portrait, plot_return
+from ._bifurcation_curve_plots import plot_bifurcation_curve, plot_fold_curve
 from ._branch_plots import plot_backbone, plot_branch, plot_frequency_response, plot_transmissibility
 from ._classical_plots import plot_receptance
 from ._coefficient_plots import plot_posterior, plot_profile
 from ._design_plots import plot_design, plot_next_test
 from ._evidence_plots import plot_ranking
-from ._fold_curve_plot import plot_fold_curve
 from ._global_sensitivity_plot import plot_global_sensitivity
 from ._map_plots import plot_stability_map
 from ._record_plot import plot_record
@@ -105,8 +107,10 @@ OBVIOUS: dict[type, Callable[..., Figure]] = {
     FrequencyResponse: plot_frequency_response,
     GlobalSensitivity: plot_global_sensitivity,
     Loop: plot_time_history,
+    NeimarkSackerCurve: plot_bifurcation_curve,
     NextTest: plot_next_test,
     Orbit: _orbit,
+    PeriodDoublingCurve: plot_bifurcation_curve,
     PhasePortrait: plot_phase_portrait,
     Posterior: plot_posterior,
     Profile: plot_profile,

@@ -38,8 +38,17 @@ MARKS: Mapping[str, Mark] = {
     "neimark_sacker": Mark("Neimark-Sacker", "^", "#2a9d8f"),
     "symmetry_breaking": Mark("symmetry breaking", "D", "#9b5de5"),
     "cusp": Mark("cusp", "*", "#222222"),
+    "resonance_1_1": Mark("1:1 resonance", "P", BEFORE),
+    "resonance_1_2": Mark("1:2 resonance", "X", "#e9c46a"),
+    "resonance_1_3": Mark("1:3 resonance", "v", "#2a9d8f"),
+    "resonance_1_4": Mark("1:4 resonance", "d", "#2a9d8f"),
 }
-"""Every bifurcation, by the name of its kind."""
+"""Every bifurcation and special point of curves of them, by the name of its kind."""
+
+
+def mark_of(kind: str) -> Mark:
+    """Give how a special point is drawn; an event of a branch by its own name."""
+    return MARKS.get(kind, Mark(kind, "h", "#ffffff"))
 
 
 def drive_words(excitation: str, symbol: str = "") -> str:
@@ -124,7 +133,7 @@ def draw_special_points(
         if np.isfinite(x) and np.isfinite(y):
             found.setdefault(point if isinstance(point, str) else point.kind, []).append((x, y))
     for kind, places in found.items():
-        ax.plot(*np.transpose(places), zorder=5, **_form(MARKS[kind]))
+        ax.plot(*np.transpose(places), zorder=5, **_form(mark_of(kind)))
     return tuple(found)
 
 
@@ -141,7 +150,8 @@ def _form(mark: Mark) -> dict[str, Any]:
 
 def mark_handle(kind: str) -> Line2D:
     """Give the entry of a bifurcation in a legend."""
-    return Line2D([], [], label=MARKS[kind].words, **_form(MARKS[kind]))
+    mark = mark_of(kind)
+    return Line2D([], [], label=mark.words, **_form(mark))
 
 
 def stability_handles(
@@ -163,7 +173,8 @@ def stability_handles(
     handles.append(Line2D([], [], color=grey, linewidth=1.6, label="stable"))
     if unstable:
         handles.append(Line2D([], [], color=grey, linewidth=1.3, linestyle=_DASHES, label="unstable"))
-    handles += [mark_handle(kind) for kind in MARKS if kind in set(kinds)]
+    drawn = sorted(set(kinds), key=lambda kind: ([*MARKS, kind].index(kind), kind))
+    handles += [mark_handle(kind) for kind in drawn]
     return [*handles, *extra]
 
 

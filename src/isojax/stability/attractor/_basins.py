@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
@@ -121,7 +122,7 @@ def basins_of_attraction(
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _settled(
     model: Isolator, excitation: Harmonic, how: Watch, state: State, looks: int, repetition: Repetition
 ) -> tuple[Float[Array, "sample lane state"], Int[Array, " lane"]]:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
@@ -63,6 +64,30 @@ class BifurcationDiagram(eqx.Module):
     result: RESULTS
 
     @property
+    def quasi_periodic(self) -> Bool[Array, "*run point"]:
+        """Whether the motion repeats nowhere up to the bound and is not chaotic: it runs on a torus, or has a
+        longer period.
+        """
+        return (self.period == 0) & ~self.chaotic & jnp.isfinite(self.samples[..., 0, 0])
+
+    @property
+    def rotation_number(self) -> Float[Array, "*run point"]:
+        """Turns a drive period of the samples around their mean, of displacement and velocity, up to whole
+        turns and their sense: from 0 to 1/2; NaN where the motion is not quasi-periodic.
+        """
+        plane = self.samples[..., :2] - jnp.mean(self.samples[..., :2], axis=-2, keepdims=True)
+        size = jnp.std(plane, axis=-2, keepdims=True)
+        plane = plane / jnp.where(size > 0.0, size, 1.0)
+        place = jax.lax.complex(plane[..., 0], plane[..., 1])
+        # Of the steps from sample to sample: their sum around a closed curve counts its turns.
+        ahead = jnp.angle(place[..., 1:] * jnp.conj(place[..., :-1]))
+        share = jnp.mean(ahead, axis=-1) / (2.0 * math.pi)
+        one_way = jnp.mean(jnp.where(ahead < 0.0, ahead + 2.0 * math.pi, ahead), axis=-1) / (2.0 * math.pi)
+        # Steps of half a turn change their sign at random: counted one way round they do not.
+        turns = jnp.where(jnp.abs(share) < 0.25, jnp.abs(share), jnp.minimum(one_way, 1.0 - one_way))
+        return jnp.where(self.quasi_periodic, turns, jnp.nan)
+
+    @property
     def displacement(self) -> Float[Array, "*run point sample"]:
         """[m]."""
         return self.samples[..., 0]
@@ -77,7 +102,9 @@ class BifurcationDiagram(eqx.Module):
         counts = zip(*np.unique(period, return_counts=True), strict=True)
         words = ", ".join(f"{count} of period {value}" for value, count in counts if value)
         runs = ", ".join(dict.fromkeys(self.runs))
-        return f"along {self.parameter} ({runs}): {words or 'no periodic motion'}, {chaotic} chaotic"
+        torus = (period == 0) & ~np.asarray(self.chaotic) & np.isfinite(np.asarray(self.samples)[..., 0, 0])
+        more = f", {int(torus.sum())} quasi-periodic" if torus.any() else ""
+        return f"along {self.parameter} ({runs}): {words or 'no periodic motion'}{more}, {chaotic} chaotic"
 
     def _rows(self) -> list[str]:
         return ["model", "amplitudes", "frequencies", "samples", "period", "lyapunov", "result"]
@@ -202,7 +229,7 @@ def _seen(
     return (seen.state, seen.tangent), (path, seen.growth.T)
 
 
-@eqx.filter_jit
+@quick_jit
 def _swept(
     model: Isolator, how: Watch, points: Points, legs: tuple[str, ...], begin: State
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
@@ -222,7 +249,7 @@ def _swept(
     return jnp.concatenate(parts[0], axis=1), jnp.concatenate(parts[1], axis=1)
 
 
-@eqx.filter_jit
+@quick_jit
 def _anew(
     model: Isolator, how: Watch, points: Points, begin: State
 ) -> tuple[Float[Array, "point run sample state"], Float[Array, "point run sample"]]:
@@ -233,7 +260,7 @@ def _anew(
     return path.reshape(count, runs, how.periods, -1), growth.reshape(count, runs, how.periods)
 
 
-@eqx.filter_jit
+@quick_jit
 def _classify_motions(
     frequencies: Float[Array, " point"],
     path: Float[Array, "point run sample state"],

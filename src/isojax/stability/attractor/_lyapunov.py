@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import amount, shown
 from ..._types import Lanes, check_float64
@@ -82,7 +83,7 @@ def largest_lyapunov_exponent(
     return _exponent(model, excitation, start_states(model, "start", start), integrator, settle, periods)
 
 
-@eqx.filter_jit
+@quick_jit
 def _exponent(
     model: Isolator, excitation: Harmonic, state: State, integrator: Integrator, settle: int, periods: int
 ) -> LyapunovExponent:

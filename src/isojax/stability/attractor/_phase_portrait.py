@@ -2,10 +2,10 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
@@ -63,7 +63,7 @@ def phase_portrait(
     return _portrait(model, excitation, start_states(model, "start", start), integrator, settle, periods)
 
 
-@eqx.filter_jit
+@quick_jit
 def _portrait(
     model: Isolator, excitation: Harmonic, state: State, integrator: Integrator, settle: int, periods: int
 ) -> PhasePortrait:

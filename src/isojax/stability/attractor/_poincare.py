@@ -3,12 +3,12 @@
 import math
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
@@ -79,7 +79,7 @@ def poincare_section(
     return _section(model, excitation, jnp.asarray(turns), state, how)
 
 
-@eqx.filter_jit
+@quick_jit
 def _section(
     model: Isolator, excitation: Harmonic, phases: Float[Array, " phase"], state: State, how: Watch
 ) -> PoincareSection:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import brief, shown
 from ..._types import Lanes, check_float64
@@ -109,7 +110,7 @@ def return_to_orbit(
     return _return(model, orbit, kick, periods, integrator)
 
 
-@eqx.filter_jit
+@quick_jit
 def _return(
     model: Isolator, orbit: Orbit, kick: Float[Array, " state"], periods: int, integrator: Integrator
 ) -> ReturnToOrbit:

@@ -1,25 +1,30 @@
 """Branches of periodic orbits along one parameter, and curves of their bifurcations over two.
 
-In: an isolator, the parameter and its range. Out: `Branch` with its `SpecialPoint`s, fold and period-
-doubling curves, nearest folds. Read _parameter_family, _arc_length (how a curve is followed), _branch,
-_continuation with _tracing; then _other_branches (what the branch does not reach) with _orbit_search and
-_orbit_starts; _special_points (what is located along a branch) and _extended_system (its exact
-equations); then _branch_switching, _codimension_two with _bifurcation_curves, and _nearest_folds.
+In: an isolator, the parameter and its range. Out: `Branch` with its `SpecialPoint`s, curves of folds,
+period doublings and Neimark-Sacker bifurcations, nearest folds. Read _parameter_family, _arc_length (how a
+curve is followed), _branch, _continuation with _tracing; then _other_branches (what the branch does not
+reach) with _orbit_search and _orbit_starts; _criticality (what vanishes where an orbit bifurcates),
+_locating and _special_points (what is found along a branch) with _extended_system (its exact equations);
+then _branch_switching, _codimension_two with _orbit_curve and _bifurcation_curves, and _nearest_folds.
 """
 
-from ._bifurcation_curves import Cusp as Cusp
+from ._bifurcation_curves import CodimensionTwoPoint as CodimensionTwoPoint
 from ._bifurcation_curves import FoldCurve as FoldCurve
+from ._bifurcation_curves import NeimarkSackerCurve as NeimarkSackerCurve
 from ._bifurcation_curves import PeriodDoublingCurve as PeriodDoublingCurve
 from ._branch import Branch as Branch
+from ._branch import BranchEvent as BranchEvent
 from ._branch import BranchPoints as BranchPoints
 from ._branch import Searched as Searched
 from ._branch import SpecialPoint as SpecialPoint
 from ._branch import half_range as half_range
 from ._branch_switching import switch_branch as switch_branch
 from ._codimension_two import fold_curve as fold_curve
+from ._codimension_two import neimark_sacker_curve as neimark_sacker_curve
 from ._codimension_two import period_doubling_curve as period_doubling_curve
 from ._continuation import continue_branch as continue_branch
 from ._continuation import tracing_steps as tracing_steps
+from ._criticality import BifurcationKind as BifurcationKind
 from ._extended_system import PointGuess as PointGuess
 from ._nearest_folds import NearestFolds as NearestFolds
 from ._nearest_folds import find_nearest_folds as find_nearest_folds

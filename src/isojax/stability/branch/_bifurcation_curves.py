@@ -4,27 +4,52 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._implicit import frozen
 from ..._results import RESULTS
 from ..._show import brief, number, shown
 from ...models import Band
+from ..orbit import pair_angle
+
+WORDS = {
+    "cusp": "cusp",
+    "resonance_1_1": "1:1 resonance (fold meets Neimark-Sacker)",
+    "resonance_1_2": "1:2 resonance (doubling meets Neimark-Sacker)",
+    "resonance_1_3": "1:3 resonance",
+    "resonance_1_4": "1:4 resonance",
+}
 
 
 @shown
-class Cusp(eqx.Module):
-    """Where two folds meet and end.
+class CodimensionTwoPoint(eqx.Module):
+    """A special point of a curve of bifurcations: two conditions meet there.
 
     Attributes:
+        kind: "cusp", where two folds meet and end; "resonance_1_1", a pair of multipliers +1;
+            "resonance_1_2", a pair -1; "resonance_1_3" and "resonance_1_4", a pair `exp(+-i theta)` with
+            theta of 120 and of 90 degrees. The multipliers are those of the map that closes the orbit: for
+            symmetric orbits over half a period.
         amplitude: F0 [N, or m/s^2 for base excitation].
         frequency: f [Hz].
-        y0: state at t = 0, SI units.
+        y0: state at t = 0, SI units. Its derivative by the model leaves out, at a cusp, what moves along the
+            critical direction; those of amplitude and frequency hold.
+        multipliers: over the period of the orbit, in falling modulus.
+        result: whether it was found; if not, its numbers are NaN.
+
+    Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, sec. 9.5.
     """
 
+    kind: str = eqx.field(static=True)
     amplitude: Float[Array, ""]
     frequency: Float[Array, ""]
     y0: Float[Array, " state"]
+    multipliers: Complex[Array, " multiplier"]
+    result: RESULTS
 
     def _headline(self) -> str:
-        return f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
+        if not np.isfinite(np.asarray(self.amplitude)):
+            return f"{WORDS[self.kind]}, not found. {brief(self.result)}"
+        where = f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
+        return f"{WORDS[self.kind]} at {where}"
 
 
 @shown
@@ -36,8 +61,7 @@ class FoldCurve(eqx.Module):
         frequency: f [Hz].
         y0: state at t = 0, SI units.
         multipliers: in falling modulus; one is +1.
-        cusps: where two folds meet. Derivatives of their amplitude and frequency by the model hold; the state
-            moves along the critical direction as well, which its derivative leaves out.
+        special_points: cusps and 1:1 resonances, in the order of the curve.
         closed: whether the last point is the first.
         periods: drive periods after which the orbits repeat.
         symmetric: whether they were closed with the half-period map.
@@ -50,17 +74,23 @@ class FoldCurve(eqx.Module):
     frequency: Float[Array, " point"]
     y0: Float[Array, "point state"]
     multipliers: Complex[Array, "point multiplier"]
-    cusps: tuple[Cusp, ...]
+    special_points: tuple[CodimensionTwoPoint, ...]
     closed: Bool[Array, ""]
     periods: int = eqx.field(static=True)
     symmetric: bool = eqx.field(static=True)
     result: RESULTS
     band: Band | None = None
 
+    @property
+    def cusps(self) -> tuple[CodimensionTwoPoint, ...]:
+        """Where two folds meet and end, those that were found."""
+        return _found(self.special_points, "cusp")
+
     def _headline(self) -> str:
-        amplitude, frequency = brief(self.amplitude), brief(self.frequency)
-        shape = "closed" if bool(np.asarray(self.closed)) else "open"
-        return f"{shape} curve of folds: amplitude {amplitude}, frequency {frequency} Hz"
+        return _headline("folds", self)
+
+    def _lines(self) -> list[str]:
+        return [f"  {point._headline()}" for point in self.special_points]
 
 
 @shown
@@ -72,6 +102,7 @@ class PeriodDoublingCurve(eqx.Module):
         frequency: f [Hz].
         y0: state at t = 0 of the orbit that doubles, SI units.
         multipliers: in falling modulus; one is -1.
+        special_points: 1:2 resonances, in the order of the curve.
         closed: whether the last point is the first.
         periods: drive periods after which the orbits that double repeat.
         result: see `FoldCurve`.
@@ -81,11 +112,73 @@ class PeriodDoublingCurve(eqx.Module):
     frequency: Float[Array, " point"]
     y0: Float[Array, "point state"]
     multipliers: Complex[Array, "point multiplier"]
+    special_points: tuple[CodimensionTwoPoint, ...]
     closed: Bool[Array, ""]
     periods: int = eqx.field(static=True)
     result: RESULTS
 
     def _headline(self) -> str:
-        amplitude, frequency = brief(self.amplitude), brief(self.frequency)
-        shape = "closed" if bool(np.asarray(self.closed)) else "open"
-        return f"{shape} curve of period doublings: amplitude {amplitude}, frequency {frequency} Hz"
+        return _headline("period doublings", self)
+
+    def _lines(self) -> list[str]:
+        return [f"  {point._headline()}" for point in self.special_points]
+
+
+@shown
+class NeimarkSackerCurve(eqx.Module):
+    """Neimark-Sacker bifurcations over the plane of the drive: where quasi-periodic motion begins.
+
+    Attributes:
+        amplitude: F0 along the curve [N, or m/s^2 for base excitation].
+        frequency: f [Hz].
+        y0: state at t = 0 of the periodic orbit, SI units.
+        multipliers: in falling modulus; two are `exp(+-i theta)`.
+        special_points: strong resonances, in the order of the curve.
+        closed: whether the last point is the first.
+        periods: drive periods after which the orbits repeat.
+        symmetric: whether they were closed with the half-period map.
+        result: whether the curve was followed until it closed, left the window or ended at a resonance 1:1 or
+            1:2, every point to the tolerance of a single orbit; points that were not are NaN.
+    """
+
+    amplitude: Float[Array, " point"]
+    frequency: Float[Array, " point"]
+    y0: Float[Array, "point state"]
+    multipliers: Complex[Array, "point multiplier"]
+    special_points: tuple[CodimensionTwoPoint, ...]
+    closed: Bool[Array, ""]
+    periods: int = eqx.field(static=True)
+    symmetric: bool = eqx.field(static=True)
+    result: RESULTS
+
+    @property
+    def angle(self) -> Float[Array, " point"]:
+        """Theta of the pair on the unit circle, from 0 to pi [rad]."""
+        return pair_angle(self.multipliers)
+
+    @property
+    def rotation_number(self) -> Float[Array, " point"]:
+        """Turns of the quasi-periodic motion around the orbit within `periods` drive periods, up to whole
+        turns and their sense: theta / (2 pi), from 0 to 1/2.
+        """
+        return self.angle / (2.0 * np.pi)
+
+    def _headline(self) -> str:
+        return (
+            f"{_headline('Neimark-Sacker bifurcations', self)}, rotation number {brief(self.rotation_number)}"
+        )
+
+    def _lines(self) -> list[str]:
+        return [f"  {point._headline()}" for point in self.special_points]
+
+
+def _headline(what: str, curve: FoldCurve | PeriodDoublingCurve | NeimarkSackerCurve) -> str:
+    shape = "closed" if bool(np.asarray(curve.closed)) else "open"
+    amplitude, frequency = brief(curve.amplitude), brief(curve.frequency)
+    return f"{shape} curve of {what}: amplitude {amplitude}, frequency {frequency} Hz"
+
+
+def _found(points: tuple[CodimensionTwoPoint, ...], kind: str) -> tuple[CodimensionTwoPoint, ...]:
+    return tuple(
+        point for point in points if point.kind == kind and np.isfinite(np.asarray(frozen(point.amplitude)))
+    )

@@ -1,6 +1,7 @@
 """A branch of periodic orbits: its points, its bifurcations, and what following another one needs."""
 
 import math
+from collections.abc import Callable
 from typing import Literal
 
 import equinox as eqx
@@ -12,9 +13,9 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS
 from ..._show import Row, amount, brief, number, shown
+from ..._types import Scalar
 from ...models import Integrator, Isolator, State
-from ..orbit import ShootingMethod, Sine, modulus, multipliers, trajectory, value_and_jacobian
-from ._extended_system import BifurcationKind
+from ..orbit import ShootingMethod, Sine, modulus, multipliers, pair_angle, trajectory, value_and_jacobian
 from ._parameter_family import ParameterFamily
 
 
@@ -59,12 +60,30 @@ class BranchPoints(eqx.Module):
         return f"{int(known.sum())} points, {int(stable.sum())} of them stable"
 
 
-@shown
-class SpecialPoint(eqx.Module):
-    """A bifurcation of periodic orbits.
+class BranchEvent(eqx.Module):
+    """Something to look out for along a branch: a named number of its orbits whose zero is located.
 
     Attributes:
-        kind: "fold", "period_doubling", "neimark_sacker" or "symmetry_breaking".
+        name: by which the special points are called.
+        function: gives the number of one orbit, a `BranchPoints` of a single point; written with `jax.numpy`,
+            and smooth where its derivative is wanted.
+
+    Example:
+        >>> ij.BranchEvent("5 mm", lambda orbit: orbit.response - 5e-3).name
+        '5 mm'
+    """
+
+    name: str = eqx.field(static=True)
+    function: Callable[[BranchPoints], Scalar] = eqx.field(static=True)
+
+
+@shown
+class SpecialPoint(eqx.Module):
+    """A bifurcation of periodic orbits, or the zero of an event.
+
+    Attributes:
+        kind: "fold", "period_doubling", "neimark_sacker" (quasi-periodic motion begins there) or
+            "symmetry_breaking"; of an event its name.
         periods: drive periods after which the orbit repeats.
         branch: which branch of a batch it lies on; 0 for a single one.
         value: of the parameter [its SI unit].
@@ -74,14 +93,15 @@ class SpecialPoint(eqx.Module):
         multipliers: over `periods` drive periods, in falling modulus.
         half_period_multipliers: those of the half-period map; NaN where the orbit is not symmetric.
         direction: direction of the state in which the orbit loses its hold, SI units; of a pair
-            its real part.
-        result: whether it was found to the tolerance of a single orbit; if not, its numbers are NaN.
+            its real part; NaN of an event.
+        result: whether it was found to the tolerance of a single orbit (of an event, of the branch's own
+            steps); if not, its numbers are NaN.
         family: isolators and drives along the parameter.
         integrator: steps and solver.
         symmetric: whether it was closed with the half-period map.
     """
 
-    kind: BifurcationKind = eqx.field(static=True)
+    kind: str = eqx.field(static=True)
     periods: int = eqx.field(static=True)
     branch: int = eqx.field(static=True)
     value: Float[Array, ""]
@@ -106,10 +126,22 @@ class SpecialPoint(eqx.Module):
         """Largest modulus of the multipliers."""
         return modulus(self.multipliers[0])
 
+    @property
+    def rotation_number(self) -> Float[Array, ""]:
+        """Turns around the orbit within its period of the quasi-periodic motion that begins at a Neimark-
+        Sacker bifurcation, up to whole turns and their sense: from 0 to 1/2; NaN of other kinds.
+        """
+        angle = pair_angle(self.multipliers) / (2.0 * math.pi)
+        return angle if self.kind == "neimark_sacker" else jnp.nan * angle
+
     def _headline(self) -> str:
         drive = f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
         after = "" if self.periods == 1 else f", orbit over {self.periods} drive periods"
-        return f"{self.kind.replace('_', ' ')} at {drive}{after}"
+        torus = ""
+        if self.kind == "neimark_sacker" and np.isfinite(np.asarray(self.value)):
+            turns = number(float(self.rotation_number))
+            torus = f": quasi-periodic motion begins here, rotation number {turns}"
+        return f"{self.kind.replace('_', ' ')} at {drive}{after}{torus}"
 
     def _rows(self) -> list[str]:
         return ["value", "y0", "multipliers", "direction", "result"]
@@ -155,7 +187,7 @@ class Branch(eqx.Module):
             the first.
         closed: whether the branch returns to its first point.
         points: the orbits.
-        special_points: bifurcations in the order of the branch; of a batch, branch after branch.
+        special_points: bifurcations and events in the order of the branch; of a batch, branch after branch.
         result: whether the branch was followed to the end of the range, or back to its start.
         family: isolators and drives along the parameter.
         integrator: steps and solver.
@@ -165,6 +197,7 @@ class Branch(eqx.Module):
             (isolas), curves that leave the range, subharmonics. Of mirror images one is given, and of the
             orbits that are one motion counted from another drive period.
         searched: where they were sought; None if they were not.
+        events: what was looked out for.
     """
 
     model: Isolator
@@ -181,6 +214,7 @@ class Branch(eqx.Module):
     longest: float = eqx.field(static=True)
     others: tuple["Branch", ...] = ()
     searched: Searched | None = None
+    events: tuple[BranchEvent, ...] = ()
 
     @property
     def connection(self) -> Literal["none", "bifurcation", "unknown"]:
@@ -270,11 +304,33 @@ def branch_point(
     Returns:
         The point. Its derivatives by the model are those of the branch moving across itself.
     """
-    states = scale.shape[0]
     held = method, scale, tangent, unknown
     left, slope = value_and_jacobian(lambda here: _across(here, frozen(family), held)[0], unknown)
     closed = unknown - jnp.linalg.solve(slope, left)
     unknown = with_derivatives(closed, _across, closed, family, held)
+    return orbit_at(family, method, scale, unknown, tangent)
+
+
+def orbit_at(
+    family: ParameterFamily,
+    method: ShootingMethod,
+    scale: Float[Array, " state"],
+    unknown: Float[Array, " unknown"],
+    tangent: Float[Array, " unknown"],
+) -> BranchPoints:
+    """Give what is known of one closed motion.
+
+    Args:
+        family: isolators and drives.
+        method: how the orbits are closed.
+        scale: size of each state.
+        unknown: scaled state and share of the parameter.
+        tangent: along the branch.
+
+    Returns:
+        The point.
+    """
+    states = scale.shape[0]
     scaled, shares = unknown[:states], unknown[states:]
     setting = family.at(shares)
     matrix = jax.jacfwd(lambda z: family.image(method, scale, z, shares))(scaled)

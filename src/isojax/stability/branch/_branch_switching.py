@@ -70,4 +70,4 @@ def switch_branch(
     departure = Departure((origin + _ASIDE * step * tangent)[None], tangent[None], tangent[None])
     method = ShootingMethod(branch.integrator, periods, False)
     followed = trace(still, method, scale, departure, Stride(step, most))
-    return assemble(family, method, scale, followed, batched=False, step=step)
+    return assemble(family, method, scale, followed, batched=False, step=step, events=branch.events)

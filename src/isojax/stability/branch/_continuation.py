@@ -3,8 +3,8 @@
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import get_args
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,11 +12,13 @@ from jaxtyping import Array, Float
 
 from ..._implicit import frozen
 from ..._parameters import list_parameters
+from ..._quick_jit import quick_jit
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..orbit import ShootingMethod, is_odd, refuse_traced, response_start
-from ._arc_length import Departure, Stride
-from ._branch import Branch
+from ._arc_length import Departure, Followed, Stride
+from ._branch import Branch, BranchEvent
+from ._criticality import BifurcationKind
 from ._other_branches import BranchSearch, find_other_branches
 from ._parameter_family import ParameterFamily
 from ._tracing import assemble, trace
@@ -49,6 +51,7 @@ def continue_branch(
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
+    events: Sequence[BranchEvent] = (),
 ) -> Branch:
     """Follow a branch of periodic orbits along the drive's amplitude, its frequency or any coefficient.
 
@@ -79,6 +82,8 @@ def continue_branch(
         step: largest step, over the size of the motion and the range of the parameter.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
+        events: numbers of the orbits whose zeros are to be located too; they are among the special points,
+            by their names. Passing the same events again uses what was compiled for them.
 
     Returns:
         The branch. Where it ends early `result` says so, and the points found so far stand.
@@ -87,7 +92,7 @@ def continue_branch(
         ValueError: if `parameter` is none of the model's, the drive is incomplete or said twice, the range is
             empty or not finite, a frequency is not positive, `start_state` has the wrong length, `symmetric`
             is asked of a model that is not odd, or `step`, `most`, `periods` or one of `other_periods` is not
-            positive.
+            positive, or two events have one name or that of a bifurcation.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Nayfeh & Balachandran 1995, sec. 6.1.
@@ -102,13 +107,16 @@ def continue_branch(
     check_float64()
     refuse_traced(model, amplitude, frequency, start, stop)
     integrator = tracing_steps() if integrator is None else integrator
-    family, batched = _family(model, parameter, start, stop, amplitude, frequency)
+    family, batched = swept_family(model, parameter, start, stop, amplitude, frequency)
     states = 2 + model.internal_states
     if start_state is not None and len(start_state) != states:
         raise ValueError(f"Argument `start_state` must hold {states} states, but holds {len(start_state)}.")
     for name, value in (("periods", periods), ("step", step), ("most", most)):
         if not value > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
+    own = [event.name for event in events]
+    if len({*own, *get_args(BifurcationKind)}) < len(own) + len(get_args(BifurcationKind)):
+        raise ValueError(f"Argument `events` must have names of their own, but they are {own}.")
     if other_periods is None:
         other_periods = (1, 2, 3) if start_state is None else ()
     if any(count < 1 for count in other_periods):
@@ -123,20 +131,41 @@ def continue_branch(
             "periods, but is True."
         )
     begin = None if start_state is None else jnp.stack([as_float64(value) for value in start_state])
-    still = frozen(family)
-    first, scale = _starts(still, frozen(begin))
-    fixed = jnp.zeros((*scale.shape[:1], states + 1)).at[:, -1].set(1.0)
     method, stride = ShootingMethod(integrator, periods, half), Stride(step, most)
-    followed = trace(still, method, scale, Departure(first, fixed, fixed), stride)
-    branch = assemble(family, method, scale, followed, batched, step)
+    scale, followed = follow_branches(frozen(family), method, frozen(begin), stride)
+    branch = assemble(family, method, scale, followed, batched, step, tuple(events))
     if not other_periods:
         return branch
-    search = BranchSearch(tuple(other_periods), stride)
+    search = BranchSearch(tuple(other_periods), stride, tuple(events))
     found, searched = find_other_branches(family, method, scale, followed, search)
     return dataclasses.replace(branch, others=found, searched=searched)
 
 
-def _family(
+def follow_branches(
+    family: ParameterFamily,
+    method: ShootingMethod,
+    begin: Float[Array, " state"] | None,
+    stride: Stride,
+) -> tuple[Float[Array, "branch state"], Followed]:
+    """Follow branches from the start of their range.
+
+    Args:
+        family: isolators and drives, drive with a leading axis.
+        method: how the orbits are closed.
+        begin: state to start from; the one-harmonic balance if None.
+        stride: steps along the branches.
+
+    Returns:
+        The size of each state, and the curves.
+    """
+    first, scale = _starts(family, begin)
+    fixed = np.zeros(first.shape)
+    fixed[:, -1] = 1.0
+    fixed = jnp.asarray(fixed)
+    return scale, trace(family, method, scale, Departure(first, fixed, fixed), stride)
+
+
+def swept_family(
     model: Isolator,
     parameter: str,
     start: Scalar | float,
@@ -176,7 +205,7 @@ def _family(
     return ParameterFamily(model, *drives, start[None], stop[None], (parameter,)), bool(shape)
 
 
-@eqx.filter_jit
+@quick_jit
 def _starts(
     family: ParameterFamily, begin: Float[Array, " state"] | None
 ) -> tuple[Float[Array, "branch unknown"], Float[Array, "branch state"]]:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
@@ -191,7 +192,7 @@ class _Orbits(eqx.Module):
     finite: Bool[Array, "*motion"]
 
 
-@eqx.filter_jit
+@quick_jit
 def _orbits(
     model: Isolator,
     integrator: Integrator,
@@ -235,7 +236,7 @@ def _orbits(
     return jax.vmap(lane)(amplitude, frequency, starts)
 
 
-@eqx.filter_jit
+@quick_jit
 def _folds(
     model: Isolator,
     integrator: Integrator,

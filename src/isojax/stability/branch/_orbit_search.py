@@ -3,12 +3,12 @@
 import math
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ..._quick_jit import quick_jit
 from ...models import Integrator
 from ..orbit import period_map, value_and_jacobian
 from ._orbit_starts import OrbitStarts
@@ -49,7 +49,7 @@ class FoundOrbits(NamedTuple):
         return FoundOrbits(*(values[which] for values in self))
 
 
-@eqx.filter_jit
+@quick_jit
 def _improved(
     family: ParameterFamily,
     integrator: Integrator,

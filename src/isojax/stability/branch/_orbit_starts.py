@@ -3,12 +3,12 @@
 import math
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ..orbit import imposed_balance, rest_displacement
 from ._parameter_family import ParameterFamily
 
@@ -71,7 +71,7 @@ class OneHarmonic(NamedTuple):
     frequency: Float[np.ndarray, " share"]
 
 
-@eqx.filter_jit
+@quick_jit
 def _tables(
     family: ParameterFamily, shares: Float[Array, " share"], sizes: Float[Array, " size"], periods: Array
 ) -> tuple[Array, Array, Array, Array]:
@@ -89,7 +89,7 @@ def _tables(
     return jax.vmap(row)(shares)
 
 
-@eqx.filter_jit
+@quick_jit
 def _balanced_states(
     family: ParameterFamily, shares: Float[Array, " start"], sizes: Float[Array, " start"]
 ) -> Float[Array, "start state"]:

@@ -11,7 +11,7 @@ from ..._implicit import frozen
 from ...models import Integrator
 from ..orbit import ShootingMethod, is_odd
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride
-from ._branch import Branch, Searched
+from ._branch import Branch, BranchEvent, Searched
 from ._orbit_search import FoundOrbits, OrbitSearch
 from ._orbit_starts import PLACES, OrbitStarts, one_harmonic, orbit_starts
 from ._parameter_family import ParameterFamily
@@ -81,10 +81,12 @@ class BranchSearch(NamedTuple):
     Attributes:
         periods: drive periods of the orbits that are sought.
         stride: steps along the branches that are found.
+        events: what to look out for along them.
     """
 
     periods: tuple[int, ...]
     stride: Stride
+    events: tuple[BranchEvent, ...] = ()
 
 
 def find_other_branches(
@@ -126,7 +128,7 @@ def find_other_branches(
         curves, largest, more = _other_curves(own, odd, main, search)
         reach, left = max(reach, largest), left + more
         lanes = live.driven(live.amplitude[lane : lane + 1], live.frequency[lane : lane + 1])
-        found += [_branch(lanes, curve, search.stride) for curve in curves]
+        found += [_branch(lanes, curve, search) for curve in curves]
     shares = (np.arange(PLACES) + 0.5) / PLACES
     values = np.asarray(jax.vmap(still.values)(jnp.asarray(shares)[:, None]))[:, 0]
     return tuple(found), Searched(still.names[0], jnp.asarray(values), search.periods, reach, left)
@@ -213,12 +215,14 @@ def _followed_both_ways(
     return Curve(method, scale, unknowns, tangents, ending)
 
 
-def _branch(live: ParameterFamily, curve: Curve, stride: Stride) -> Branch:
+def _branch(live: ParameterFamily, curve: Curve, search: BranchSearch) -> Branch:
     """Give a curve as a branch."""
-    count = len(curve.unknowns)
+    count, stride = len(curve.unknowns), search.stride
     room = ((0, max(2 * stride.most - count, 0)), (0, 0))
     unknowns, tangents = (
         jnp.asarray(np.pad(values, room, mode="edge"))[None] for values in (curve.unknowns, curve.tangents)
     )
     followed = Followed(unknowns, tangents, jnp.asarray([count]), jnp.asarray([curve.ending]))
-    return assemble(live, curve.method, jnp.asarray(curve.scale)[None], followed, False, stride.longest)
+    return assemble(
+        live, curve.method, jnp.asarray(curve.scale)[None], followed, False, stride.longest, search.events
+    )

@@ -1,21 +1,22 @@
 """From starts to branches: many curves traced at once, and what is known of each point of them."""
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..orbit import ShootingMethod
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
-from ._branch import Branch, BranchPoints, branch_point
+from ._branch import Branch, BranchEvent, BranchPoints, branch_point
+from ._locating import BranchCurves
 from ._parameter_family import ParameterFamily
 from ._special_points import find_special_points
 
 
-@eqx.filter_jit
+@quick_jit
 def trace(
     family: ParameterFamily,
     method: ShootingMethod,
@@ -44,7 +45,7 @@ def trace(
     return jax.vmap(lane)(family.amplitude, family.frequency, scale, departure)
 
 
-@eqx.filter_jit
+@quick_jit
 def _branch_points(
     family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
 ) -> BranchPoints:
@@ -57,6 +58,11 @@ def _branch_points(
     return jax.vmap(lane)(family.amplitude, family.frequency, scale, unknowns, tangents)
 
 
+def room_for(counts: Int[np.ndarray, " branch"], most: int) -> int:
+    """Give how many points of each branch to keep: all, rounded up, so that few shapes are compiled."""
+    return min(-(-max(int(counts.max()), 2) // 128) * 128, most)
+
+
 def assemble(
     family: ParameterFamily,
     method: ShootingMethod,
@@ -64,6 +70,7 @@ def assemble(
     followed: Followed,
     batched: bool,
     step: float,
+    events: tuple[BranchEvent, ...] = (),
 ) -> Branch:
     """Give the branch of traced points: what is known of each, and the bifurcations between them.
 
@@ -74,16 +81,17 @@ def assemble(
         followed: the traced points.
         batched: whether to keep the leading axis.
         step: largest step.
+        events: what to look out for.
 
     Returns:
         The branch.
     """
     counts = np.asarray(followed.found)
-    # Rounded up, so that few shapes are compiled.
-    room = min(-(-max(int(counts.max()), 2) // 128) * 128, followed.unknowns.shape[1])
+    room = room_for(counts, followed.unknowns.shape[1])
     unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
     points = _branch_points(family, method, scale, unknowns, tangents)
-    special = find_special_points(family, method, scale, unknowns, tangents, counts)
+    curves = BranchCurves(scale, unknowns, tangents, counts)
+    special = find_special_points(family, method, curves, events, points)
     longest = int(counts.max())
 
     def crop(values: Array) -> Array:
@@ -112,4 +120,5 @@ def assemble(
         method.integrator,
         single(scale),
         step,
+        events=events,
     )

@@ -1,6 +1,6 @@
 """A known answer found again for another model: what JAX can trace, batch and differentiate."""
 
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import jax
 import numpy as np
@@ -9,7 +9,7 @@ from jax.core import Tracer
 from ..._types import Scalar, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Isolator, Modelled, as_isolator
-from ..branch import ParameterFamily, PointGuess, SpecialPoint, special_point
+from ..branch import BifurcationKind, ParameterFamily, PointGuess, SpecialPoint, special_point
 from ..map import StabilityMap, found_again
 from ..orbit import Orbit, find_periodic_orbit
 from ..response import Resonance, resonance_near
@@ -98,6 +98,12 @@ def _closed_by_half(orbit: Orbit) -> bool:
 
 def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequency: Any) -> SpecialPoint:
     known = point.family
+    kind = next((name for name in get_args(BifurcationKind) if name == point.kind), None)
+    if kind is None:
+        raise ValueError(
+            "Argument `answer` must be a bifurcation where it is a special point, but is the event "
+            f"{point.kind!r}."
+        )
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if value is not None and name in known.names:
             raise ValueError(
@@ -109,7 +115,7 @@ def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequen
     )
     family = ParameterFamily(model, *fixed, known.start, known.stop, known.names)
     guess = PointGuess(point.y0, known.shares(point.value[None]))
-    return special_point(family, point.method, point.kind, point.branch, guess, _MOVED_WITHIN)
+    return special_point(family, point.method, kind, point.branch, guess, _MOVED_WITHIN)
 
 
 def _map(smap: StabilityMap, model: Isolator, amplitude: Any, frequency: Any) -> StabilityMap:

@@ -1,5 +1,6 @@
 """Batched Newton: orbits and multipliers of many cells of a map at once."""
 
+import functools
 import math
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Complex, Float, Int
 
+from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
 from ..orbit import Crossings, Sine, advance_across_kinks, modulus, multipliers
@@ -86,7 +88,7 @@ def newton_step(model: Isolator, method: MapMethod, lane: Lane) -> tuple[State, 
     return step, matrix
 
 
-@eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
+@functools.partial(quick_jit, options=_WIDE)
 def _newton_steps(model: Isolator, method: MapMethod, lanes: Lane) -> tuple[State, Lanes, Array, Lanes]:
     step, matrix = jax.vmap(lambda lane: newton_step(model, method, lane))(lanes)
     state, response, omega = lanes.state, lanes.response, lanes.drive.angular_frequency
@@ -100,7 +102,7 @@ def _newton_steps(model: Isolator, method: MapMethod, lanes: Lane) -> tuple[Stat
     return moved, size, roots, modulus(roots[..., 0])
 
 
-@eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
+@functools.partial(quick_jit, options=_WIDE)
 def _lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
     read = read_surface(surface, 2 + model.internal_states, *where)
     push, (sine, cosine) = surface.amplitudes[where[0]], read.direction
@@ -238,7 +240,7 @@ def cell_solvers(
     return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
 
 
-@eqx.filter_jit
+@quick_jit
 def states_at_zero(model: Isolator, method: MapMethod, lanes: Lane) -> State:
     """Give the states of orbits at t = 0 of the recorded drive.
 

@@ -4,13 +4,13 @@ import dataclasses
 from typing import NamedTuple
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._implicit import frozen, with_derivatives
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ...excitations import Harmonic
 from ...models import Isolator
@@ -134,7 +134,7 @@ def _put(cells: _Cells, places: np.ndarray, found: _Cells) -> _Cells:
     return jax.tree.map(lambda all_of, some: all_of.at[places].set(some), cells, found)
 
 
-@eqx.filter_jit
+@quick_jit
 def _close(
     model: Isolator,
     method: MapMethod,
@@ -237,7 +237,7 @@ def _gap_and_matrix(
     return left, (root * way.sizes, matrix)
 
 
-@eqx.filter_jit
+@quick_jit
 def _single(
     model: Isolator,
     y0: Float[Array, "cell state"],

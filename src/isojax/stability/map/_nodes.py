@@ -5,13 +5,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._cores import usable_cores
+from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator
 from ..orbit import (
@@ -42,6 +42,9 @@ _START_CLOSED_TO = 1e-6
 
 _MOST_NODE_CROSSINGS = 16
 """Kinks an orbit to make room for."""
+
+_ANY_STEPS = 8
+"""Steps of an integrator that are of no consequence."""
 
 _NODES_A_BLOCK = 544
 """Nodes solved at once: one compiled batch serves grids of any size, and each core runs its own."""
@@ -117,7 +120,7 @@ def node_starts(
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _starts(
     model: Isolator, integrator: Integrator, half: bool, rest: Array, amplitude: Array, frequency: Array
 ) -> tuple[Array, Crossings]:
@@ -184,6 +187,9 @@ def closed_nodes(
         The orbits.
     """
     kinks = kinks_between(np.asarray(method.sides))
+    # The steps are a number on the device: with those of the integrator each count would be compiled anew.
+    integrator = method.integrator.with_steps(_ANY_STEPS)
+    method = MapMethod(integrator, method.half, method.sides, method.steps)
 
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
         return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *map(jnp.asarray, rows))
@@ -196,7 +202,7 @@ def kinks_between(sides: Float[np.ndarray, "piece kink"]) -> Int[np.ndarray, " c
     return np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
 
 
-@eqx.filter_jit
+@quick_jit
 def _closed(
     model: Isolator,
     method: MapMethod,
@@ -297,7 +303,7 @@ def node_responses(
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _responses(
     model: Isolator,
     integrator: Integrator,

@@ -9,6 +9,7 @@ import numpy as np
 from jax.sharding import NamedSharding
 from jaxtyping import Array
 
+from ..._quick_jit import quick_jit
 from ._batched_newton import FOUND, Found, padded
 from ._starts import Candidates, PlacedSurface, read_surface
 
@@ -48,7 +49,7 @@ class SurfaceReader(eqx.Module):
         return Found(states, direction, phases, roots, radius, response, np.full(count, FOUND, np.int8))
 
 
-@eqx.filter_jit
+@quick_jit
 def _read(surface: PlacedSurface, half: bool, where: Any) -> tuple[Array, ...]:
     read = read_surface(surface, 2, *where)
     half_trace, determinant = read.invariants

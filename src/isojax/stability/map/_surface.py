@@ -8,12 +8,12 @@ any force, with the invariants of their period map, from which the multipliers f
 import math
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
+from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
 from ..orbit import response_amplitudes, rest_displacement
 from ._map_method import MapMethod
@@ -134,7 +134,7 @@ class _Grid(NamedTuple):
         return rows @ (self.tables @ columns.T)
 
 
-@eqx.filter_jit
+@quick_jit
 def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:
     rest = rest_displacement(model)
     return rest, response_amplitudes(model, frequencies, amplitudes, rest)
@@ -227,7 +227,9 @@ def _start_grid(
     """Find orbits that are not split, without their invariants, and the kinks that most of them pass."""
     logarithms, band = _axes(ends, frequencies, 0)
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
-    coarse = integrator.with_steps(2 * (integrator.steps_per_period // 4 + 2))
+    # Starts need no more steps where the map takes more, and what is compiled for one grid serves the next.
+    steps = min(integrator.steps_per_period, Integrator().steps_per_period)
+    coarse = integrator.with_steps(2 * (steps // 4 + 2))
     starts = node_starts(model, coarse, half, rest, amplitude, frequency)
     shape = len(band), len(logarithms)
     kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)

@@ -16,6 +16,7 @@ from ._floquet import Floquet as Floquet
 from ._floquet import margin_beside_folds as margin_beside_folds
 from ._floquet import modulus as modulus
 from ._floquet import multipliers as multipliers
+from ._floquet import pair_angle as pair_angle
 from ._floquet import stable_words as stable_words
 from ._harmonic_balance import HarmonicBalance as HarmonicBalance
 from ._harmonic_balance import harmonic_balance as harmonic_balance
@@ -33,10 +34,13 @@ from ._shooting_method import ShootingMethod as ShootingMethod
 from ._sine import Sine as Sine
 from ._sine import recorded_sine as recorded_sine
 from ._smoothness import has_continuous_slopes as has_continuous_slopes
+from ._split_period_map import FEWEST_STEPS as FEWEST_STEPS
+from ._split_period_map import MOST_STEPS_A_PERIOD as MOST_STEPS_A_PERIOD
 from ._split_period_map import Split as Split
-from ._split_period_map import find_split as find_split
+from ._split_period_map import first_split as first_split
 from ._split_period_map import split_image as split_image
 from ._split_period_map import split_jacobian as split_jacobian
 from ._split_period_map import state_scale as state_scale
+from ._split_period_map import steps_wanted as steps_wanted
 from ._state_path import AbstractStatePath as AbstractStatePath
 from ._symmetry import is_odd as is_odd

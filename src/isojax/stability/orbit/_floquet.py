@@ -74,6 +74,20 @@ def modulus(value: Complex[Array, "..."]) -> Float[Array, "..."]:
     return jnp.where(square > 0.0, root, square)
 
 
+def pair_angle(values: Complex[Array, "*cells multiplier"]) -> Float[Array, "*cells"]:
+    """Give the angle of the complex pair of multipliers that is nearest to the unit circle.
+
+    Args:
+        values: Floquet multipliers.
+
+    Returns:
+        From 0 to pi [rad]; 0 or pi of real multipliers.
+    """
+    off = jnp.abs(modulus(values) - 1.0) + jnp.where(jnp.imag(values) == 0.0, 10.0, 0.0)
+    own = jnp.take_along_axis(values, jnp.argmin(off, axis=-1)[..., None], axis=-1)[..., 0]
+    return jnp.abs(jnp.arctan2(jnp.imag(own), jnp.real(own)))
+
+
 def multipliers(matrix: Float[Array, "*cells state state"]) -> Complex[Array, "*cells multiplier"]:
     """Give the eigenvalues of monodromy matrices in falling modulus.
 

@@ -12,6 +12,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
 from ..._implicit import frozen, with_derivatives
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
 from ..._types import Lanes, as_float64, check_float64
@@ -155,7 +156,7 @@ def harmonic_balance(
     return _balance(model, excitation, begin, harmonics, samples, solver, tolerance)
 
 
-@eqx.filter_jit
+@quick_jit
 def _balance(
     model: Isolator,
     excitation: Harmonic,

@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen, with_derivatives
 from ..._parameters import list_parameters
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS, is_successful
 from ..._show import amount, brief, declared_numbers, number, shown
 from ..._types import Lanes, as_float64, check_float64
@@ -186,7 +187,7 @@ def find_periodic_orbit(
     return _orbit(model, excitation, method, solution)
 
 
-@eqx.filter_jit
+@quick_jit
 def _solve(
     model: Isolator,
     excitation: Harmonic,
@@ -201,7 +202,7 @@ def _solve(
     return shoot(model, method, solver, drive, start, places)
 
 
-@eqx.filter_jit
+@quick_jit
 def _orbit(
     model: Isolator, excitation: Harmonic, method: ShootingMethod, solution: ShootingSolution
 ) -> Orbit:

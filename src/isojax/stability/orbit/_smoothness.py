@@ -1,11 +1,11 @@
 """Whether the laws of a model keep a continuous slope across their kinks."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ...models import ContinuedLaw, Instant, Isolator
 
 _STATES_TRIED = 8
@@ -15,7 +15,7 @@ _SAME_SLOPE = 1e-9
 """Largest difference of the slopes, over the largest of them, that counts as rounding."""
 
 
-@eqx.filter_jit
+@quick_jit
 def _jumps(model: Isolator, states: Float[Array, "trial state"]) -> Float[Array, "trial kink"]:
     count = len(model.kinks(tuple(states[0])))
 

@@ -16,7 +16,7 @@ from ._sine import Sine
 FEWEST_STEPS = 16
 """Steps a piece of the coarsest trial."""
 
-_MOST_STEPS_A_PERIOD = 1 << 12
+MOST_STEPS_A_PERIOD = 1 << 12
 """Steps a piece of a drive period at most, for a bifurcation."""
 
 
@@ -85,15 +85,14 @@ def split_jacobian(
     return upper[:, :states] + upper[:, states:] @ phases, phases
 
 
-def find_split(
+def first_split(
     model: Isolator,
     method: ShootingMethod,
     drive: Sine,
     state: Float[Array, " state"],
     places: int,
-    tolerance: float,
-) -> tuple[Split, Float[Array, " unknown"], Float[Array, "state state"], Float[Array, "crossing state"]]:
-    """Find where a motion is to be split and in how many steps.
+) -> tuple[Split, Float[Array, " unknown"]]:
+    """Find where a motion is to be split, with the steps of the coarsest trial.
 
     Args:
         model: the isolator.
@@ -101,10 +100,9 @@ def find_split(
         drive: the drive that acts.
         state: at t = 0, SI units.
         places: crossings to make room for.
-        tolerance: error of the multipliers that the steps may leave.
 
     Returns:
-        The split, the scaled state with the phases of the crossings, and roughly what `split_jacobian` gives.
+        The split, and the scaled state with the phases of the crossings.
     """
     path = trajectory(model, method.integrator, drive, tuple(state), turns=method.turns)
     crossings = find_crossings(model, path, 2.0 * math.pi * method.turns, places)
@@ -112,15 +110,7 @@ def find_split(
     steps = method.periods * method.integrator.steps_a_period(model)
     least = jnp.asarray(max(FEWEST_STEPS, steps // (places + 1)))
     split = Split(state_scale(path), crossings, sizes, least, crossings.complete)
-    unknown = jnp.concatenate([state / split.scale, crossings.phases])
-
-    def jacobian(steps: Array) -> tuple[Array, Array]:
-        return split_jacobian(model, method, drive, split._replace(steps=steps), unknown)
-
-    matrices, phases = jax.lax.map(jacobian, jnp.stack([least, 2 * least]))
-    most = method.periods * _MOST_STEPS_A_PERIOD
-    split = split._replace(steps=steps_wanted(least, matrices, tolerance, doublings=0, most=most))
-    return split, unknown, matrices[1], phases[1]
+    return split, jnp.concatenate([state / split.scale, crossings.phases])
 
 
 def steps_wanted(

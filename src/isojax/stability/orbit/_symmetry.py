@@ -1,6 +1,5 @@
 """Whether a model answers a turned drive with the turned motion."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,13 +7,14 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters, replace_parameters
+from ..._quick_jit import quick_jit
 from ...models import Instant, Isolator
 
 _SIZES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """Displacements at which oddness is tried [m]: an even term shows at one of them or nowhere that matters."""
 
 
-@eqx.filter_jit
+@quick_jit
 def _defects(
     model: Isolator, states: Float[Array, "state trial"], drive: Float[Array, " trial"]
 ) -> tuple[Array, Array]:

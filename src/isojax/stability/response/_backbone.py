@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._implicit import frozen, with_derivatives
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import brief, shown
 from ..._types import check_float64
@@ -119,7 +120,7 @@ def backbone_curve(
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _resonance(
     model: Isolator,
     amplitudes: Float[Array, " point"],

@@ -2,13 +2,13 @@
 
 import math
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._implicit import frozen, with_derivatives
+from ..._quick_jit import quick_jit
 from ...models import Instant, Isolator
 from ..orbit import rest_displacement
 
@@ -32,7 +32,7 @@ _WIDEST = 8.0
 """Largest distance of the other turning point from rest, over the amplitude."""
 
 
-@eqx.filter_jit
+@quick_jit
 def natural_frequencies(model: Isolator, amplitudes: Float[Array, " point"]) -> Float[Array, " point"]:
     """Give the frequency of free, undamped vibration.
 

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import amount, number, shown
 from ..._types import check_float64
@@ -197,7 +198,7 @@ def _receptance(model: Isolator, branch: Branch) -> Complex[Array, "*branch poin
     return found[:count].reshape(shape)
 
 
-@eqx.filter_jit
+@quick_jit
 def _receptances(
     model: Isolator, integrator: Integrator, periods: int, amplitude: Array, frequency: Array, state: State
 ) -> Complex[Array, " point"]:

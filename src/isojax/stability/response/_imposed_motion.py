@@ -7,12 +7,12 @@ their multipliers and how they move with the coefficients.
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._quick_jit import quick_jit
 from ...models import CoefficientErrors, Integrator, Isolator
 from ..orbit import Sine, imposed_balance, is_odd, rest_displacement, trajectory, value_and_jacobian
 from ._frequency_response import fundamental
@@ -164,7 +164,7 @@ def _grid(
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def _balances(model: Isolator, frequencies: Float[Array, " frequency"]) -> _Starts:
     """Give the one-harmonic answers at all displacements that are tried."""
     rest = rest_displacement(model)
@@ -201,7 +201,7 @@ def _ends(needed: Float[np.ndarray, "tried frequency"], least: float, most: floa
     return _MARGIN[0] * float(low), _MARGIN[1] * float(high)
 
 
-@eqx.filter_jit
+@quick_jit
 def _closed(
     errors: CoefficientErrors,
     integrator: Integrator,

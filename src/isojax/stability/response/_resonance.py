@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._implicit import frozen, with_derivatives
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import amount, number, shown
 from ..._types import Scalar, as_float64, check_float64
@@ -146,7 +147,7 @@ Held = tuple[bool, Integrator, Float[Array, " state"], Float[Array, ""]]
 """Whether the motion is symmetric, how it is integrated, the size of its states, and a frequency beside."""
 
 
-@eqx.filter_jit
+@quick_jit
 def _stationary(
     model: Isolator,
     amplitude: Float[Array, ""],

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._implicit import frozen, with_derivatives
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import number, shown
 from ..._types import Lanes, Scalar, as_float64, check_float64
@@ -134,7 +135,7 @@ def transmissibility(
     return Transmissibility(force, jnp.asarray(grid), ratio, peak, radius, result, band)
 
 
-@eqx.filter_jit
+@quick_jit
 def _passed(
     model: Isolator,
     amplitude: Float[Array, ""],

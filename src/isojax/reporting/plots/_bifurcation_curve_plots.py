@@ -1,4 +1,4 @@
-"""The curve of folds in the plane of the drive: a lens between two cusps."""
+"""Curves of bifurcations in the plane of the drive: the lens of folds between two cusps, and the others."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ...stability import FoldCurve
+from ...stability import FoldCurve, NeimarkSackerCurve, PeriodDoublingCurve
 from ._draw_band import draw_band
 from ._stability_style import MARKS, draw_special_points, drive_unit, drive_words, mark_handle, quantity
 from ._style import BEFORE, axes_for, entitle
@@ -79,7 +79,44 @@ def draw_lens(ax: Axes, curve: FoldCurve, *, filled: bool) -> list[Any]:
         draw_band(ax, lower, upper, colour)
     ax.plot(frequency, amplitude, color=colour, linewidth=width)
     handles.insert(0, Line2D([], [], color=colour, linewidth=width, label=MARKS["fold"].words))
-    places = [("cusp", float(cusp.frequency), float(cusp.amplitude)) for cusp in curve.cusps]
-    if draw_special_points(ax, places):
-        handles.append(mark_handle("cusp"))
-    return handles
+    return handles + _special_handles(ax, curve)
+
+
+def _special_handles(ax: Axes, curve: FoldCurve | PeriodDoublingCurve | NeimarkSackerCurve) -> list[Any]:
+    """Mark the special points of a curve, and give their entries in the legend."""
+    points = [(point, float(point.frequency), float(point.amplitude)) for point in curve.special_points]
+    return [mark_handle(kind) for kind in draw_special_points(ax, points)]
+
+
+def plot_bifurcation_curve(
+    curve: PeriodDoublingCurve | NeimarkSackerCurve, *, excitation: str = "force", ax: Axes | None = None
+) -> Figure:
+    """Draw where orbits double their period, or where quasi-periodic motion begins, over the drive.
+
+    Args:
+        curve: the bifurcations.
+        excitation: "force" or "base_acceleration", as of the isolator: the unit of the drive.
+        ax: axes to draw on.
+
+    Returns:
+        The figure.
+    """
+    figure, ax = axes_for(ax, 6.4, 4.2)
+    torus = isinstance(curve, NeimarkSackerCurve)
+    mark = MARKS["neimark_sacker" if torus else "period_doubling"]
+    frequency, amplitude = np.asarray(curve.frequency), np.asarray(curve.amplitude)
+    ax.plot(frequency, amplitude, color=mark.colour, linewidth=1.4)
+    handles: list[Any] = [Line2D([], [], color=mark.colour, linewidth=1.4, label=mark.words)]
+    handles += _special_handles(ax, curve)
+    ax.margins(0.08)
+    ax.set_xlabel("frequency [Hz]")
+    ax.set_ylabel(drive_words(excitation))
+    state = "closed" if bool(curve.closed) else "open"
+    if torus:
+        turns = np.asarray(curve.rotation_number)
+        words = f"Neimark-Sacker: quasi-periodic motion begins ({state})\nrotation number"
+        words += f" {np.nanmin(turns):.3f} to {np.nanmax(turns):.3f}"
+    else:
+        words = f"Period doublings ({state})"
+    entitle(ax, words, handles)
+    return figure

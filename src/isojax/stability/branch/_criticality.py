@@ -1,0 +1,132 @@
+"""What vanishes of a map's derivative where an orbit bifurcates: polynomials of its entries."""
+
+from typing import Literal
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+
+from ..._implicit import frozen
+
+BifurcationKind = Literal["fold", "period_doubling", "neimark_sacker", "symmetry_breaking"]
+
+CRITICAL: dict[str, float] = {"fold": 1.0, "period_doubling": -1.0, "symmetry_breaking": -1.0}
+"""The real multiplier that turns critical, of the half-period map for a broken symmetry."""
+
+
+def criticality(kind: BifurcationKind, matrix: Float[Array, "state state"]) -> Float[Array, ""]:
+    """Give what changes sign where a multiplier or a pair of them is critical.
+
+    `det(M - mu I)` for a real one, and the product of `mu_i mu_j - 1` over all pairs, which is `det(C - I)`
+    with the second compound C of M, for a pair of product one: on the unit circle, or real and one the
+    inverse of the other, which bifurcates nothing.
+
+    Args:
+        kind: of the bifurcation.
+        matrix: derivative of the map.
+
+    Returns:
+        The polynomial.
+
+    Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, sec. 10.2; the compound is his bialternate
+    product.
+    """
+    if kind == "neimark_sacker":
+        compound = second_compound(matrix)
+        return _determinant(compound - jnp.eye(compound.shape[0]))
+    return _determinant(matrix - CRITICAL[kind] * jnp.eye(matrix.shape[0]))
+
+
+def second_compound(matrix: Float[Array, "state state"]) -> Float[Array, "pair pair"]:
+    """Give the minors of order two: the matrix whose eigenvalues are the products of pairs of multipliers."""
+    first, second = np.triu_indices(matrix.shape[0], 1)
+    upper, lower = matrix[first], matrix[second]
+    return upper[:, first] * lower[:, second] - upper[:, second] * lower[:, first]
+
+
+def pair_cosine(matrix: Float[Array, "state state"]) -> Float[Array, ""]:
+    """Give half the sum of the two multipliers whose product is nearest to one.
+
+    Where the product is one it is the cosine of their angle for a pair on the unit circle, and beyond one in
+    modulus for two real multipliers. Of the second compound C it is `w S v / (2 w v)`, with the null vectors
+    of `C - I` and the matrix S whose eigenvalues are the sums of pairs: smooth where the pair itself meets.
+
+    Args:
+        matrix: derivative of the map.
+
+    Returns:
+        The cosine.
+    """
+    size = matrix.shape[0]
+    if size == 2:
+        return 0.5 * jnp.trace(matrix)
+    first, second = np.triu_indices(size, 1)
+    unit = jnp.eye(size)
+    sums = sum(
+        one[first][:, first] * other[second][:, second] - one[first][:, second] * other[second][:, first]
+        for one, other in ((matrix, unit), (unit, matrix))
+    )
+    compound = second_compound(matrix) - jnp.eye(first.size)
+    right, left = null_direction(compound), null_direction(compound.T)
+    return 0.5 * jnp.dot(left, sums @ right) / jnp.dot(left, right)
+
+
+def null_direction(matrix: Array) -> Array:
+    """Give the unit vector that a nearly singular matrix takes to nothing, with its derivatives.
+
+    From the matrix bordered by its own singular vectors, which are held fixed.
+
+    Args:
+        matrix: real or complex.
+
+    Returns:
+        The vector; its sign, or phase, is arbitrary.
+
+    Source: Govaerts 2000, Numerical Methods for Bifurcations of Dynamical Equilibria, ch. 3.
+    """
+    left, _, right = jnp.linalg.svd(frozen(matrix), full_matrices=False)
+    column, row = left[:, -1], right[-1]
+    size = matrix.shape[0]
+    bordered = jnp.concatenate([matrix, row[None]])
+    bordered = jnp.concatenate([bordered, jnp.concatenate([column, jnp.zeros(1)])[:, None]], axis=1)
+    wanted = jnp.zeros(size + 1, bordered.dtype).at[-1].set(1.0)
+    vector = jnp.linalg.solve(bordered, wanted)[:size]
+    return vector / jnp.sqrt(jnp.sum(jnp.abs(vector) ** 2))
+
+
+def critical_direction(
+    kind: BifurcationKind, matrix: Float[Array, "state state"], roots: Complex[Array, " multiplier"]
+) -> Float[Array, " state"]:
+    """Give the direction in which an orbit loses its hold, of unit length.
+
+    Args:
+        kind: of the bifurcation.
+        matrix: derivative of the map.
+        roots: its multipliers.
+
+    Returns:
+        Of a real multiplier its direction; of a pair the real part, turned so that the imaginary part is
+        perpendicular to it.
+    """
+    unit = jnp.eye(matrix.shape[0])
+    if kind != "neimark_sacker":
+        return null_direction(matrix - CRITICAL[kind] * unit)
+    off = jnp.abs(jnp.abs(roots) - 1.0) + jnp.where(jnp.imag(roots) > 0.0, 0.0, jnp.inf)
+    vector = null_direction(matrix - roots[jnp.argmin(off)] * unit)
+    vector = vector * jnp.exp(-0.5j * jnp.angle(jnp.sum(vector**2)))
+    real = jnp.real(vector)
+    return real / jnp.linalg.norm(real)
+
+
+def _determinant(matrix: Float[Array, "row row"]) -> Float[Array, ""]:
+    """Give the determinant as a polynomial, whose derivatives of any order hold where it vanishes.
+
+    Source: Faddeev & Faddeeva 1963, Computational Methods of Linear Algebra, sec. 47.
+    """
+    size = matrix.shape[0]
+    unit = jnp.eye(size)
+    part, coefficient = unit, -jnp.trace(matrix)
+    for order in range(2, size + 1):
+        part = matrix @ part + coefficient * unit
+        coefficient = -jnp.trace(matrix @ part) / order
+    return coefficient * (-1.0) ** size
