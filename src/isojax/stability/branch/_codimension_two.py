@@ -14,7 +14,7 @@ from ..._implicit import frozen
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
 from ...models import EndsEstimated, Estimated, Integrator, Isolator, Modelled, as_isolator, find_band
-from ..orbit import ShootingMethod, multipliers, refuse_traced, state_scale, trajectory
+from ..orbit import ShootingMethod, event_places, multipliers, refuse_traced, state_scale, trajectory
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._bifurcation_curves import Cusp, FoldCurve, PeriodDoublingCurve
 from ._branch import SpecialPoint
@@ -26,7 +26,6 @@ from ._extended_system import (
     BifurcationKind,
     PointGuess,
     Polished,
-    first_places,
     null_vector,
     polish,
 )
@@ -274,7 +273,7 @@ class _OrbitCurve(eqx.Module):
         count = unknowns.shape[0]
         rows = -(-count // _POLISHED_AT_ONCE)
         places = np.resize(np.arange(count), (rows, _POLISHED_AT_ONCE))
-        room = first_places(self.family, scale.shape[0], self.method.turns)
+        room = event_places(self.family.model, self.method.turns)
         while True:
             parts = [_polish_points(self, room, scale, unknowns[part], normals[part]) for part in places]
             whole = jax.tree.map(lambda *values: jnp.concatenate(values)[:count], *parts)

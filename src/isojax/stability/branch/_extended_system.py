@@ -329,8 +329,3 @@ def _bend(
 
 
 polish_jitted = eqx.filter_jit(polish)
-
-
-def first_places(family: ParameterFamily, states: int, turns: float) -> int:
-    """Give how many crossings of kinks to make room for first."""
-    return math.ceil(4 * len(family.model.kinks((jnp.zeros(()),) * states)) * turns)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from ..._implicit import frozen
 from ..._results import RESULTS, is_successful
-from ..orbit import ShootingMethod, is_odd, multipliers, period_map, value_and_jacobian
+from ..orbit import ShootingMethod, event_places, is_odd, multipliers, period_map, value_and_jacobian
 from ._branch import SpecialPoint
 from ._extended_system import (
     LOCATED_WITHIN,
@@ -20,7 +20,6 @@ from ._extended_system import (
     BifurcationKind,
     PointGuess,
     Polished,
-    first_places,
     polish_jitted,
 )
 from ._parameter_family import ParameterFamily
@@ -289,7 +288,7 @@ def special_point(
     Returns:
         The point.
     """
-    places = first_places(family, guess.state.shape[0], method.turns)
+    places = event_places(family.model, method.turns)
     # A number on the device, so that what is compiled serves for all.
     still, guess, reach = *frozen((family, guess)), jnp.asarray(within)
     found = polish_jitted(still, method, kind, guess, places, within=reach)

@@ -12,8 +12,8 @@ from jaxtyping import Array, Complex, Float, Int
 
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Crossings, Sine, advance_across_kinks, modulus, multipliers
-from ._map_method import Lane, MapMethod
+from ..orbit import Sine, modulus, multipliers
+from ._map_method import Lane, MapMethod, advance
 from ._starts import Candidates, PlacedSurface, read_surface
 from ._surface import Surface
 
@@ -33,7 +33,7 @@ _WIDE = {"xla_cpu_prefer_vector_width": 512}
 WHOLE_STEPS = 4
 """Times the steps of orbits that are not split at kinks."""
 
-FOUND, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
+FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE = 0, 1, 2, 3
 """Codes of how the search in a cell ended."""
 
 
@@ -101,7 +101,17 @@ def _newton_steps(model: Isolator, method: MapMethod, lanes: Lane) -> tuple[Stat
 
 
 @eqx.filter_jit(compiler_options=_WIDE)  # pyright: ignore[reportCallIssue]
-def _lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
+def surface_lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
+    """Give starts as the surface has them.
+
+    Args:
+        model: the isolator.
+        surface: orbits over displacement and frequency.
+        where: places of force, frequency and part of each.
+
+    Returns:
+        The starts.
+    """
     read = read_surface(surface, 2 + model.internal_states, *where)
     push, (sine, cosine) = surface.amplitudes[where[0]], read.direction
     drive = Sine(push * sine, push * cosine, surface.frequencies[where[1]])
@@ -153,7 +163,7 @@ class CellSolver(eqx.Module):
             Their orbits.
         """
         where = jax.device_put([padded(values, size) for values in candidates[:3]], self.sharding)
-        lanes = _lanes(self.model, self.surface, where)
+        lanes = surface_lanes(self.model, self.surface, where)
         return self.improve(self.method, lanes, candidates.force.size, limit)
 
     def improve(self, method: MapMethod, lanes: Lane, count: int, limit: float | None = None) -> Found:
@@ -258,9 +268,7 @@ def states_at_zero(model: Isolator, method: MapMethod, lanes: Lane) -> State:
         target = jnp.mod(-lead, whole)
         turned = method.half & (target >= math.pi)
         target = jnp.where(turned, target - math.pi, target)
-        nothing = Crossings(jnp.zeros(0), jnp.zeros(0, int), None, jnp.array(True))
-        steps = 4 * method.steps
-        state, _ = advance_across_kinks(model, method.integrator, drive, lane.state, nothing, target, steps)
+        state = advance(model, method.integrator, drive, lane.state, target, 4 * method.steps)
         return tuple(jnp.where(turned, -value, value) for value in state)
 
     return jax.vmap(one)(lanes)

@@ -25,11 +25,13 @@ from ...models import (
     coefficient_errors,
 )
 from ..orbit import Sine, ascending, is_odd, refuse_transformed
-from ._batched_newton import FOUND, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
+from ._batched_newton import FOUND, NOT_ACCURATE, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
+from ._empty_cells import Cells, fill_empty
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
+from ._single_orbits import SingleOrbits
 from ._sought import Sought, seek
 from ._starts import Candidates
 from ._surface import MapWindow
@@ -291,15 +293,15 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         parts.append(run_chunks(solver, candidates, run.chunk, run.folder, name, run.progress))
         if isinstance(solver, CellSolver):
             errors.append(sampled_error(solver, candidates, parts[-1], window))
-    error = max((value for value in errors if not math.isnan(value)), default=math.nan)
-    found = parts[0] if len(parts) == 1 else Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))
+        elif isinstance(solver, SingleOrbits):
+            errors.append(integrator.orbit_error)
     lists = [group.candidates for group in sought.groups]
-    candidates = (
-        lists[0]
-        if len(lists) == 1
-        else Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
-    )
-    split = np.repeat([group.name != "whole" for group in sought.groups], [own.force.size for own in lists])
+    split = np.repeat([group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists])
+    known = Cells(*(one[0] if len(one) == 1 else _joined(one) for one in (lists, parts)), split)
+    candidates, found, split = fill_empty(model, integrator, half, window, known)
+    if found.code.size > known.found.code.size or (found.code != known.found.code).any():
+        errors.append(integrator.orbit_error)
+    error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     arrays = _gridded(candidates, found, split, len(forces), len(band), run.coexisting)
     code = arrays.pop("code")
     ending = _ending
@@ -321,9 +323,15 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     return smap, sought
 
 
+def _joined(lists: list[Any]) -> Any:
+    """Join lists of orbits."""
+    return type(lists[0])(*(np.concatenate(own) for own in zip(*lists, strict=True)))
+
+
 def _ending(code: Array) -> RESULTS:
     """Give the outcome that a code of the search stands for."""
     failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
+    failed = RESULTS.where(code == NOT_ACCURATE, RESULTS.not_accurate, failed)
     return RESULTS.where(code == FOUND, RESULTS.promote(diffrax.RESULTS.successful), failed)
 
 

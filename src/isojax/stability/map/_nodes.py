@@ -17,7 +17,7 @@ from ...models import Integrator, Isolator
 from ..orbit import (
     Crossings,
     Sine,
-    find_crossings,
+    follow_events,
     imposed_balance,
     period_map,
     trajectory,
@@ -148,12 +148,16 @@ def _starts(
             # Far from the balance of one harmonic a full step may leave the basin.
             return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
 
-        found = jax.lax.fori_loop(0, _START_STEPS, improve, start)
-        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _START_CLOSED_TO)
-        unknown = jnp.where(good, found, start)
+        unknown = start
+        # A motion that friction turns, or holds, at the very start has no derivative by it.
+        if not model.slides:
+            found = jax.lax.fori_loop(0, _START_STEPS, improve, start)
+            good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _START_CLOSED_TO)
+            unknown = jnp.where(good, found, start)
         drive, state = unpack(unknown)
-        path = trajectory(model, integrator, drive, state, turns=turns)
-        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _MOST_NODE_CROSSINGS)
+        steps = round(integrator.steps_a_period(model) * turns)
+        end = 2.0 * math.pi * turns
+        crossings = follow_events(model, drive, state, end, steps, _MOST_NODE_CROSSINGS).crossings
         over = jnp.concatenate([jnp.full(2, push), inner]) / a
         return unknown * over, crossings
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._types import Lanes, Scalar, as_float64
-from ...models import Instant, Isolator
+from ...models import ContinuedLaw, Instant, Isolator
 from ._sine import Sine
 
 _SAMPLES = 64
@@ -110,8 +110,11 @@ def imposed_balance(
     internal = imposed_internal(model, x, v, frequency)
     # Without a drive the acceleration is -force / inertia; what is missing for the imposed one is the drive.
     state, still = (x, v, *internal), Instant(0.0 * x)
-    missing = -size * omega**2 * cosine - model.acceleration(state, still)
-    unit = model.acceleration(state, Instant(0.0 * x + 1.0)) - model.acceleration(state, still)
+    # Sharp laws are meant as they are: the rounded one of dry friction is a damper where motion is small.
+    law = ContinuedLaw(tuple(jnp.where(value >= 0.0, 1.0, -1.0) for value in model.switches(state)))
+    without = model.acceleration(state, still, law)
+    missing = -size * omega**2 * cosine - without
+    unit = model.acceleration(state, Instant(0.0 * x + 1.0), law) - without
     wanted = missing / unit
     in_phase, in_quadrature = 2.0 * jnp.mean(wanted * cosine, axis=0), 2.0 * jnp.mean(wanted * sine, axis=0)
     return Sine(in_quadrature, in_phase, frequency), internal

@@ -1,0 +1,142 @@
+"""Cells of a map that are left empty, tried as single orbits: from their own start, then from cells beside."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import distance_transform_edt
+
+from ...models import Integrator, Isolator
+from ._batched_newton import FOUND, NOT_CONVERGED, Found, padded, states_at_zero
+from ._map_error import lanes_of
+from ._map_method import MapMethod
+from ._single_orbits import single_orbits
+from ._starts import Candidates
+from ._surface import MapWindow
+
+_TRIED = 128
+"""Cells of an even sample of those left empty; where none of them can be filled, the others are not tried."""
+
+_ROUNDS = 8
+"""Times at most that empty cells are tried from those next to them."""
+
+_SAME = 1e-6
+"""Distance of two orbits, over their size, up to which they are one."""
+
+_LANES = 1024
+"""Lanes of the compiled step from a start to t = 0."""
+
+
+class Cells(NamedTuple):
+    """Orbits of a map, a candidate each.
+
+    Attributes:
+        candidates: where each is sought.
+        found: what was found.
+        split: whether each is split at the kinks that the others share.
+    """
+
+    candidates: Candidates
+    found: Found
+    split: Bool[np.ndarray, " candidate"]
+
+
+def fill_empty(
+    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, cells: Cells
+) -> Cells:
+    """Fill cells in which no orbit was found, as far as single orbits are found there.
+
+    Args:
+        model: the isolator.
+        integrator: steps and tolerances.
+        half: whether symmetric orbits are closed over half a period.
+        window: axes of the map.
+        cells: the orbits.
+
+    Returns:
+        The orbits, with those that were lacking.
+    """
+    shape = len(window.amplitudes), len(window.frequencies)
+    method = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
+    cells = _with_every_cell(cells, shape)
+    candidates, found = cells.candidates, Found(*(np.array(values) for values in cells.found))
+    split = cells.split.copy()
+    place = candidates.force.astype(int) * shape[1] + candidates.frequency
+    for attempt in range(1 + _ROUNDS):
+        held = np.zeros(shape[0] * shape[1], bool)
+        held[place[found.code == FOUND]] = True
+        lost = np.flatnonzero(~held[place] & (candidates.order == 0))
+        if not lost.size or (attempt and not held.any()):
+            break
+        beside = _beside(model, method, window, Cells(candidates, found, split), lost) if attempt else None
+        filled = 0
+        for some in _blocks(lost.size):
+            push, rate = window.amplitudes[candidates.force[lost[some]]], window.frequencies[candidates.frequency[lost[some]]]
+            starts = None if beside is None else beside[some]
+            got = single_orbits(model, integrator, half, push, rate, starts)
+            good = got.code == FOUND
+            own = lost[some][good]
+            for name in ("states", "direction", "multipliers", "radius", "response", "code"):
+                getattr(found, name)[own] = getattr(got, name)[good]
+            found.phases[own] = np.nan
+            # What friction or a stop leaves inaccurate says so.
+            found.code[lost[some][~good]] = got.code[~good]
+            split[own], filled = False, filled + own.size
+            if not filled:
+                break
+        if attempt and not filled:
+            break
+    return Cells(candidates, found, split)
+
+
+def _blocks(count: int) -> list[np.ndarray]:
+    """Give places of an even sample, then those of the others."""
+    first = np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(int))
+    others = np.setdiff1d(np.arange(count), first)
+    return [first, others] if others.size else [first]
+
+
+def _with_every_cell(cells: Cells, shape: tuple[int, int]) -> Cells:
+    """Add the cells in which the surface holds no orbit."""
+    candidates, found, split = cells
+    has = np.zeros(shape, bool)
+    has[candidates.force, candidates.frequency] = True
+    force, column = (places.astype(np.int32) for places in np.nonzero(~has))
+    if not force.size:
+        return cells
+    none = np.zeros(force.size, np.int32)
+    added = Candidates(force, column, none, none)
+    blank = [np.full((force.size, *values.shape[1:]), np.nan, values.dtype) for values in found[:-1]]
+    missing = Found(*blank, np.full(force.size, NOT_CONVERGED, np.int8))
+    return Cells(
+        Candidates(*(np.concatenate(own) for own in zip(candidates, added, strict=True))),
+        Found(*(np.concatenate(own) for own in zip(found, missing, strict=True))),
+        np.concatenate([split, np.zeros(force.size, bool)]),
+    )
+
+
+def _beside(
+    model: Isolator, method: MapMethod, window: MapWindow, cells: Cells, lost: Int[np.ndarray, " cell"]
+) -> Float[np.ndarray, "cell state"]:
+    """Give the states at t = 0 of the orbits in the cells next to some."""
+    candidates, found, _ = cells
+    holder = np.full((len(window.amplitudes), len(window.frequencies)), -1)
+    good = np.flatnonzero((found.code == FOUND) & (candidates.order == 0))
+    holder[candidates.force[good], candidates.frequency[good]] = good
+    row, column = distance_transform_edt(holder < 0, return_distances=False, return_indices=True)
+    own = candidates.force[lost], candidates.frequency[lost]
+    source = holder[row[own], column[own]]
+    return states_of(model, method, window, cells, source)
+
+
+def states_of(
+    model: Isolator, method: MapMethod, window: MapWindow, cells: Cells, picked: Int[np.ndarray, " orbit"]
+) -> Float[np.ndarray, "orbit state"]:
+    """Give the states of some orbits at t = 0 of the recorded drive."""
+    parts = []
+    for begin in range(0, picked.size, _LANES):
+        block = picked[begin : begin + _LANES]
+        lanes = lanes_of(cells.found, cells.candidates, window, padded(block, _LANES))
+        parts.append(np.stack(states_at_zero(model, method, lanes._replace(phases=())), axis=-1)[: block.size])
+    return np.concatenate(parts)
