@@ -119,7 +119,9 @@ class Integrator(eqx.Module):
         Returns:
             Steps, an even number.
         """
-        return self.steps_per_period * max((one.substeps for one in model.elements if not one.splits), default=1)
+        return self.steps_per_period * max(
+            (one.substeps for one in model.elements if not one.splits), default=1
+        )
 
     def with_steps(self, steps_per_period: int) -> "Integrator":
         """Give the same integrator with other steps a period.
@@ -156,6 +158,16 @@ class Integrator(eqx.Module):
     def map_error(self) -> float:
         """Error of a map's multipliers to which its steps are chosen, where none are asked for."""
         return 2e-5
+
+    @property
+    def map_orbit_tolerance(self) -> float:
+        """Integration error to which steps are refined in cells of a map that are found as single orbits."""
+        return 1e-3 * self.map_error
+
+    @property
+    def map_orbit_error(self) -> float:
+        """Integration error of such a cell beyond which it is not accurate enough."""
+        return 0.05 * self.map_error
 
     @property
     def map_tolerance(self) -> float:

@@ -42,9 +42,7 @@ class Cells(NamedTuple):
     split: Bool[np.ndarray, " candidate"]
 
 
-def fill_empty(
-    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, cells: Cells
-) -> Cells:
+def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapWindow, cells: Cells) -> Cells:
     """Fill cells in which no orbit was found, as far as single orbits are found there.
 
     Args:
@@ -72,7 +70,10 @@ def fill_empty(
         beside = _beside(model, method, window, Cells(candidates, found, split), lost) if attempt else None
         filled = 0
         for some in _blocks(lost.size):
-            push, rate = window.amplitudes[candidates.force[lost[some]]], window.frequencies[candidates.frequency[lost[some]]]
+            push, rate = (
+                window.amplitudes[candidates.force[lost[some]]],
+                window.frequencies[candidates.frequency[lost[some]]],
+            )
             starts = None if beside is None else beside[some]
             got = single_orbits(model, integrator, half, push, rate, starts)
             good = got.code == FOUND
@@ -138,5 +139,7 @@ def states_of(
     for begin in range(0, picked.size, _LANES):
         block = picked[begin : begin + _LANES]
         lanes = lanes_of(cells.found, cells.candidates, window, padded(block, _LANES))
-        parts.append(np.stack(states_at_zero(model, method, lanes._replace(phases=())), axis=-1)[: block.size])
+        parts.append(
+            np.stack(states_at_zero(model, method, lanes._replace(phases=())), axis=-1)[: block.size]
+        )
     return np.concatenate(parts)

@@ -294,13 +294,15 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         if isinstance(solver, CellSolver):
             errors.append(sampled_error(solver, candidates, parts[-1], window))
         elif isinstance(solver, SingleOrbits):
-            errors.append(integrator.orbit_error)
+            errors.append(integrator.map_orbit_error)
     lists = [group.candidates for group in sought.groups]
-    split = np.repeat([group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists])
+    split = np.repeat(
+        [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
+    )
     known = Cells(*(one[0] if len(one) == 1 else _joined(one) for one in (lists, parts)), split)
     candidates, found, split = fill_empty(model, integrator, half, window, known)
     if found.code.size > known.found.code.size or (found.code != known.found.code).any():
-        errors.append(integrator.orbit_error)
+        errors.append(integrator.map_orbit_error)
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     arrays = _gridded(candidates, found, split, len(forces), len(band), run.coexisting)
     code = arrays.pop("code")

@@ -28,6 +28,11 @@ class Lane(NamedTuple):
     response: Lanes
 
 
+def kinks_between(sides: Float[Array, "piece kink"]) -> Int[Array, " crossing"]:
+    """Give which kink is passed between one piece and the next, from the signs of all kinks on each."""
+    return jnp.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else jnp.zeros(0, int)
+
+
 def advance(
     model: Isolator, integrator: Integrator, drive: Sine, state: State, end: Array | float, steps: Array
 ) -> State:

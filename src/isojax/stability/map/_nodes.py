@@ -23,7 +23,7 @@ from ..orbit import (
     trajectory,
     value_and_jacobian,
 )
-from ._map_method import Lane, MapMethod
+from ._map_method import Lane, MapMethod, kinks_between
 
 _START_STEPS = 6
 """Steps of Newton's method from the balance of one harmonic."""
@@ -187,17 +187,13 @@ def closed_nodes(
     Returns:
         The orbits.
     """
-    kinks = kinks_between(np.asarray(method.sides))
+    assert method.sides is not None
+    kinks = kinks_between(method.sides)
 
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
-        return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *map(jnp.asarray, rows))
+        return _closed(model, method, kinks, jnp.asarray(rest), *map(jnp.asarray, rows))
 
     return NodeOrbits(*_in_blocks(work, amplitude, frequency, start))
-
-
-def kinks_between(sides: Float[np.ndarray, "piece kink"]) -> Int[np.ndarray, " crossing"]:
-    """Give which kink is passed between one piece and the next, from the signs of all kinks on each."""
-    return np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
 
 
 @eqx.filter_jit

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from ...models import Integrator, Isolator
 from ..orbit import (
+    Accuracy,
     ShootingMethod,
     event_places,
     modulus,
@@ -104,7 +105,9 @@ def single_orbits(
         block += [] if starts is None else [starts[begin : begin + _AT_ONCE]]
         count = block[0].size
         values = [jnp.asarray(padded(value, _AT_ONCE)) for value in block]
-        parts.append(jax.tree.map(lambda it, count=count: np.asarray(it)[:count], _shoot(model, method, *values)))
+        parts.append(
+            jax.tree.map(lambda it, count=count: np.asarray(it)[:count], _shoot(model, method, *values))
+        )
     return jax.tree.map(lambda *own: np.concatenate(own), *parts)
 
 
@@ -113,12 +116,13 @@ def _shoot(
     model: Isolator, method: ShootingMethod, amplitude: Array, frequency: Array, starts: Array | None = None
 ) -> Found:
     goal = method.integrator.orbit_tolerance
+    accuracy = Accuracy(method.integrator.map_orbit_tolerance, method.integrator.map_orbit_error)
     solver, places = optx.Newton(rtol=goal, atol=goal), event_places(model, method.turns)
 
     def one(push: Array, rate: Array, start: Array | None) -> Found:
         drive = recorded_sine(model, push, rate)
         begin = response_start(model, push, rate) if start is None else start
-        solution = shoot(model, method, solver, drive, begin, places)
+        solution = shoot(model, method, solver, drive, begin, places, accuracy)
         path = trajectory(model, method.integrator, drive, tuple(solution.state), turns=method.turns)[0]
         finite = jnp.all(jnp.isfinite(path)) & jnp.all(jnp.isfinite(solution.matrix))
         code = jnp.where(solution.accurate, FOUND, NOT_ACCURATE)

@@ -121,7 +121,10 @@ def seek(
     if model.splits:
         # Where sharp laws give each orbit events of its own, no compiled step serves all.
         unsplit = MapMethod(integrator, half, None, split.method.steps)
-        ways = (("read", reader, read), ("single", SingleOrbits(model, unsplit, split.surface, split.sharding), ~read))
+        ways = (
+            ("read", reader, read),
+            ("single", SingleOrbits(model, unsplit, split.surface, split.sharding), ~read),
+        )
     groups = tuple(Group(name, way, _chosen(candidates, own)) for name, way, own in ways if own.any())
     return Sought(surface, groups, error)
 

@@ -13,8 +13,8 @@ from ._sine import Sine
 _ROUNDING = 1e-12
 """Share of the size of a switch that it may be off by, and share of a step that an instant may be."""
 
-_ROOT_STEPS = 50
-"""Halvings of a bracket: of a polynomial, so that they cost next to nothing."""
+_HALVINGS, _NEWTON_STEPS = 6, 3
+"""Of a bracket on a cubic, and steps of Newton's method from there; one more, on the motion, follows."""
 
 _AT_ENDS, _TOGETHER = 1e-6, 1e-4
 """Shares of a motion: within which an event counts as lying at its end; by which two events may differ."""
@@ -216,7 +216,8 @@ def _cubic(
     k3 = field(1, moved(0.5, k2))
     k4 = field(2, moved(1.0, k3))
     return [
-        (a, b + c - 1.5 * a - 0.5 * d, (a - b - c + d) / 1.5) for a, b, c, d in zip(k1, k2, k3, k4, strict=True)
+        (a, b + c - 1.5 * a - 0.5 * d, (a - b - c + d) / 1.5)
+        for a, b, c, d in zip(k1, k2, k3, k4, strict=True)
     ]
 
 
@@ -248,11 +249,15 @@ def _first_root(values: Float[Array, "4 switch"]) -> tuple[Int[Array, ""], Float
     dips, ends = value(lowest) < limit, value(jnp.ones_like(lowest)) < limit
     high = jnp.where(dips, lowest, 1.0)
     low = jnp.zeros_like(high)
-    for _ in range(_ROOT_STEPS):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         above = value(middle) >= 0.0
         low, high = jnp.where(above, middle, low), jnp.where(above, high, middle)
-    shares = jnp.where(dips | ends, high, 2.0)
+    share = 0.5 * (low + high)
+    for _ in range(_NEWTON_STEPS):
+        slope = a + share * (2.0 * b + 3.0 * share * c)
+        share = jnp.clip(share - value(share) / jnp.where(slope == 0.0, 1.0, slope), low, high)
+    shares = jnp.where(dips | ends, share, 2.0)
     return jnp.argmin(shares), shares
 
 

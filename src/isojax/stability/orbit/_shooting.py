@@ -23,7 +23,7 @@ _MOST_STEPS_A_PIECE = 1 << 14
 _ROUNDS = 4
 """Times at most that a motion is split anew because the closed one has other events."""
 
-_FINER_STEPS = 8
+_FINER_STEPS = 2
 """Times the steps with which the events of a closed motion are looked at."""
 
 
@@ -47,6 +47,18 @@ class ShootingSolution(NamedTuple):
     error: Float[Array, ""]
     found: Bool[Array, ""]
     accurate: Bool[Array, ""]
+
+
+class Accuracy(NamedTuple):
+    """How accurate multipliers are to be.
+
+    Attributes:
+        goal: integration error down to which steps are refined.
+        limit: beyond which they are not accurate enough.
+    """
+
+    goal: float
+    limit: float
 
 
 class _Round(NamedTuple):
@@ -108,6 +120,7 @@ def shoot(
     drive: Sine,
     start: Float[Array, " state"],
     places: int,
+    accuracy: Accuracy | None = None,
 ) -> ShootingSolution:
     """Find the motion that repeats after the drive periods of a method.
 
@@ -121,10 +134,13 @@ def shoot(
         drive: the drive that acts.
         start: state at t = 0 to start from.
         places: kinks a motion to make room for.
+        accuracy: of the multipliers; that of single orbits if omitted.
 
     Returns:
         The closed motion.
     """
+    if accuracy is None:
+        accuracy = Accuracy(method.integrator.multiplier_tolerance, method.integrator.orbit_error)
     integrator, turns = method.integrator, method.turns
     scale = state_scale(trajectory(model, integrator, drive, tuple(start), turns=turns))
 
@@ -133,18 +149,18 @@ def shoot(
         return jnp.stack(moved) / scale - scaled
 
     near = optx.root_find(open_end, solver, start / scale, max_steps=50, throw=False).value
-    first = _closed(model, method, solver, drive, near * scale, places, jnp.asarray(0))
+    first = _closed(model, method, solver, drive, near * scale, places, jnp.asarray(0), accuracy.goal)
 
     def again(own: _Round) -> Array:
         return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.count < _ROUNDS)
 
     def body(own: _Round) -> _Round:
-        return _closed(model, method, solver, drive, own.state, places, own.count)
+        return _closed(model, method, solver, drive, own.state, places, own.count, accuracy.goal)
 
     last = jax.lax.while_loop(again, body, first)
     matrix = last.split.scale[:, None] * last.transition / last.split.scale[None, :]
     found = jnp.isfinite(last.mismatch) & (last.mismatch < integrator.residual_tolerance)
-    accurate = last.agrees & (last.error <= integrator.orbit_error)
+    accurate = last.agrees & (last.error <= accuracy.limit)
     return ShootingSolution(last.root, last.split, last.state, matrix, last.error, found, accurate)
 
 
@@ -156,6 +172,7 @@ def _closed(
     near: Float[Array, " state"],
     places: int,
     count: Array,
+    goal: float,
 ) -> _Round:
     """Close a motion with the events of one next to it, and see whether it has these events itself."""
     integrator = method.integrator
@@ -179,7 +196,6 @@ def _closed(
 
     first = jnp.concatenate([near / scale, split.crossings.phases])
     _, (trials, _) = matrices(first, jnp.stack([least, 2 * least]), jnp.zeros(2, bool))
-    goal = integrator.multiplier_tolerance
     steps = steps_wanted(least, trials, goal, doublings=1, most=_MOST_STEPS_A_PIECE)
     split = split._replace(steps=steps)
 

@@ -111,7 +111,7 @@ def find_split(
     """
     split = split_at_events(model, method, drive, tuple(state), places)
     least = split.steps
-    unknown = jnp.concatenate([state / split.scale, crossings.phases])
+    unknown = jnp.concatenate([state / split.scale, split.crossings.phases])
 
     def jacobian(steps: Array) -> tuple[Array, Array]:
         return split_jacobian(model, method, drive, split._replace(steps=steps), unknown)
@@ -122,9 +122,7 @@ def find_split(
     return split, unknown, matrices[1], phases[1]
 
 
-def split_at_events(
-    model: Isolator, method: ShootingMethod, drive: Sine, state: State, places: int
-) -> Split:
+def split_at_events(model: Isolator, method: ShootingMethod, drive: Sine, state: State, places: int) -> Split:
     """Split a motion at its events, with the fewest steps.
 
     Args:
@@ -205,7 +203,7 @@ def state_scale(path: State) -> Float[Array, " state"]:
 def _switch_scale(
     model: Isolator, path: State, crossings: Crossings, acceleration: Array
 ) -> Float[Array, " crossing"]:
-    """Give the size of the switch that belongs to each crossing; of what frees a mass, that of acceleration."""
+    """Give the size of the switch of each crossing; of what frees a mass, that of acceleration."""
     switches = model.switches(path)
     if not switches:
         return jnp.ones(crossings.phases.shape)
