@@ -3,8 +3,9 @@
 Run: python benchmarks/element_maps.py [ELEMENT ...]
 
 For each element: cells of a 20 x 20 map that are empty and how many of these a single orbit fills; the error
-of the multipliers of the map, and of single orbits, against orbits of the rig (`_rig_orbits.py`), beside the
-errors that both report; cells with several orbits that the rig does not confirm; time, compiling apart.
+of the multipliers of the map, and of single orbits, against orbits of the rig (`rig_orbits.py` in
+tests/stability), beside the errors that both report; cells with several orbits, and of the orbits in a few of
+them those that the rig does not confirm; time, compiling apart.
 Marks: no cell is empty where a single orbit converges; no error exceeds the reported one, unless the result
 says that the accuracy was not reached. The exit status is 1 after a FAIL.
 """
@@ -14,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, no_type_check
 
 import jax
@@ -21,11 +23,13 @@ import jax
 jax.config.update("jax_enable_x64", True)
 
 import numpy as np  # noqa: E402  (float64 first)
-from _rig_orbits import multiplier_error, rig_orbit  # noqa: E402
 
 import isojax as ij  # noqa: E402
 from isojax import elements as el  # noqa: E402
 from isojax import rig  # noqa: E402
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "stability"))
+from rig_orbits import multiplier_error, rig_orbit  # noqa: E402  (path first)
 
 AMPLITUDES = np.linspace(5.0, 60.0, 20)
 FREQUENCIES = np.linspace(4.0, 8.0, 20)

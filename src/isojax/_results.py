@@ -19,9 +19,9 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "tolerance in `Integrator`."
     )
     not_accurate = (
-        "The orbit closes, but its multipliers miss the accuracy that was asked for; `error` says by how much. "
-        "It grazes a stop or turns where friction all but holds it. Try more steps in `Integrator`, or a drive "
-        "a little beside this one."
+        "The orbit closes, but its multipliers miss the accuracy that was asked for; `error` says by how "
+        "much. It grazes a stop or turns where friction all but holds it. Try more steps in `Integrator`, "
+        "or a drive a little beside this one."
     )
     not_finite = (
         "The simulated response left every bound (it is not finite). Try a smaller step, or a start whose "

@@ -268,7 +268,7 @@ class Isolator(eqx.Module):
     @property
     def sliding_switch(self) -> int:
         """Which of the switches is the velocity, at whose zero dry friction may hold the mass; -1 if none."""
-        rest = (jnp.zeros(()),) + tuple(jnp.zeros(()) for _ in range(1 + self.internal_states))
+        rest = tuple(jnp.zeros(()) for _ in range(2 + self.internal_states))
         return find_switches(self.elements, rest).velocity if self.slides else -1
 
     def beside(self, sides: State) -> ContinuedLaw:

@@ -1,6 +1,5 @@
 """The extended equations of a bifurcation: the motion closes and a multiplier turns critical."""
 
-import math
 from typing import Literal, NamedTuple
 
 import equinox as eqx

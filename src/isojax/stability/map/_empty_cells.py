@@ -1,4 +1,4 @@
-"""Cells of a map that are left empty, tried as single orbits: from their own start, then from cells beside."""
+"""Empty cells of a map tried as single orbits: from their own start, then from the cells beside."""
 
 from typing import NamedTuple
 
@@ -21,11 +21,15 @@ _TRIED = 128
 _ROUNDS = 8
 """Times at most that empty cells are tried from those next to them."""
 
-_SAME = 1e-6
+_SAME = 1e-5
 """Distance of two orbits, over their size, up to which they are one."""
 
 _LANES = 1024
 """Lanes of the compiled step from a start to t = 0."""
+
+
+_CLOSE = 1e-3
+"""Relative difference of the sizes of two motions up to which they are looked at as one."""
 
 
 class Cells(NamedTuple):
@@ -88,6 +92,45 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
                 break
         if attempt and not filled:
             break
+    return Cells(candidates, found, split)
+
+
+def without_repeats(
+    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, cells: Cells
+) -> Cells:
+    """Leave out orbits that are another one of their cell: two starts may lead to the same.
+
+    Args:
+        model: the isolator.
+        integrator: steps and tolerances.
+        half: whether symmetric orbits are closed over half a period.
+        window: axes of the map.
+        cells: the orbits.
+
+    Returns:
+        The orbits, each once.
+    """
+    candidates, found, split = cells
+    place = candidates.force.astype(int) * len(window.frequencies) + candidates.frequency
+    good = np.flatnonzero(found.code == FOUND)
+    order = good[np.lexsort((found.response[good], place[good]))]
+    size = found.response[order]
+    close = (np.diff(place[order]) == 0) & (np.diff(size) <= _CLOSE * size[1:])
+    if not close.any():
+        return cells
+    method = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
+    pairs = np.stack([order[:-1][close], order[1:][close]])
+    first, second = (states_of(model, method, window, cells, own)[:, :2] for own in pairs)
+    scale = np.stack(
+        [found.response[pairs[0]], 2.0 * np.pi * window.frequencies[candidates.frequency[pairs[0]]]]
+    )
+    scale[1] *= scale[0]
+    same = np.all(np.abs(first - second) <= _SAME * scale.T, axis=1)
+    gone = np.maximum(*pairs)[same]
+    found = Found(*(np.array(values) for values in found))
+    found.code[gone] = NOT_CONVERGED
+    for values in (found.states, found.multipliers, found.radius, found.response):
+        values[gone] = np.nan
     return Cells(candidates, found, split)
 
 

@@ -28,7 +28,7 @@ from ..orbit import Sine, ascending, is_odd, refuse_transformed
 from ._batched_newton import FOUND, NOT_ACCURATE, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
-from ._empty_cells import Cells, fill_empty
+from ._empty_cells import Cells, fill_empty, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
 from ._single_orbits import SingleOrbits
@@ -300,7 +300,8 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
     )
     known = Cells(*(one[0] if len(one) == 1 else _joined(one) for one in (lists, parts)), split)
-    candidates, found, split = fill_empty(model, integrator, half, window, known)
+    filled = fill_empty(model, integrator, half, window, known)
+    candidates, found, split = without_repeats(model, integrator, half, window, filled)
     if found.code.size > known.found.code.size or (found.code != known.found.code).any():
         errors.append(integrator.map_orbit_error)
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)

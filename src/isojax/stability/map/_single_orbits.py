@@ -1,4 +1,4 @@
-"""Cells of a map found as single orbits, many at once: where nothing can be read off, and where Newton failed."""
+"""Cells of a map found as single orbits: where nothing can be read off, and where Newton failed."""
 
 import equinox as eqx
 import jax

@@ -295,7 +295,7 @@ def _closed_grid(
 def _with_responses(
     model: Isolator, integrator: Integrator, half: bool, rest: float, grid: _Grid
 ) -> Float[np.ndarray, "table frequency displacement"]:
-    """Give the tables of a grid with half the peak-to-peak displacements; where it slides they are left out."""
+    """Give the tables of a grid with half the peak-to-peak displacements; without, of what slides."""
     if model.slides:
         return grid.tables
     frequency, amplitude = np.meshgrid(grid.frequencies, np.exp(grid.logarithms), indexing="ij")

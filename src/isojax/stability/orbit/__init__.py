@@ -1,10 +1,10 @@
 """One periodic orbit of the forced isolator.
 
 In: an isolator, a harmonic drive. Out: `Orbit` with its state at t = 0 and its Floquet multipliers, or a
-harmonic balance. Read _describing_function (the start), _event_path (steps that end where a law jumps
-or bends), _period_map (fixed steps), _kink_crossings and _split_period_map (the motion split there), _shooting (the closed motion), _floquet,
-_orbit; _harmonic_balance stands beside them. The rooms branch, map, response, attractor and derivatives
-build on this one.
+harmonic balance. Read _describing_function (the start), _event_path (steps that end where a law jumps or
+bends), _period_map (fixed steps), _kink_crossings and _split_period_map (the motion split there), _shooting
+(the closed motion), _floquet, _orbit; _harmonic_balance stands beside them. The rooms branch, map, response,
+attractor and derivatives build on this one.
 """
 
 from ._axis import ascending as ascending

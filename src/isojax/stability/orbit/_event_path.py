@@ -72,8 +72,8 @@ def follow_events(
     Returns:
         The motion.
 
-    Source: Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6 (dense output);
-    Filippov 1988, sec. 15 (sticking); Aizerman & Gantmakher 1958 (derivatives).
+    Source: Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, sec. II.6 (dense
+    output); Filippov 1988, sec. 15 (sticking); Aizerman & Gantmakher 1958 (derivatives).
     """
     state = tuple(jnp.asarray(value, dtype=float) for value in state)
     begin, length = jnp.zeros(()), end / steps
@@ -138,7 +138,7 @@ def _leaves(model: Isolator, state: State, at: Instant, sides: Float[Array, " sw
 def _step(
     model: Isolator, drive: Sine, walk: _Walk, length: Array
 ) -> tuple[Array, Int[Array, ""], State, Float[Array, " switch"]]:
-    """Give the share of a step at which an event ends it, which one, the state there and the sides after it."""
+    """Give the share of a step at which an event ends it, which one, the state and the sides there."""
     sides, place = walk.sides, model.sliding_switch
     law = model.beside(tuple(sides))
     start, time = walk.state, length / drive.angular_frequency

@@ -88,7 +88,9 @@ def advance_across_kinks(
             moved, *_ = integrator.solver.step(term, 0.0, 1.0, state, None, None, False)
             return moved, finish
 
-        last, _ = jax.lax.fori_loop(0, steps, step, (carry, (jnp.sin(start), jnp.cos(start))))
+        # A place that no crossing uses is a piece of no length.
+        count = jnp.where(stop > start, steps, 1)
+        last, _ = jax.lax.fori_loop(0, count, step, (carry, (jnp.sin(start), jnp.cos(start))))
         return last, _events(model, last, drive.at(jnp.sin(stop), jnp.cos(stop)), sides)
 
     final, values = jax.lax.scan(piece, state, (bounds[:-1], bounds[1:], crossings.sides))

@@ -37,7 +37,7 @@ class ShootingSolution(NamedTuple):
         matrix: derivative of the state after the turns (of minus it after half a turn) by the one before.
         error: largest change of `matrix`, in scaled units, where the steps are halved.
         found: whether the search converged.
-        accurate: whether the motion has the events at which it is split, and as accurate multipliers as asked.
+        accurate: whether it has the events at which it is split, and as accurate multipliers as asked.
     """
 
     root: Float[Array, " unknown"]
@@ -149,7 +149,6 @@ def shoot(
         return jnp.stack(moved) / scale - scaled
 
     near = optx.root_find(open_end, solver, start / scale, max_steps=50, throw=False).value
-    first = _closed(model, method, solver, drive, near * scale, places, jnp.asarray(0), accuracy.goal)
 
     def again(own: _Round) -> Array:
         return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.count < _ROUNDS)
@@ -157,6 +156,14 @@ def shoot(
     def body(own: _Round) -> _Round:
         return _closed(model, method, solver, drive, own.state, places, own.count, accuracy.goal)
 
+    # What is carried into the first round, but for the state, is read by nothing.
+    begun = near * scale, jnp.asarray(0)
+    shapes = jax.eval_shape(
+        lambda state, count: _closed(model, method, solver, drive, state, places, count, accuracy.goal),
+        *begun,
+    )
+    blank = jax.tree.map(lambda one: jnp.zeros(one.shape, one.dtype), shapes)
+    first = blank._replace(state=begun[0], agrees=jnp.array(False), count=begun[1])
     last = jax.lax.while_loop(again, body, first)
     matrix = last.split.scale[:, None] * last.transition / last.split.scale[None, :]
     found = jnp.isfinite(last.mismatch) & (last.mismatch < integrator.residual_tolerance)

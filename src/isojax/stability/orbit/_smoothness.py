@@ -47,7 +47,8 @@ def has_continuous_slopes(model: Isolator) -> bool:
     """Say whether the derivative of the equations by the state is continuous across every kink.
 
     It is of |x|x, whose second derivative alone jumps; it is not of a hysteresis that turns around, nor of
-    dry friction, which itself jumps. Where it is, the instants of the kinks move nothing to first order in the multipliers.
+    dry friction, which itself jumps. Where it is, the instants of the kinks move nothing to first order in
+    the multipliers.
 
     Args:
         model: the isolator, with concrete numbers.

@@ -66,7 +66,9 @@ def _units(y0: np.ndarray, frequency: float) -> np.ndarray:
     return np.array([1.0, 2.0 * math.pi * frequency, *np.ones(y0.size - 2)])
 
 
-def rig_orbit(plant: rig.Plant, amplitude: float, frequency: float, start: np.ndarray) -> RigOrbit:
+def rig_orbit(
+    plant: rig.Plant, amplitude: float, frequency: float, start: np.ndarray, shift: float = SHIFT
+) -> RigOrbit:
     """Close an orbit from a start.
 
     Args:
@@ -74,6 +76,7 @@ def rig_orbit(plant: rig.Plant, amplitude: float, frequency: float, start: np.nd
         amplitude: F0 [N].
         frequency: f [Hz].
         start: state at t = 0, near the orbit.
+        shift: differences of the states, over their sizes: less where events come and go within them.
 
     Returns:
         The orbit.
@@ -87,10 +90,9 @@ def rig_orbit(plant: rig.Plant, amplitude: float, frequency: float, start: np.nd
         end = after_a_period(plant, amplitude, frequency, y0)
         columns = []
         for place in range(y0.size):
-            shift = np.zeros(y0.size)
-            shift[place] = SHIFT * sizes[place]
-            ends = [after_a_period(plant, amplitude, frequency, y0 + sign * shift) for sign in (1.0, -1.0)]
-            columns.append((ends[0] - ends[1]) / (2.0 * SHIFT * sizes[place]))
+            moved = shift * sizes[place] * np.eye(y0.size)[place]
+            ends = [after_a_period(plant, amplitude, frequency, y0 + sign * moved) for sign in (1.0, -1.0)]
+            columns.append((ends[0] - ends[1]) / (2.0 * shift * sizes[place]))
         matrix = np.stack(columns, axis=1)
         step = np.linalg.solve(np.eye(y0.size) - matrix, end - y0)
         y0 = y0 + step
