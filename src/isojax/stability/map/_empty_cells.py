@@ -1,6 +1,6 @@
 """Empty cells of a map tried as single orbits: from their own start, then from the cells beside."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -151,13 +151,22 @@ def _with_every_cell(cells: Cells, shape: tuple[int, int]) -> Cells:
         return cells
     none = np.zeros(force.size, np.int32)
     added = Candidates(force, column, none, none)
-    blank = [np.full((force.size, *values.shape[1:]), np.nan, values.dtype) for values in found[:-1]]
-    missing = Found(*blank, np.full(force.size, NOT_CONVERGED, np.int8))
+    blank = {
+        name: np.full((force.size, *values.shape[1:]), np.nan, values.dtype)
+        for name, values in found._asdict().items()
+        if name != "code"
+    }
+    missing = Found(**blank, code=np.full(force.size, NOT_CONVERGED, np.int8))
     return Cells(
-        Candidates(*(np.concatenate(own) for own in zip(candidates, added, strict=True))),
-        Found(*(np.concatenate(own) for own in zip(found, missing, strict=True))),
+        joined([candidates, added]),
+        joined([found, missing]),
         np.concatenate([split, np.zeros(force.size, bool)]),
     )
+
+
+def joined(lists: list[Any]) -> Any:
+    """Join lists of orbits."""
+    return type(lists[0])(*(np.concatenate(own) for own in zip(*lists, strict=True)))
 
 
 def _beside(
@@ -168,7 +177,7 @@ def _beside(
     holder = np.full((len(window.amplitudes), len(window.frequencies)), -1)
     good = np.flatnonzero((found.code == FOUND) & (candidates.order == 0))
     holder[candidates.force[good], candidates.frequency[good]] = good
-    row, column = distance_transform_edt(holder < 0, return_distances=False, return_indices=True)
+    row, column = np.asarray(distance_transform_edt(holder < 0, return_distances=False, return_indices=True))
     own = candidates.force[lost], candidates.frequency[lost]
     source = holder[row[own], column[own]]
     return states_of(model, method, window, cells, source)

@@ -28,7 +28,7 @@ from ..orbit import Sine, ascending, is_odd, refuse_transformed
 from ._batched_newton import FOUND, NOT_ACCURATE, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
-from ._empty_cells import Cells, fill_empty, without_repeats
+from ._empty_cells import Cells, fill_empty, joined, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
 from ._single_orbits import SingleOrbits
@@ -299,10 +299,12 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     split = np.repeat(
         [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
     )
-    known = Cells(*(one[0] if len(one) == 1 else _joined(one) for one in (lists, parts)), split)
+    # The common case, one list, takes no copying.
+    sought_and_found: list[Any] = [one[0] if len(one) == 1 else joined(one) for one in (lists, parts)]
+    known = Cells(*sought_and_found, split=split)
     filled = fill_empty(model, integrator, half, window, known)
     candidates, found, split = without_repeats(model, integrator, half, window, filled)
-    if found.code.size > known.found.code.size or (found.code != known.found.code).any():
+    if np.sum(filled.found.code == FOUND) > np.sum(known.found.code == FOUND):
         errors.append(integrator.map_orbit_error)
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     arrays = _gridded(candidates, found, split, len(forces), len(band), run.coexisting)
@@ -324,11 +326,6 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         **fields,
     )
     return smap, sought
-
-
-def _joined(lists: list[Any]) -> Any:
-    """Join lists of orbits."""
-    return type(lists[0])(*(np.concatenate(own) for own in zip(*lists, strict=True)))
 
 
 def _ending(code: Array) -> RESULTS:

@@ -34,7 +34,12 @@ def kinks_between(sides: Float[Array, "piece kink"]) -> Int[Array, " crossing"]:
 
 
 def advance(
-    model: Isolator, integrator: Integrator, drive: Sine, state: State, end: Array | float, steps: Array
+    model: Isolator,
+    integrator: Integrator,
+    drive: Sine,
+    state: State,
+    end: Float[Array, ""] | float,
+    steps: Array,
 ) -> State:
     """Give the state at a phase, by steps that are split where a law jumps, but not at kinks.
 

@@ -108,18 +108,18 @@ def single_orbits(
         parts.append(
             jax.tree.map(lambda it, count=count: np.asarray(it)[:count], _shoot(model, method, *values))
         )
-    return jax.tree.map(lambda *own: np.concatenate(own), *parts)
+    return Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))
 
 
 @eqx.filter_jit
 def _shoot(
     model: Isolator, method: ShootingMethod, amplitude: Array, frequency: Array, starts: Array | None = None
-) -> Found:
+) -> tuple[Array, ...]:
     goal = method.integrator.orbit_tolerance
     accuracy = Accuracy(method.integrator.map_orbit_tolerance, method.integrator.map_orbit_error)
     solver, places = optx.Newton(rtol=goal, atol=goal), event_places(model, method.turns)
 
-    def one(push: Array, rate: Array, start: Array | None) -> Found:
+    def one(push: Array, rate: Array, start: Array | None) -> tuple[Array, ...]:
         drive = recorded_sine(model, push, rate)
         begin = response_start(model, push, rate) if start is None else start
         solution = shoot(model, method, solver, drive, begin, places, accuracy)
@@ -134,7 +134,7 @@ def _shoot(
         direction = jnp.stack([unit.sine, jnp.asarray(unit.cosine, dtype=float)])
         size = half_peak_to_peak(path, method.half) * blank
         state = solution.state * blank
-        return Found(state, direction, jnp.zeros(0), roots, modulus(roots[0]), size, code.astype(jnp.int8))
+        return state, direction, jnp.zeros(0), roots, modulus(roots[0]), size, code.astype(jnp.int8)
 
     if starts is None:
         return jax.vmap(lambda push, rate: one(push, rate, None))(amplitude, frequency)

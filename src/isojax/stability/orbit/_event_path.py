@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from ..._types import Lanes
 from ...models import ContinuedLaw, Instant, Isolator, State
 from ._kink_crossings import Crossings
 from ._sine import Sine
@@ -42,7 +43,7 @@ class _Walk(NamedTuple):
     state: State
     sides: Float[Array, " switch"]
     crossings: Crossings
-    count: Int[Array, ""]
+    events: Int[Array, ""]
     path: Float[Array, "time state"]
 
 
@@ -50,7 +51,7 @@ def follow_events(
     model: Isolator,
     drive: Sine,
     state: State,
-    end: float,
+    end: Lanes | float,
     steps: Int[Array, ""] | int,
     places: int,
     kept: int = 0,
@@ -88,27 +89,28 @@ def follow_events(
     walk = _Walk(begin, state, sides, crossings, jnp.asarray(0), path.at[:1].set(jnp.stack(state)))
 
     def unfinished(walk: _Walk) -> Array:
-        return (walk.phase < end * (1.0 - _ROUNDING)) & (walk.count <= places)
+        return (walk.phase < end * (1.0 - _ROUNDING)) & (walk.events <= places)
 
     def body(walk: _Walk) -> _Walk:
         number = jnp.floor(jax.lax.stop_gradient(walk.phase) / length + 1e-6) + 1.0
         target = jnp.minimum(number * length, end)
         share, event, moved, after = _step(model, drive, walk, target - walk.phase)
         phase = jnp.where(event >= 0, walk.phase + share * (target - walk.phase), target)
-        here = (jnp.arange(places) == walk.count) & (event >= 0)
-        later = (jnp.arange(places + 1) > walk.count)[:, None] & (event >= 0)
-        old = walk.crossings
+        here = (jnp.arange(places) == walk.events) & (event >= 0)
+        later = (jnp.arange(places + 1) > walk.events)[:, None] & (event >= 0)
+        old, old_sides = walk.crossings, walk.crossings.sides
+        assert old_sides is not None
         found = Crossings(
             jnp.where(here, phase, old.phases),
             jnp.where(here, event, old.kinks),
-            jnp.where(later, after, old.sides),
-            old.complete & ((event < 0) | (walk.count < places)),
+            jnp.where(later, after, old_sides),
+            old.complete & ((event < 0) | (walk.events < places)),
         )
         path = walk.path
         if kept:
             row = jnp.where(event >= 0, kept, number.astype(int))
             path = path.at[row].set(jnp.stack(moved), mode="drop")
-        return _Walk(phase, moved, after, found, walk.count + (event >= 0), path)
+        return _Walk(phase, moved, after, found, walk.events + (event >= 0), path)
 
     last = jax.lax.while_loop(unfinished, body, walk)
     blank = jnp.where(last.crossings.complete, 1.0, jnp.nan)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from ...excitations import Harmonic
 from ...models import Isolator
@@ -71,7 +71,7 @@ class _Round(NamedTuple):
     error: Float[Array, ""]
     mismatch: Float[Array, ""]
     agrees: Bool[Array, ""]
-    count: Array
+    rounds: Int[Array, ""]
 
 
 def _gap(
@@ -151,10 +151,10 @@ def shoot(
     near = optx.root_find(open_end, solver, start / scale, max_steps=50, throw=False).value
 
     def again(own: _Round) -> Array:
-        return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.count < _ROUNDS)
+        return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.rounds < _ROUNDS)
 
     def body(own: _Round) -> _Round:
-        return _closed(model, method, solver, drive, own.state, places, own.count, accuracy.goal)
+        return _closed(model, method, solver, drive, own.state, places, own.rounds, accuracy.goal)
 
     # What is carried into the first round, but for the state, is read by nothing.
     begun = near * scale, jnp.asarray(0)
@@ -163,7 +163,7 @@ def shoot(
         *begun,
     )
     blank = jax.tree.map(lambda one: jnp.zeros(one.shape, one.dtype), shapes)
-    first = blank._replace(state=begun[0], agrees=jnp.array(False), count=begun[1])
+    first = blank._replace(state=begun[0], agrees=jnp.array(False), rounds=begun[1])
     last = jax.lax.while_loop(again, body, first)
     matrix = last.split.scale[:, None] * last.transition / last.split.scale[None, :]
     found = jnp.isfinite(last.mismatch) & (last.mismatch < integrator.residual_tolerance)
@@ -178,7 +178,7 @@ def _closed(
     drive: Sine,
     near: Float[Array, " state"],
     places: int,
-    count: Array,
+    rounds: Int[Array, ""],
     goal: float,
 ) -> _Round:
     """Close a motion with the events of one next to it, and see whether it has these events itself."""
@@ -216,4 +216,4 @@ def _closed(
     fine = round(_FINER_STEPS * integrator.steps_a_period(model) * method.turns)
     own = follow_events(model, drive, tuple(state), end, fine, places).crossings
     agrees = same_events(own, split.crossings._replace(phases=root[scale.size :]), end)
-    return _Round(state, root, split, transitions[1], error, left[1], agrees, count + 1)
+    return _Round(state, root, split, transitions[1], error, left[1], agrees, rounds + 1)
