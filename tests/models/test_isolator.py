@@ -18,7 +18,7 @@ from isojax.elements import (
     LinearStiffness,
     SensorGain,
 )
-from isojax.models import ContinuedLaw, Instant, Isolator, Regime
+from isojax.models import ContinuedLaw, Instant, Isolator, Regime, freeing_accelerations, law_beside
 
 
 @pytest.fixture
@@ -158,9 +158,9 @@ def test_the_law_that_is_meant_is_said_beside_the_state_and_not_guessed_from_it(
     # The law of the other side of rest, carried on to a positive displacement; friction without its rounding.
     beside = ContinuedLaw((-one,) * len(model.switches(state)))
     np.testing.assert_allclose(model.acceleration(state, at, beside), (8.0 + 3.0 + 10.0) / 2.0, rtol=1e-14)
-    held = model.beside((-one, 0.0 * one))
+    held = law_beside(model, (-one, 0.0 * one))
     np.testing.assert_allclose(model.acceleration(state, at, held), 0.0, atol=1e-14)
-    forward, backward = model.freed(state, at, (-one, 0.0 * one))
+    forward, backward = freeing_accelerations(model, state, at, (-one, 0.0 * one))
     np.testing.assert_allclose(forward, (8.0 + 3.0 - 10.0) / 2.0, rtol=1e-14)
     np.testing.assert_allclose(backward, (8.0 + 3.0 + 10.0) / 2.0, rtol=1e-14)
     for direction, expected in (

@@ -31,7 +31,7 @@ def test_crossings_are_those_of_a_free_sine():
         ),
     )
     drive = recorded_sine(model, 0.0, 1.0)
-    start = (math.sin(0.3), 2.0 * math.pi * math.cos(0.3))
+    start = (jnp.sin(0.3), 2.0 * math.pi * jnp.cos(0.3))
     crossings = crossings_of(model, drive, start, 128, 6)
     # v = cos passes zero at pi/2 - 0.3 and 3 pi/2 - 0.3, x = sin at pi - 0.3 and 2 pi - 0.3.
     expected = np.array([0.5, 1.0, 1.5, 2.0]) * math.pi - 0.3

@@ -93,7 +93,7 @@ def test_a_contact_within_one_step_is_not_stepped_over():
     spring, omega = 100.0, 10.0
     model = Isolator(1.0, (elements.LinearStiffness(spring), elements.EndStop(5e3, 1.0 - 1e-6, 1.0, 1e-9)))
     drive = recorded_sine(model, 0.0, omega / (2.0 * math.pi))
-    events = follow_events(model, drive, (0.0, omega), math.pi, 16, 4).crossings
+    events = follow_events(model, drive, (jnp.asarray(0.0), jnp.asarray(omega)), math.pi, 16, 4).crossings
     met = math.acos(1.0 - 1e-6)
     np.testing.assert_array_equal(events.kinks[:2], [0, 0])
     np.testing.assert_allclose(events.phases[0], 0.5 * math.pi - met, atol=1e-4)

@@ -25,7 +25,6 @@ from ._instant import Instant
 from ._laws import (
     ROUNDED,
     AbstractLaw,
-    ContinuedLaw,
     State,
     evaluate_corners,
     find_switches,
@@ -264,43 +263,6 @@ class Isolator(eqx.Module):
             One value a switch.
         """
         return find_switches(self.elements, state).values
-
-    @property
-    def sliding_switch(self) -> int:
-        """Which of the switches is the velocity, at whose zero dry friction may hold the mass; -1 if none."""
-        rest = tuple(jnp.zeros(()) for _ in range(2 + self.internal_states))
-        return find_switches(self.elements, rest).velocity if self.slides else -1
-
-    def beside(self, sides: State) -> ContinuedLaw:
-        """Give the laws of given sides of the switches, continued smoothly past them.
-
-        Args:
-            sides: +1 or -1 a switch; 0 for the velocity where dry friction holds the mass.
-
-        Returns:
-            The law.
-        """
-        place = self.sliding_switch
-        return ContinuedLaw(sides, None if place < 0 else sides[place] == 0.0)
-
-    def freed(self, state: State, at: Instant, sides: State) -> State:
-        """Give what says whether friction lets a mass at rest go.
-
-        Args:
-            state: displacement, velocity and internal states.
-            at: what acts at the instant.
-            sides: of the switches.
-
-        Returns:
-            Acceleration against forward friction, which frees the mass where it is positive, and against
-            backward friction, which frees it where it is negative; none of a model that does not slide.
-        """
-        place = self.sliding_switch
-        if place < 0:
-            return ()
-        one = jnp.ones_like(state[1])
-        moving = ((*sides[:place], sign * one, *sides[place + 1 :]) for sign in (1.0, -1.0))
-        return tuple(self.acceleration(state, at, ContinuedLaw(way)) for way in moving)
 
     def corners(self, state: State) -> State:
         """Give the functions at whose zeros some law, unrounded, has a corner.

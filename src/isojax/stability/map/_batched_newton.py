@@ -236,11 +236,11 @@ class CellSolver(eqx.Module):
         return Found(states, direction, phases, roots, radius, response, code)
 
 
-def _in_order(phases: State, end: float) -> np.ndarray:
+def _in_order(phases: tuple[Any, ...], end: float) -> np.ndarray:
     """Say whether kinks are passed one after the other, before the end."""
     bounds = [0.0, *phases, end]
     later = [np.asarray(after) >= np.asarray(before) - 1e-9 for before, after in itertools.pairwise(bounds)]
-    return np.logical_and.reduce(np.broadcast_arrays(*later))
+    return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*later)))
 
 
 def padded(values: np.ndarray, size: int) -> np.ndarray:

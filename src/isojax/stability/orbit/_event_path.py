@@ -7,7 +7,15 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._types import Lanes
-from ...models import ContinuedLaw, Instant, Isolator, State
+from ...models import (
+    ContinuedLaw,
+    Instant,
+    Isolator,
+    State,
+    freeing_accelerations,
+    law_beside,
+    sliding_switch,
+)
 from ._kink_crossings import Crossings
 from ._sine import Sine
 
@@ -123,7 +131,7 @@ def first_sides(model: Isolator, drive: Sine, state: State) -> Float[Array, " sw
     if not values:
         return jnp.zeros(0)
     sides = jnp.stack([jnp.where(value >= 0.0, 1.0, -1.0) for value in values])
-    place = model.sliding_switch
+    place = sliding_switch(model)
     if place < 0:
         return sides
     at = drive.at(jnp.zeros(()), jnp.ones(()))
@@ -133,7 +141,7 @@ def first_sides(model: Isolator, drive: Sine, state: State) -> Float[Array, " sw
 
 def _leaves(model: Isolator, state: State, at: Instant, sides: Float[Array, " switch"]) -> Array:
     """Give the direction in which a mass at rest leaves; 0 where friction holds it."""
-    forward, backward = model.freed(state, at, tuple(sides))
+    forward, backward = freeing_accelerations(model, state, at, tuple(sides))
     return jnp.where(forward > 0.0, 1.0, jnp.where(backward < 0.0, -1.0, 0.0))
 
 
@@ -141,8 +149,8 @@ def _step(
     model: Isolator, drive: Sine, walk: _Walk, length: Array
 ) -> tuple[Array, Int[Array, ""], State, Float[Array, " switch"]]:
     """Give the share of a step at which an event ends it, which one, the state and the sides there."""
-    sides, place = walk.sides, model.sliding_switch
-    law = model.beside(tuple(sides))
+    sides, place = walk.sides, sliding_switch(model)
+    law = law_beside(model, tuple(sides))
     start, time = walk.state, length / drive.angular_frequency
     if place >= 0:
         # What is held has no velocity, nor a derivative of it.
@@ -169,7 +177,7 @@ def _step(
         if place < 0:
             return values
         held = sides[place] == 0.0
-        forward, backward = model.freed(there, acting(share), tuple(sides))
+        forward, backward = freeing_accelerations(model, there, acting(share), tuple(sides))
         values = values.at[place].set(jnp.where(held, 1.0, values[place]))
         loose = jnp.where(held, jnp.stack([-forward, backward]), 1.0)
         return jnp.concatenate([values, loose])
@@ -191,7 +199,7 @@ def _after(
     model: Isolator, at: Instant, state: State, sides: Float[Array, " switch"], event: Int[Array, ""]
 ) -> tuple[State, Float[Array, " switch"]]:
     """Give the state at an event, and the sides after it."""
-    switches, place = sides.size, model.sliding_switch
+    switches, place = sides.size, sliding_switch(model)
     flipped = jnp.where(jnp.arange(switches) == event, -sides, sides)
     if place < 0:
         return state, flipped

@@ -8,7 +8,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._types import Lanes
-from ...models import ROUNDED, Instant, Integrator, Isolator, State
+from ...models import (
+    ROUNDED,
+    Instant,
+    Integrator,
+    Isolator,
+    State,
+    freeing_accelerations,
+    law_beside,
+    sliding_switch,
+)
 from ._sine import Sine
 
 
@@ -59,13 +68,13 @@ def advance_across_kinks(
         The state at the end, and the value of the switch at each crossing, zero where the phase is right.
     """
     bounds = jnp.concatenate([jnp.zeros(1), crossings.phases, jnp.reshape(end, 1)])
-    sliding = model.sliding_switch
+    sliding = sliding_switch(model)
 
     def piece(carry: State, along: tuple[Array, Array, Array | None]) -> tuple[State, Lanes]:
         start, stop, sides = along
         length = (stop - start) / steps
         step_time = length / drive.angular_frequency
-        law = ROUNDED if sides is None else model.beside(tuple(sides))
+        law = ROUNDED if sides is None else law_beside(model, tuple(sides))
         if sides is not None and sliding >= 0:
             # What is held has no velocity, nor a derivative of it.
             carry = (carry[0], jnp.where(sides[sliding] == 0.0, 0.0, carry[1]), *carry[2:])
@@ -105,5 +114,5 @@ def _events(model: Isolator, state: State, at: Instant, sides: Array | None) -> 
     """Give the switches, then what says whether friction lets a mass at rest go."""
     if sides is None:
         return jnp.zeros(0)
-    values = (*model.switches(state), *model.freed(state, at, tuple(sides)))
+    values = (*model.switches(state), *freeing_accelerations(model, state, at, tuple(sides)))
     return jnp.stack(values) if values else jnp.zeros(0)

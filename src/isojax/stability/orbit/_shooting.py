@@ -9,7 +9,7 @@ import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
 from ...excitations import Harmonic
-from ...models import Isolator
+from ...models import Isolator, sliding_switch
 from ._event_path import follow_events, same_events
 from ._jacobian import value_and_jacobian
 from ._period_map import period_map, trajectory
@@ -167,6 +167,10 @@ def shoot(
     last = jax.lax.while_loop(again, body, first)
     matrix = last.split.scale[:, None] * last.transition / last.split.scale[None, :]
     found = jnp.isfinite(last.mismatch) & (last.mismatch < integrator.residual_tolerance)
+    if model.slides:
+        # Held throughout, the mass may rest anywhere within the friction: that is no orbit of its own.
+        assert last.split.crossings.sides is not None
+        found = found & jnp.any(last.split.crossings.sides[:, sliding_switch(model)] != 0.0)
     accurate = last.agrees & (last.error <= accuracy.limit)
     return ShootingSolution(last.root, last.split, last.state, matrix, last.error, found, accurate)
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...models import Instant, Isolator
+from ...models import Instant, Isolator, law_beside
 
 _STATES_TRIED = 8
 """States on each kink at which the slopes of both sides are compared."""
@@ -34,7 +34,7 @@ def _jumps(model: Isolator, states: Float[Array, "trial state"]) -> Float[Array,
         signs = [jnp.where(value >= 0.0, 1.0, -1.0) for value in model.switches(tuple(there))]
 
         def slope(side: float) -> Array:
-            law = model.beside((*signs[:which], jnp.asarray(side), *signs[which + 1 :]))
+            law = law_beside(model, (*signs[:which], jnp.asarray(side), *signs[which + 1 :]))
             return jax.jacfwd(lambda s: jnp.stack(model.rates(tuple(s), Instant(0.0 * s[0]), law=law)))(there)
 
         upper, lower = slope(1.0), slope(-1.0)
