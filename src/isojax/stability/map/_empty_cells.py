@@ -60,6 +60,8 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
         The orbits, with those that were lacking.
     """
     shape = len(window.amplitudes), len(window.frequencies)
+    if (cells.found.code == FOUND).all() and np.sum(cells.candidates.order == 0) == shape[0] * shape[1]:
+        return cells
     method = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
     cells = _with_every_cell(cells, shape)
     candidates, found = cells.candidates, Found(*(np.array(values) for values in cells.found))
@@ -111,8 +113,13 @@ def without_repeats(
         The orbits, each once.
     """
     candidates, found, split = cells
+    good = found.code == FOUND
+    single = np.flatnonzero(good & ~split)
+    if not single.size:
+        return cells
+    # Orbits that are read off, or split alike, differ by how they are found.
     place = candidates.force.astype(int) * len(window.frequencies) + candidates.frequency
-    good = np.flatnonzero(found.code == FOUND)
+    good = np.flatnonzero(good & np.isin(place, place[single]))
     order = good[np.lexsort((found.response[good], place[good]))]
     size = found.response[order]
     close = (np.diff(place[order]) == 0) & (np.diff(size) <= _CLOSE * size[1:])
