@@ -18,6 +18,11 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "The search stopped before it converged. Try a start nearer to the answer, more steps, or a looser "
         "tolerance in `Integrator`."
     )
+    not_accurate = (
+        "The orbit closes, but its multipliers miss the accuracy that was asked for; `error` says by how "
+        "much. It grazes a stop or turns where friction all but holds it. Try more steps in `Integrator`, "
+        "or a drive a little beside this one."
+    )
     not_finite = (
         "The simulated response left every bound (it is not finite). Try a smaller step, or a start whose "
         "stiffness and damping stay positive over the motion that was measured."

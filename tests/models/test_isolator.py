@@ -18,7 +18,7 @@ from isojax.elements import (
     LinearStiffness,
     SensorGain,
 )
-from isojax.models import ContinuedLaw, Instant, Isolator, Regime
+from isojax.models import ContinuedLaw, Instant, Isolator, Regime, freeing_accelerations, law_beside
 
 
 @pytest.fixture
@@ -155,9 +155,14 @@ def test_the_law_that_is_meant_is_said_beside_the_state_and_not_guessed_from_it(
     state, at = (jnp.asarray(1e-3), jnp.asarray(0.0)), Instant(jnp.asarray(8.0))
     one = jnp.ones(())
     np.testing.assert_allclose(model.acceleration(state, at), (8.0 - 3.0) / 2.0, rtol=1e-14)
-    # The law of the other side of rest, carried on to a positive displacement.
-    beside = ContinuedLaw((-one,) * len(model.kinks(state)))
-    np.testing.assert_allclose(model.acceleration(state, at, beside), (8.0 + 3.0) / 2.0, rtol=1e-14)
+    # The law of the other side of rest, carried on to a positive displacement; friction without its rounding.
+    beside = ContinuedLaw((-one,) * len(model.switches(state)))
+    np.testing.assert_allclose(model.acceleration(state, at, beside), (8.0 + 3.0 + 10.0) / 2.0, rtol=1e-14)
+    held = law_beside(model, (-one, 0.0 * one))
+    np.testing.assert_allclose(model.acceleration(state, at, held), 0.0, atol=1e-14)
+    forward, backward = freeing_accelerations(model, state, at, (-one, 0.0 * one))
+    np.testing.assert_allclose(forward, (8.0 + 3.0 - 10.0) / 2.0, rtol=1e-14)
+    np.testing.assert_allclose(backward, (8.0 + 3.0 + 10.0) / 2.0, rtol=1e-14)
     for direction, expected in (
         (1.0, (8.0 - 3.0 - 10.0) / 2.0),
         (-1.0, (8.0 - 3.0 + 10.0) / 2.0),

@@ -9,31 +9,41 @@ import numpy as np
 import pytest
 from scipy_orbits import Y_DIRECTION, flow, polynomial
 
-from isojax import Harmonic, Integrator, find_periodic_orbit, paper
-from isojax.stability.orbit._kink_crossings import advance_across_kinks, find_crossings
-from isojax.stability.orbit._period_map import period_map, trajectory
+from isojax import Harmonic, Integrator, Isolator, elements, find_periodic_orbit, paper
+from isojax.stability.orbit._event_path import follow_events
+from isojax.stability.orbit._kink_crossings import advance_across_kinks
+from isojax.stability.orbit._period_map import period_map
 from isojax.stability.orbit._sine import recorded_sine
 
 
-def crossings_of(model, drive, state, steps=512):
-    path = trajectory(model, Integrator(steps_per_period=steps), drive, state)
-    return find_crossings(model, path, 2.0 * math.pi, 8)
+def crossings_of(model, drive, state, steps=512, places=8):
+    return follow_events(model, drive, state, 2.0 * math.pi, steps, places).crossings
 
 
-def test_crossings_are_those_of_the_sampled_sine():
-    model = paper.y_direction()
-    phase = jnp.linspace(0.0, 2.0 * math.pi, 400)
-    path = (jnp.sin(phase + 0.3), jnp.cos(phase + 0.3))
-    crossings = find_crossings(model, path, 2.0 * math.pi, 6)
+def test_crossings_are_those_of_a_free_sine():
+    # Kinks of laws that have no strength: what is left swings as a sine, one turn in one period of the drive.
+    model = Isolator(
+        1.0,
+        (
+            elements.LinearStiffness((2.0 * math.pi) ** 2),
+            elements.AbsQuadraticStiffness(0.0),
+            elements.AbsQuadraticDamping(0.0),
+        ),
+    )
+    drive = recorded_sine(model, 0.0, 1.0)
+    start = (jnp.sin(0.3), 2.0 * math.pi * jnp.cos(0.3))
+    crossings = crossings_of(model, drive, start, 128, 6)
     # v = cos passes zero at pi/2 - 0.3 and 3 pi/2 - 0.3, x = sin at pi - 0.3 and 2 pi - 0.3.
     expected = np.array([0.5, 1.0, 1.5, 2.0]) * math.pi - 0.3
-    np.testing.assert_allclose(crossings.phases[:4], expected, atol=1e-5)
+    np.testing.assert_allclose(crossings.phases[:4], expected, atol=1e-6)
     np.testing.assert_array_equal(crossings.phases[4:], 2.0 * math.pi)
     np.testing.assert_array_equal(crossings.kinks, [1, 0, 1, 0, -1, -1])
     expected_sides = [[1, 1], [1, -1], [-1, -1], [-1, 1], [1, 1], [1, 1], [1, 1]]
     np.testing.assert_array_equal(crossings.sides, expected_sides)
     assert bool(crossings.complete)
-    assert not bool(find_crossings(model, path, 2.0 * math.pi, 3).complete)
+    short = follow_events(model, drive, start, 2.0 * math.pi, 128, 3)
+    assert not bool(short.crossings.complete)
+    assert not np.any(np.isfinite(short.end))
 
 
 def test_split_at_its_kinks_a_motion_converges_with_fourth_order_to_that_of_scipy():

@@ -15,7 +15,7 @@ class AsymmetricFriction(AbstractElement):
 
     `dF tanh(v / vs)^2` [N]; meant beside `Fc tanh(v / vs)`, with which it is `Fc + dF` against positive
     motion and `Fc - dF` against negative motion; |dF| <= Fc is what takes energy in both. vs is the declared
-    regularising width of dry friction; simulated records are split at reversals instead. In a motion that
+    regularising width of dry friction; records and orbits are split at reversals instead. In a motion that
     never rests it is a constant force but for the instants of reversal, and so all but exactly an offset of
     the drive.
 

@@ -12,7 +12,7 @@ from ._element import AbstractElement, Group, LookAlike, Scales
 class CoulombFriction(AbstractElement):
     """Dry friction: a constant force against the motion.
 
-    `Fc sign(v)` [N] in simulated records, which are split where the mass reverses, sticks and breaks loose;
+    `Fc sign(v)` [N] in records and orbits, which are split where the mass reverses, sticks and breaks loose;
     `Fc tanh(v / vs)` where a smooth law is needed, with a declared regularising width vs that is no physical
     number. Of a motion of velocity amplitude V that loses `pi^2/24 (vs/V)^2` of the dissipation, and `0.25
     vs/V` of the mean square force goes amiss near the reversals.

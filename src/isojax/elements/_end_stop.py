@@ -15,10 +15,10 @@ class EndStop(AbstractElement):
 
     `K [(1 + side) u(x - g) - (1 - side) u(-x - g)]` [N] with the rounded ramp `u(d) = w ln(1 + exp(d / w))`,
     which is max(d, 0) but for a corner of width w: a declared regularising width, not a physical number. The
-    rounding of a corner of the stiffness k takes in `pi^2/12 k w^2` of energy on either side of it. Simulated
-    records are split at the corner and have the ramp itself. K is the
-    mean of the two stops; with side = 0 each has K, with side = +1 only positive displacement meets one, of
-    2 K. The side is fitted, for a search that starts on the wrong one must find its way.
+    rounding of a corner of the stiffness k takes in `pi^2/12 k w^2` of energy on either side of it. Records
+    and orbits are split at the corner and have the ramp itself. K is the mean of the two stops; with side = 0
+    each has K, with side = +1 only positive displacement meets one, of 2 K. The side is fitted, for a search
+    that starts on the wrong one must find its way.
 
     With a free linear spring a stop with side = 0 is exactly the class of a free gap: `K x - K clip(x, -g,
     g)` is this law, so that "K more beyond g" and "K less within g" differ by what is called the linear

@@ -129,8 +129,8 @@ class AbstractForce(AbstractEffect):
     def corners(self, x: Lanes, v: Lanes, s: Internal) -> tuple[Lanes, ...]:
         """Give the functions of the state at whose zeros the law, unrounded, has a corner.
 
-        A simulated record is split there, and where an element that `slides` changes direction, so that each
-        piece has the law of `sharp_force`. Orbits and maps keep to `force`, which is smooth.
+        Simulated records, orbits and maps are split there, and where an element that `slides` changes
+        direction, so that each piece has the law of `sharp_force`.
 
         Args:
             x: displacement [m].
@@ -161,5 +161,5 @@ class AbstractForce(AbstractEffect):
 
     @property
     def splits(self) -> bool:
-        """Whether simulated records are split where this law jumps or bends."""
+        """Whether simulated records, orbits and maps are split where this law, unrounded, jumps or bends."""
         return self.slides or type(self).corners is not AbstractForce.corners

@@ -16,8 +16,8 @@ class Freeplay(AbstractElement):
 
     `-K clip(x, -g, g)` [N] beside the linear spring, which then has `k1 - K` within the gap and `k1 x
     -+ K g` beyond it; K = k1 is a gap without any spring. The corners are rounded: `clip` is `w ln[(1 + e^((x
-    + g)/w)) / (1 + e^((x - g)/w))] - g`, with the declared regularising width w; simulated records are split
-    there instead.
+    + g)/w)) / (1 + e^((x - g)/w))] - g`, with the declared regularising width w; records and orbits are
+    split there instead.
 
     With a free linear spring it is exactly the class of the two-sided end stop, of equal K, g and w: `K x - K
     clip(x, -g, g)` is that stop, and the two linear springs differ by K. No record separates them; a look at

@@ -15,7 +15,7 @@ class StribeckFriction(AbstractElement):
 
     `F [1 + r exp(-(v / vst)^2)] tanh(v / vs)` [N]: breakaway at `F (1 + r)`, sliding at F. It is the whole
     law and contains dry friction (r = 0), whose place it takes. vs is the declared regularising width of dry
-    friction; simulated records are split at reversals instead.
+    friction; records and orbits are split at reversals instead.
 
     Attributes:
         force_level: F, sliding friction [N].

@@ -43,6 +43,9 @@ from ._scan import read_record as read_record
 from ._scan import scan_records as scan_records
 from ._simulate import Simulation as Simulation
 from ._simulate import simulate as simulate
+from ._sliding import freeing_accelerations as freeing_accelerations
+from ._sliding import law_beside as law_beside
+from ._sliding import sliding_switch as sliding_switch
 from ._solve import check_integrator as check_integrator
 from ._solve import solve_record as solve_record
 from ._storage import load_model as load_model

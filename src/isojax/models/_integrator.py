@@ -111,15 +111,17 @@ class Integrator(eqx.Module):
         return max(_FINE_STEPS, self.steps_per_sample(model))
 
     def steps_a_period(self, model: Isolator) -> int:
-        """Give the integration steps a drive period.
+        """Give the integration steps a drive period, which are split where a law jumps or bends.
 
         Args:
-            model: the isolator, whose sharpest element may ask for more.
+            model: the isolator, whose sharpest element may ask for more; one that is split does not.
 
         Returns:
             Steps, an even number.
         """
-        return self.steps_per_period * model.substeps
+        return self.steps_per_period * max(
+            (one.substeps for one in model.elements if not one.splits), default=1
+        )
 
     def with_steps(self, steps_per_period: int) -> "Integrator":
         """Give the same integrator with other steps a period.
@@ -148,9 +150,24 @@ class Integrator(eqx.Module):
         return 1e-11
 
     @property
+    def orbit_error(self) -> float:
+        """Integration error of the multipliers of a single orbit beyond which it is not accurate enough."""
+        return 1e-9
+
+    @property
     def map_error(self) -> float:
         """Error of a map's multipliers to which its steps are chosen, where none are asked for."""
         return 2e-5
+
+    @property
+    def map_orbit_tolerance(self) -> float:
+        """Integration error to which steps are refined in cells of a map that are found as single orbits."""
+        return 1e-3 * self.map_error
+
+    @property
+    def map_orbit_error(self) -> float:
+        """Integration error of such a cell beyond which it is not accurate enough."""
+        return 0.05 * self.map_error
 
     @property
     def map_tolerance(self) -> float:

@@ -22,7 +22,14 @@ from .._types import Lanes, Scalar
 from ..elements import AbstractElement, Channels
 from ._conditions import followed_conditions, plain_elements
 from ._instant import Instant
-from ._laws import ROUNDED, AbstractLaw, State, evaluate_switches, share_internal
+from ._laws import (
+    ROUNDED,
+    AbstractLaw,
+    State,
+    evaluate_corners,
+    find_switches,
+    share_internal,
+)
 
 Quantity = Literal["acceleration", "velocity", "displacement"]
 
@@ -246,16 +253,16 @@ class Isolator(eqx.Module):
                 total = moved if total is None else total + moved
         return total
 
-    def kinks(self, state: State) -> State:
-        """Give the functions at whose zeros some law is not smooth.
+    def switches(self, state: State) -> State:
+        """Give the functions at whose zeros some law, unrounded, jumps or bends; orbits are split there.
 
         Args:
             state: displacement, velocity and internal states.
 
         Returns:
-            One value a kink, those of each element in turn.
+            One value a switch.
         """
-        return self._switches(state, "kinks")
+        return find_switches(self.elements, state).values
 
     def corners(self, state: State) -> State:
         """Give the functions at whose zeros some law, unrounded, has a corner.
@@ -266,10 +273,7 @@ class Isolator(eqx.Module):
         Returns:
             One value a corner, those of each element in turn.
         """
-        return self._switches(state, "corners")
-
-    def _switches(self, state: State, which: Literal["kinks", "corners"]) -> State:
-        return tuple(one for own in evaluate_switches(self.elements, state, which) for one in own)
+        return tuple(one for own in evaluate_corners(self.elements, state) for one in own)
 
     def restoring_force(self, state: State, law: AbstractLaw = ROUNDED) -> Lanes:
         """Give the sum of element forces.

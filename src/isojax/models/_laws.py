@@ -1,7 +1,7 @@
 """Which law of the elements is meant where one jumps or bends: rounded, continued from one side, or sharp."""
 
 import abc
-from typing import Literal
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -33,12 +33,55 @@ def share_internal(elements: Elements, state: State) -> list[Internal]:
     return shares
 
 
-def evaluate_switches(
-    elements: Elements, state: State, which: Literal["kinks", "corners"]
-) -> list[tuple[Lanes, ...]]:
-    """Evaluate the functions at whose zeros laws are not smooth."""
+def evaluate_corners(elements: Elements, state: State) -> list[tuple[Lanes, ...]]:
+    """Evaluate the functions at whose zeros laws, unrounded, have a corner; those of each element."""
     shares = zip(elements, share_internal(elements, state), strict=True)
-    return [getattr(element, which)(state[0], state[1], own) for element, own in shares]
+    return [element.corners(state[0], state[1], own) for element, own in shares]
+
+
+class Switches(NamedTuple):
+    """The functions of the state at whose zeros some law jumps or bends, each once.
+
+    Attributes:
+        values: of the functions.
+        places: which of them are those of each element, in its own order.
+        velocity: which of them is the velocity; -1 where no law depends on its sign.
+    """
+
+    values: State
+    places: tuple[tuple[int, ...], ...]
+    velocity: int
+
+
+def find_switches(elements: Elements, state: State) -> Switches:
+    """Find where laws jump or bend: the corners of those that split records, the kinks of the others.
+
+    Laws that share a switch, such as the velocity, give back the very array that they were given.
+
+    Args:
+        elements: the isolator's.
+        state: displacement, velocity and internal states.
+
+    Returns:
+        The switches.
+    """
+    values: list[Lanes] = []
+    places = []
+
+    def place_of(one: Lanes) -> int:
+        for place, other in enumerate(values):
+            if one is other:
+                return place
+        values.append(one)
+        return len(values) - 1
+
+    for element, internal in zip(elements, share_internal(elements, state), strict=True):
+        own = (element.corners if element.splits else element.kinks)(state[0], state[1], internal)
+        places.append(tuple(place_of(one) for one in own))
+    if any(element.slides for element in elements):
+        place_of(state[1])
+    velocity = next((place for place, one in enumerate(values) if one is state[1]), -1)
+    return Switches(tuple(values), tuple(places), velocity)
 
 
 class AbstractLaw(eqx.Module):
@@ -70,21 +113,44 @@ ROUNDED = RoundedLaw()
 
 
 class ContinuedLaw(AbstractLaw):
-    """The laws of given sides of the kinks, continued smoothly past them.
+    """The laws of given sides of the switches, continued smoothly past them; sharp ones without rounding.
 
     Attributes:
-        sides: +1 or -1, side of each of the isolator's kinks.
+        sides: +1 or -1, side of each of the isolator's switches; that of the velocity 0 where dry friction
+            holds the mass.
+        held: whether it does; None of a model that nothing can hold.
     """
 
     sides: State
+    held: Bool[Array, "..."] | None = None
+
+    def _beside(self, elements: Elements, state: State) -> list[tuple]:
+        """Give each element with its internal states, the sides of its own switches and that of sliding."""
+        switches = find_switches(elements, state)
+        direction = self.sides[switches.velocity] if switches.velocity >= 0 else jnp.ones_like(state[1])
+        own = [tuple(self.sides[place] for place in places) for places in switches.places]
+        shares = share_internal(elements, state)
+        return [(*each, direction) for each in zip(elements, shares, own, strict=True)]
 
     def forces(self, elements: Elements, state: State) -> list[Lanes]:
-        shares = _share_sides(elements, state, "kinks", self.sides)
-        return [element.force_beside(state[0], state[1], own, sides) for element, own, sides in shares]
+        x, v = state[:2]
+        return [
+            element.sharp_force(x, v, own, direction, sides)
+            if element.splits
+            else element.force_beside(x, v, own, sides)
+            for element, own, sides, direction in self._beside(elements, state)
+        ]
 
     def state_rates(self, elements: Elements, state: State) -> list[Internal]:
-        shares = _share_sides(elements, state, "kinks", self.sides)
-        return [element.state_rate_beside(state[0], state[1], own, sides) for element, own, sides in shares]
+        return [
+            element.state_rate(state[0], state[1], own)
+            if element.splits
+            else element.state_rate_beside(state[0], state[1], own, sides)
+            for element, own, sides, _ in self._beside(elements, state)
+        ]
+
+    def acceleration(self, unheld: Lanes) -> Lanes:
+        return unheld if self.held is None else jnp.where(self.held, 0.0, unheld)
 
 
 class Regime(AbstractLaw):
@@ -104,7 +170,7 @@ class Regime(AbstractLaw):
         return self.direction == 0.0
 
     def forces(self, elements: Elements, state: State) -> list[Lanes]:
-        shares = _share_sides(elements, state, "corners", self.corners)
+        shares = _share_sides(elements, state, self.corners)
         return [
             element.sharp_force(state[0], state[1], own, self.direction, sides)
             for element, own, sides in shares
@@ -115,11 +181,11 @@ class Regime(AbstractLaw):
 
 
 def _share_sides(
-    elements: Elements, state: State, which: Literal["kinks", "corners"], sides: tuple[Lanes, ...]
+    elements: Elements, state: State, sides: tuple[Lanes, ...]
 ) -> list[tuple[AbstractElement, Internal, tuple[Lanes, ...]]]:
-    """Give each element with its internal states and the sides of its own kinks or corners."""
+    """Give each element with its internal states and the sides of its own corners."""
     shares, place = [], 0
-    counts = [len(own) for own in evaluate_switches(elements, state, which)]
+    counts = [len(own) for own in evaluate_corners(elements, state)]
     for element, internal, count in zip(elements, share_internal(elements, state), counts, strict=True):
         shares.append((element, internal, sides[place : place + count]))
         place += count

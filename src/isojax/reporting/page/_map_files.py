@@ -13,7 +13,7 @@ from ...stability import FoldCurve, StabilityMap, continue_branch, fold_curve
 from ..plots import plot_fold_curve, plot_response_curves, plot_response_map, plot_stability_map
 from ._png import png_bytes
 
-_CODES = ("successful", "not_converged", "not_finite")
+_CODES = ("successful", "not_converged", "not_finite", "not_accurate")
 """Codes of a cell's result, 0 first."""
 
 _ARRAYS = (

@@ -1,6 +1,5 @@
 """A bifurcation found exactly: the motion, split at its kinks, closes and a multiplier turns critical."""
 
-import math
 from typing import NamedTuple
 
 import equinox as eqx
@@ -399,8 +398,3 @@ def _bend(system: _System, beside: _Expansion) -> Float[Array, ""]:
 
 
 polish_jitted = quick_jit(polish)
-
-
-def first_places(family: ParameterFamily, states: int, turns: float) -> int:
-    """Give how many crossings of kinks to make room for first."""
-    return math.ceil(4 * len(family.model.kinks((jnp.zeros(()),) * states)) * turns)

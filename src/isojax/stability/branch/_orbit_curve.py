@@ -12,11 +12,11 @@ from jaxtyping import Array, Bool, Float
 from ..._implicit import frozen
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
-from ..orbit import ShootingMethod, multipliers, state_scale, trajectory, value_and_jacobian
+from ..orbit import ShootingMethod, event_places, multipliers, state_scale, trajectory, value_and_jacobian
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._bifurcation_curves import CodimensionTwoPoint
 from ._criticality import BifurcationKind, criticality
-from ._extended_system import MOST_PLACES, PointGuess, Polished, first_places, polish
+from ._extended_system import MOST_PLACES, PointGuess, Polished, polish
 from ._parameter_family import ParameterFamily
 
 _POLISHED_AT_ONCE = 16
@@ -134,11 +134,11 @@ class OrbitCurve(eqx.Module):
 
     def polished(self, whole: Whole) -> Polished:
         """Give the points found anew, in planes across the curve."""
-        count, (_, states) = whole.unknowns.shape[0], (0, whole.scale.shape[0])
+        count = whole.unknowns.shape[0]
         blocks = -(-count // _POLISHED_AT_ONCE)
         places = np.resize(np.arange(count), (blocks, _POLISHED_AT_ONCE))
         still = frozen(self)
-        room = first_places(still.family, states, self.method.turns)
+        room = event_places(still.family.model, self.method.turns)
         while True:
             rows = [
                 [jnp.asarray(values) for values in (whole.scale, whole.unknowns[part], whole.tangents[part])]

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS, is_successful
-from ..orbit import ShootingMethod, multipliers
+from ..orbit import ShootingMethod, event_places, multipliers
 from ._branch import BranchEvent, BranchPoints, SpecialPoint, orbit_at
 from ._criticality import BifurcationKind
 from ._extended_system import (
@@ -17,7 +17,6 @@ from ._extended_system import (
     MOST_PLACES,
     PointGuess,
     Polished,
-    first_places,
     polish_jitted,
 )
 from ._locating import SAME_MOTION, BranchCurves, crossed_branch, distance_from, locate, repeats_jitted
@@ -94,7 +93,7 @@ def special_point(
     Returns:
         The point.
     """
-    places = first_places(family, guess.state.shape[0], method.turns)
+    places = event_places(family.model, method.turns)
     # A number on the device, so that what is compiled serves for all.
     still, guess, reach = *frozen((family, guess)), jnp.asarray(within)
     found = polish_jitted(still, method, kind, guess, places, within=reach)

@@ -1,6 +1,7 @@
 """Batched Newton: orbits and multipliers of many cells of a map at once."""
 
 import functools
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -14,8 +15,8 @@ from jaxtyping import Array, Complex, Float, Int
 from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Crossings, Sine, advance_across_kinks, modulus, multipliers
-from ._map_method import Lane, MapMethod
+from ..orbit import Sine, modulus, multipliers
+from ._map_method import Lane, MapMethod, advance, kinks_between
 from ._starts import Candidates, PlacedSurface, read_surface
 from ._surface import Surface
 
@@ -35,7 +36,7 @@ _WIDE = {"xla_cpu_prefer_vector_width": 512}
 WHOLE_STEPS = 4
 """Times the steps of orbits that are not split at kinks."""
 
-FOUND, NOT_CONVERGED, NOT_FINITE = 0, 1, 2
+FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE = 0, 1, 2, 3
 """Codes of how the search in a cell ended."""
 
 
@@ -61,8 +62,12 @@ class Found(NamedTuple):
     code: Int[np.ndarray, " candidate"]
 
 
-def newton_step(model: Isolator, method: MapMethod, lane: Lane) -> tuple[State, Float[Array, "state state"]]:
+def newton_step(
+    model: Isolator, method: MapMethod, lane: Lane
+) -> tuple[State, State, Float[Array, "state state"]]:
     """Give the step of Newton's method on the period map of one orbit, and the derivative of that map.
+
+    The instants at which the orbit passes kinks are unknowns beside its state.
 
     Args:
         model: the isolator.
@@ -70,40 +75,69 @@ def newton_step(model: Isolator, method: MapMethod, lane: Lane) -> tuple[State, 
         lane: the orbit.
 
     Returns:
-        Change of the state that closes the orbit to first order; derivative of the map at the state.
+        Change of the state that closes the orbit to first order; that of the phases of its kinks; derivative
+        of the map at the state, the phases following along.
     """
+    states, phases = len(lane.state), () if method.sides is None else lane.phases
+    kinks = None if method.sides is None or not phases else kinks_between(method.sides)
 
-    def moved(begin: State) -> tuple[State, State]:
-        end = method.moved(model, lane._replace(state=begin))
-        return end, end
+    def moved(begin: State, phases: State) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+        end, reached = method.moved_past(model, lane._replace(state=begin, phases=phases), kinks)
+        out = (*end, *(reached[place] for place in range(len(phases))))
+        return out, out
 
-    slopes, end = jax.jacfwd(moved, has_aux=True)(lane.state)
-    gap = [b - a for a, b in zip(lane.state, end, strict=True)]
-    matrix = jnp.stack([jnp.stack(row) for row in slopes])
-    if len(lane.state) > 2:
-        return tuple(jnp.linalg.solve(jnp.eye(len(gap)) - matrix, jnp.stack(gap))), matrix
-    (a, b), (c, d) = slopes
-    determinant = (1.0 - a) * (1.0 - d) - b * c
-    step = (((1.0 - d) * gap[0] + b * gap[1]) / determinant, (c * gap[0] + (1.0 - a) * gap[1]) / determinant)
-    return step, matrix
+    slopes, out = jax.jacfwd(moved, argnums=(0, 1), has_aux=True)(lane.state, phases)
+    gap = [b - a for a, b in zip(lane.state, out[:states], strict=True)]
+    if not phases and states == 2:
+        (a, b), (c, d) = (own[0] for own in slopes)
+        determinant = (1.0 - a) * (1.0 - d) - b * c
+        step = (
+            ((1.0 - d) * gap[0] + b * gap[1]) / determinant,
+            (c * gap[0] + (1.0 - a) * gap[1]) / determinant,
+        )
+        return step, (), jnp.stack([jnp.stack([a, b]), jnp.stack([c, d])])
+    whole = jnp.stack([jnp.stack([*by_state, *by_phase]) for by_state, by_phase in slopes])
+    matrix, bend = whole[:states, :states], whole[:states, states:]
+    missed = jnp.stack(out[states:]) if phases else jnp.zeros(0)
+    # The phases that meet the kinks, to first order: p = -lower^-1 (missed + follow z).
+    lower = whole[states:, states:]
+    follow = jnp.linalg.solve(lower, whole[states:, :states]) if phases else jnp.zeros((0, states))
+    shift = jnp.linalg.solve(lower, missed) if phases else missed
+    matrix = matrix - bend @ follow
+    step = jnp.linalg.solve(jnp.eye(states) - matrix, jnp.stack(gap) - bend @ shift)
+    return tuple(step), tuple(-shift - follow @ step), matrix
 
 
 @functools.partial(quick_jit, options=_WIDE)
-def _newton_steps(model: Isolator, method: MapMethod, lanes: Lane) -> tuple[State, Lanes, Array, Lanes]:
-    step, matrix = jax.vmap(lambda lane: newton_step(model, method, lane))(lanes)
+def _newton_steps(
+    model: Isolator, method: MapMethod, lanes: Lane
+) -> tuple[State, State, Lanes, Array, Lanes]:
+    step, turn, matrix = jax.vmap(lambda lane: newton_step(model, method, lane))(lanes)
     state, response, omega = lanes.state, lanes.response, lanes.drive.angular_frequency
     scales = (response, response * omega, *(jnp.maximum(jnp.abs(s), 1e-3 * response) for s in state[2:]))
-    size = jnp.max(jnp.stack([jnp.abs(d) / c for d, c in zip(step, scales, strict=True)]), axis=0)
+    sizes = [jnp.abs(d) / c for d, c in zip(step, scales, strict=True)] + [jnp.abs(d) for d in turn]
+    size = jnp.max(jnp.stack(sizes), axis=0)
     # Far off, a full step may leave the basin of the orbit that the start is near to.
     damping = jnp.minimum(1.0, 0.3 / size)
     moved = tuple(s + damping * d for s, d in zip(state, step, strict=True))
+    phases = tuple(p + damping * d for p, d in zip(lanes.phases, turn, strict=True)) if turn else lanes.phases
     roots = multipliers(matrix)
     roots = roots * roots if method.half else roots
-    return moved, size, roots, modulus(roots[..., 0])
+    return moved, phases, size, roots, modulus(roots[..., 0])
 
 
 @functools.partial(quick_jit, options=_WIDE)
-def _lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
+def surface_lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
+    """Give starts as the surface has them.
+
+    Args:
+        model: the isolator.
+        surface: orbits over displacement and frequency.
+        where: places of force, frequency and part of each.
+
+    Returns:
+        The starts.
+    """
     read = read_surface(surface, 2 + model.internal_states, *where)
     push, (sine, cosine) = surface.amplitudes[where[0]], read.direction
     drive = Sine(push * sine, push * cosine, surface.frequencies[where[1]])
@@ -155,7 +189,7 @@ class CellSolver(eqx.Module):
             Their orbits.
         """
         where = jax.device_put([padded(values, size) for values in candidates[:3]], self.sharding)
-        lanes = _lanes(self.model, self.surface, where)
+        lanes = surface_lanes(self.model, self.surface, where)
         return self.improve(self.method, lanes, candidates.force.size, limit)
 
     def improve(self, method: MapMethod, lanes: Lane, count: int, limit: float | None = None) -> Found:
@@ -171,8 +205,8 @@ class CellSolver(eqx.Module):
             The orbits.
         """
         limit = method.integrator.map_tolerance if limit is None else limit
-        moved, *rest = _newton_steps(self.model, method, lanes)
-        lanes = lanes._replace(state=moved)
+        moved, phases, *rest = _newton_steps(self.model, method, lanes)
+        lanes = lanes._replace(state=moved, phases=phases)
         lanes, step, roots, radius = jax.tree_util.tree_map(lambda it: np.asarray(it)[:count], (lanes, *rest))
         for _ in range(_NEWTON_STEPS - 1):
             late = np.flatnonzero(~(step <= limit) & np.isfinite(radius))
@@ -184,12 +218,14 @@ class CellSolver(eqx.Module):
                 block = late[begin : begin + SAMPLED]
                 some = jax.tree_util.tree_map(lambda it, block=block: padded(it[block], SAMPLED), lanes)
                 again = _newton_steps(self.model, method, jax.device_put(some, self.sharding))
-                targets = [*lanes.state, step, roots, radius]
-                for target, value in zip(targets, [*again[0], *again[1:]], strict=True):
+                targets = [*lanes.state, *lanes.phases, step, roots, radius]
+                for target, value in zip(targets, [*again[0], *again[1], *again[2:]], strict=True):
                     target[block] = np.asarray(value)[: block.size]
         states = np.stack(lanes.state, axis=-1)
         finite = np.isfinite(radius) & np.all(np.isfinite(states), axis=-1)
-        code = np.where(finite, np.where(step <= limit, FOUND, NOT_CONVERGED), NOT_FINITE).astype(np.int8)
+        inside = _in_order(lanes.phases, math.pi if method.half else 2.0 * math.pi)
+        closed = (step <= limit) & inside
+        code = np.where(finite, np.where(closed, FOUND, NOT_CONVERGED), NOT_FINITE).astype(np.int8)
         push = np.hypot(lanes.drive.sine, lanes.drive.cosine)
         direction = np.stack([lanes.drive.sine / push, lanes.drive.cosine / push], axis=-1)
         phases = np.stack(lanes.phases, axis=-1) if lanes.phases else np.zeros((count, 0))
@@ -200,6 +236,13 @@ class CellSolver(eqx.Module):
                 values[code != FOUND] = np.nan
         states, roots, radius, response = numbers
         return Found(states, direction, phases, roots, radius, response, code)
+
+
+def _in_order(phases: tuple[Any, ...], end: float) -> np.ndarray:
+    """Say whether kinks are passed one after the other, before the end."""
+    bounds = [0.0, *phases, end]
+    later = [np.asarray(after) >= np.asarray(before) - 1e-9 for before, after in itertools.pairwise(bounds)]
+    return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*later)))
 
 
 def padded(values: np.ndarray, size: int) -> np.ndarray:
@@ -260,9 +303,7 @@ def states_at_zero(model: Isolator, method: MapMethod, lanes: Lane) -> State:
         target = jnp.mod(-lead, whole)
         turned = method.half & (target >= math.pi)
         target = jnp.where(turned, target - math.pi, target)
-        nothing = Crossings(jnp.zeros(0), jnp.zeros(0, int), None, jnp.array(True))
-        steps = 4 * method.steps
-        state, _ = advance_across_kinks(model, method.integrator, drive, lane.state, nothing, target, steps)
+        state = advance(model, method.integrator, drive, lane.state, target, 4 * method.steps)
         return tuple(jnp.where(turned, -value, value) for value in state)
 
     return jax.vmap(one)(lanes)

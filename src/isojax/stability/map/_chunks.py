@@ -16,6 +16,7 @@ from ..._progress import Counted
 from ...models import write_whole
 from ._batched_newton import CellSolver, Found
 from ._reader import SurfaceReader
+from ._single_orbits import SingleOrbits
 from ._starts import Candidates
 
 FEWEST = 1024
@@ -34,7 +35,7 @@ def fingerprint(*parts: object) -> str:
 
 
 def run_chunks(
-    solver: CellSolver | SurfaceReader,
+    solver: CellSolver | SurfaceReader | SingleOrbits,
     candidates: Candidates,
     chunk: int,
     folder: Path | None,

@@ -25,8 +25,8 @@ from ..orbit import (
     value_and_jacobian,
 )
 from ._map import StabilityMap
-from ._map_method import Lane, MapMethod
-from ._nodes import half_peak_to_peak, kinks_between
+from ._map_method import Lane, MapMethod, kinks_between
+from ._nodes import half_peak_to_peak
 
 _CELL_CLOSED_TO, _MOST_CELL_STEPS = 1e-9, 12
 """Largest last step of Newton's method, over the size of the motion, and steps after which a cell fails."""
@@ -91,7 +91,7 @@ def found_again(
     )
     steps = jnp.asarray(smap.integrator.steps_a_period(smap.model))
     method = MapMethod(smap.integrator, smap.symmetric, smap.sides, steps)
-    kinks = jnp.asarray(kinks_between(np.asarray(smap.sides)))
+    kinks = kinks_between(smap.sides)
     places = np.flatnonzero(together)
     if places.size:
         own = (start[places], direction[places], phases[places], force[places], frequency[places])

@@ -25,11 +25,13 @@ from ...models import (
     coefficient_errors,
 )
 from ..orbit import Sine, ascending, is_odd, refuse_transformed
-from ._batched_newton import FOUND, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
+from ._batched_newton import FOUND, NOT_ACCURATE, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
+from ._empty_cells import Cells, fill_empty, joined, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
+from ._single_orbits import SingleOrbits
 from ._sought import Sought, seek
 from ._starts import Candidates
 from ._surface import MapWindow
@@ -291,15 +293,20 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         parts.append(run_chunks(solver, candidates, run.chunk, run.folder, name, run.progress))
         if isinstance(solver, CellSolver):
             errors.append(sampled_error(solver, candidates, parts[-1], window))
-    error = max((value for value in errors if not math.isnan(value)), default=math.nan)
-    found = parts[0] if len(parts) == 1 else Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))
+        elif isinstance(solver, SingleOrbits):
+            errors.append(integrator.map_orbit_error)
     lists = [group.candidates for group in sought.groups]
-    candidates = (
-        lists[0]
-        if len(lists) == 1
-        else Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
+    split = np.repeat(
+        [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
     )
-    split = np.repeat([group.name != "whole" for group in sought.groups], [own.force.size for own in lists])
+    # The common case, one list, takes no copying.
+    sought_and_found: list[Any] = [one[0] if len(one) == 1 else joined(one) for one in (lists, parts)]
+    known = Cells(*sought_and_found, split=split)
+    filled = fill_empty(model, integrator, half, window, known)
+    candidates, found, split = without_repeats(model, integrator, half, window, filled)
+    if np.sum(filled.found.code == FOUND) > np.sum(known.found.code == FOUND):
+        errors.append(integrator.map_orbit_error)
+    error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     arrays = _gridded(candidates, found, split, len(forces), len(band), run.coexisting)
     code = arrays.pop("code")
     ending = _ending
@@ -324,6 +331,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
 def _ending(code: Array) -> RESULTS:
     """Give the outcome that a code of the search stands for."""
     failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
+    failed = RESULTS.where(code == NOT_ACCURATE, RESULTS.not_accurate, failed)
     return RESULTS.where(code == FOUND, RESULTS.promote(diffrax.RESULTS.successful), failed)
 
 

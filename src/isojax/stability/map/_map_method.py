@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Crossings, Sine, advance_across_kinks
+from ..orbit import Crossings, Sine, advance_across_kinks, event_places, follow_events
 
 
 class Lane(NamedTuple):
@@ -26,6 +26,38 @@ class Lane(NamedTuple):
     drive: Sine
     phases: State
     response: Lanes
+
+
+def kinks_between(sides: Float[Array, "piece kink"]) -> Int[Array, " crossing"]:
+    """Give which kink is passed between one piece and the next, from the signs of all kinks on each."""
+    return jnp.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else jnp.zeros(0, int)
+
+
+def advance(
+    model: Isolator,
+    integrator: Integrator,
+    drive: Sine,
+    state: State,
+    end: Float[Array, ""] | float,
+    steps: Array,
+) -> State:
+    """Give the state at a phase, by steps that are split where a law jumps, but not at kinks.
+
+    Args:
+        model: the isolator.
+        integrator: the solver.
+        drive: the drive that acts.
+        state: at phase 0.
+        end: the phase, no more than a turn [rad].
+        steps: over all of it.
+
+    Returns:
+        The state there.
+    """
+    if model.splits:
+        return follow_events(model, drive, state, end, steps, 2 * event_places(model, 1.0)).end
+    nothing = Crossings(jnp.zeros(0), jnp.zeros(0, int), None, jnp.array(True))
+    return advance_across_kinks(model, integrator, drive, state, nothing, end, steps)[0]
 
 
 class MapMethod(eqx.Module):
@@ -79,7 +111,12 @@ class MapMethod(eqx.Module):
         Returns:
             The state, and the values, zero where the phases are right.
         """
-        phases = () if self.sides is None else lane.phases
+        end = math.pi if self.half else 2.0 * math.pi
+        if self.sides is None:
+            steps = (self.steps + 1) // 2 if self.half else self.steps
+            after = advance(model, self.integrator, lane.drive, lane.state, end, steps)
+            return (tuple(-value for value in after) if self.half else after), jnp.zeros(0)
+        phases = lane.phases
         pieces = len(phases) + 1
         parts = pieces * (2 if self.half else 1)
         steps = (self.steps + parts - 1) // parts
@@ -89,7 +126,6 @@ class MapMethod(eqx.Module):
             self.sides,
             jnp.array(True),
         )
-        end = math.pi if self.half else 2.0 * math.pi
         after, reached = advance_across_kinks(
             model, self.integrator, lane.drive, lane.state, crossings, end, steps
         )

@@ -17,13 +17,13 @@ from ...models import Integrator, Isolator
 from ..orbit import (
     Crossings,
     Sine,
-    find_crossings,
+    follow_events,
     imposed_balance,
     period_map,
     trajectory,
     value_and_jacobian,
 )
-from ._map_method import Lane, MapMethod
+from ._map_method import Lane, MapMethod, kinks_between
 
 _START_STEPS = 6
 """Steps of Newton's method from the balance of one harmonic."""
@@ -151,12 +151,16 @@ def _starts(
             # Far from the balance of one harmonic a full step may leave the basin.
             return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
 
-        found = jax.lax.fori_loop(0, _START_STEPS, improve, start)
-        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _START_CLOSED_TO)
-        unknown = jnp.where(good, found, start)
+        unknown = start
+        # A motion that friction turns, or holds, at the very start has no derivative by it.
+        if not model.slides:
+            found = jax.lax.fori_loop(0, _START_STEPS, improve, start)
+            good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _START_CLOSED_TO)
+            unknown = jnp.where(good, found, start)
         drive, state = unpack(unknown)
-        path = trajectory(model, integrator, drive, state, turns=turns)
-        crossings = find_crossings(model, path, 2.0 * math.pi * turns, _MOST_NODE_CROSSINGS)
+        steps = round(integrator.steps_a_period(model) * turns)
+        end = 2.0 * math.pi * turns
+        crossings = follow_events(model, drive, state, end, steps, _MOST_NODE_CROSSINGS).crossings
         over = jnp.concatenate([jnp.full(2, push), inner]) / a
         return unknown * over, crossings
 
@@ -186,20 +190,16 @@ def closed_nodes(
     Returns:
         The orbits.
     """
-    kinks = kinks_between(np.asarray(method.sides))
+    assert method.sides is not None
+    kinks = kinks_between(method.sides)
     # The steps are a number on the device: with those of the integrator each count would be compiled anew.
     integrator = method.integrator.with_steps(_ANY_STEPS)
     method = MapMethod(integrator, method.half, method.sides, method.steps)
 
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
-        return _closed(model, method, jnp.asarray(kinks), jnp.asarray(rest), *map(jnp.asarray, rows))
+        return _closed(model, method, kinks, jnp.asarray(rest), *map(jnp.asarray, rows))
 
     return NodeOrbits(*_in_blocks(work, amplitude, frequency, start))
-
-
-def kinks_between(sides: Float[np.ndarray, "piece kink"]) -> Int[np.ndarray, " crossing"]:
-    """Give which kink is passed between one piece and the next, from the signs of all kinks on each."""
-    return np.argmax(sides[1:] != sides[:-1], axis=1) if sides.shape[1] else np.zeros(0, int)
 
 
 @quick_jit

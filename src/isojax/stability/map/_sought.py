@@ -9,7 +9,9 @@ from jaxtyping import Bool
 from ...models import Integrator, Isolator
 from ._batched_newton import SAMPLED, CellSolver, cell_solvers
 from ._map_error import sampled_error
+from ._map_method import MapMethod
 from ._reader import SurfaceReader
+from ._single_orbits import SingleOrbits
 from ._starts import Candidates, find_candidates
 from ._surface import MapWindow, Surface, find_surface
 
@@ -21,13 +23,13 @@ class Group(NamedTuple):
     """Orbits that are found in the same way.
 
     Attributes:
-        name: "read" off the surface; by Newton's method, "split" at kinks or "whole".
+        name: "read" off the surface; by Newton's method, "split" at kinks or "whole"; or "single" orbits.
         solver: what finds them.
         candidates: the orbits.
     """
 
     name: str
-    solver: CellSolver | SurfaceReader
+    solver: CellSolver | SurfaceReader | SingleOrbits
     candidates: Candidates
 
 
@@ -49,7 +51,7 @@ class Sought(NamedTuple):
         """Whether every orbit of a frequency is read off."""
         columns = np.ones(len(self.surface.frequencies), bool)
         for _, solver, candidates in self.groups:
-            if isinstance(solver, CellSolver):
+            if not isinstance(solver, SurfaceReader):
                 columns[candidates.frequency] = False
         return columns
 
@@ -116,6 +118,13 @@ def seek(
                 read, error = np.zeros_like(read), math.nan
     shared = surface.shared[candidates.frequency, candidates.part]
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
+    if model.splits:
+        # Where sharp laws give each orbit events of its own, no compiled step serves all.
+        unsplit = MapMethod(integrator, half, None, split.method.steps)
+        ways = (
+            ("read", reader, read),
+            ("single", SingleOrbits(model, unsplit, split.surface, split.sharding), ~read),
+        )
     groups = tuple(Group(name, way, _chosen(candidates, own)) for name, way, own in ways if own.any())
     return Sought(surface, groups, error)
 

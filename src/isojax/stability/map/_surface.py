@@ -190,7 +190,7 @@ def find_surface(
         own = kinks.shared[np.ix_(_place(start.frequencies, nodes[1]), _place(start.logarithms, nodes[0]))]
         rows = 1 if nodes[1] is window.frequencies else 2
         grid = _closed_grid(model, method, rest, grid, nodes, rows, own)
-        if not _needs_doubling(grid, window, goal):
+        if not own.any() or not _needs_doubling(grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
     tables = _with_responses(model, integrator, half, rest, grid)
@@ -233,6 +233,9 @@ def _start_grid(
     starts = node_starts(model, coarse, half, rest, amplitude, frequency)
     shape = len(band), len(logarithms)
     kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
+    if model.slides:
+        # At its largest displacement such a motion jumps from law to law: nodes there cannot be closed.
+        kinks = kinks._replace(shared=np.zeros(shape, bool))
     unknown = _filled(starts.unknown.T.reshape(-1, *shape)), np.moveaxis(kinks.phases, -1, 0)
     tables = np.concatenate([*unknown, np.zeros((2, *shape)), np.ones((1, *shape))])
     return _Grid(logarithms, band, tables, np.full(shape, np.inf)), kinks
@@ -294,7 +297,9 @@ def _closed_grid(
 def _with_responses(
     model: Isolator, integrator: Integrator, half: bool, rest: float, grid: _Grid
 ) -> Float[np.ndarray, "table frequency displacement"]:
-    """Give the tables of a grid with half the peak-to-peak displacements."""
+    """Give the tables of a grid with half the peak-to-peak displacements; without, of what slides."""
+    if model.slides:
+        return grid.tables
     frequency, amplitude = np.meshgrid(grid.frequencies, np.exp(grid.logarithms), indexing="ij")
     unknown = grid.tables[: 2 + model.internal_states].reshape(-1, amplitude.size).T
     sizes = node_responses(model, integrator, half, rest, amplitude.ravel(), frequency.ravel(), unknown)

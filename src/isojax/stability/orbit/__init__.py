@@ -1,10 +1,10 @@
 """One periodic orbit of the forced isolator.
 
 In: an isolator, a harmonic drive. Out: `Orbit` with its state at t = 0 and its Floquet multipliers, or a
-harmonic balance. Read _describing_function (the start), _period_map (fixed steps), _kink_crossings and
-_split_period_map (the motion split where laws are not smooth), _shooting (the closed motion), _floquet,
-_orbit; _harmonic_balance stands beside them. The rooms branch, map, response, attractor and derivatives
-build on this one.
+harmonic balance. Read _describing_function (the start), _event_path (steps that end where a law jumps or
+bends), _period_map (fixed steps), _kink_crossings and _split_period_map (the motion split there), _shooting
+(the closed motion), _floquet, _orbit; _harmonic_balance stands beside them. The rooms branch, map, response,
+attractor and derivatives build on this one.
 """
 
 from ._axis import ascending as ascending
@@ -12,6 +12,7 @@ from ._describing_function import imposed_balance as imposed_balance
 from ._describing_function import response_amplitudes as response_amplitudes
 from ._describing_function import response_start as response_start
 from ._describing_function import rest_displacement as rest_displacement
+from ._event_path import follow_events as follow_events
 from ._floquet import Floquet as Floquet
 from ._floquet import margin_beside_folds as margin_beside_folds
 from ._floquet import modulus as modulus
@@ -23,13 +24,14 @@ from ._harmonic_balance import harmonic_balance as harmonic_balance
 from ._jacobian import value_and_jacobian as value_and_jacobian
 from ._kink_crossings import Crossings as Crossings
 from ._kink_crossings import advance_across_kinks as advance_across_kinks
-from ._kink_crossings import find_crossings as find_crossings
 from ._known_numbers import refuse_traced as refuse_traced
 from ._known_numbers import refuse_transformed as refuse_transformed
 from ._orbit import Orbit as Orbit
 from ._orbit import find_periodic_orbit as find_periodic_orbit
 from ._period_map import period_map as period_map
 from ._period_map import trajectory as trajectory
+from ._shooting import Accuracy as Accuracy
+from ._shooting import shoot as shoot
 from ._shooting_method import ShootingMethod as ShootingMethod
 from ._sine import Sine as Sine
 from ._sine import recorded_sine as recorded_sine
@@ -37,6 +39,7 @@ from ._smoothness import has_continuous_slopes as has_continuous_slopes
 from ._split_period_map import FEWEST_STEPS as FEWEST_STEPS
 from ._split_period_map import MOST_STEPS_A_PERIOD as MOST_STEPS_A_PERIOD
 from ._split_period_map import Split as Split
+from ._split_period_map import event_places as event_places
 from ._split_period_map import first_split as first_split
 from ._split_period_map import split_image as split_image
 from ._split_period_map import split_jacobian as split_jacobian

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._types import Lanes, Scalar, as_float64
-from ...models import Instant, Isolator
+from ...models import ContinuedLaw, Instant, Isolator
 from ._sine import Sine
 
 _SAMPLES = 64
@@ -67,15 +67,26 @@ def imposed_internal(
     def rates(internal: tuple[Lanes, ...], x: Lanes, v: Lanes) -> tuple[Lanes, ...]:
         return model.rates((x, v, *internal), Instant(zero))[2:]
 
+    # Bristles relax within a part of a sample.
+    parts = model.substeps**2
+
+    def part(
+        number: int | Array, internal: tuple[Lanes, ...], ends: list[tuple[Lanes, Lanes]]
+    ) -> tuple[Lanes, ...]:
+        def at(share: Array | float) -> list[Lanes]:
+            return [a + share * (b - a) for a, b in zip(*ends, strict=True)]
+
+        k1 = rates(internal, *at(number / parts))
+        half = tuple(s + 0.5 * step / parts * k for s, k in zip(internal, k1, strict=True))
+        k2 = rates(half, *at((number + 0.5) / parts))
+        return tuple(s + step / parts * k for s, k in zip(internal, k2, strict=True))
+
     def body(internal: tuple[Lanes, ...], place: Array) -> tuple[tuple[Lanes, ...], tuple[Lanes, ...]]:
         following = (place + 1) % count
         ends = [(displacement[place], velocity[place]), (displacement[following], velocity[following])]
-        middle = tuple(0.5 * (a + b) for a, b in zip(*ends, strict=True))
-        k1 = rates(internal, *ends[0])
-        half = tuple(s + 0.5 * step * k for s, k in zip(internal, k1, strict=True))
-        k2 = rates(half, *middle)
-        moved = tuple(s + step * k for s, k in zip(internal, k2, strict=True))
-        return moved, internal
+        if parts == 1:
+            return part(0, internal, ends), internal
+        return jax.lax.fori_loop(0, parts, lambda number, own: part(number, own, ends), internal), internal
 
     start = (zero,) * model.internal_states
     _, along = jax.lax.scan(body, start, jnp.asarray(np.tile(places, _IMPOSED_CYCLES)))
@@ -110,8 +121,11 @@ def imposed_balance(
     internal = imposed_internal(model, x, v, frequency)
     # Without a drive the acceleration is -force / inertia; what is missing for the imposed one is the drive.
     state, still = (x, v, *internal), Instant(0.0 * x)
-    missing = -size * omega**2 * cosine - model.acceleration(state, still)
-    unit = model.acceleration(state, Instant(0.0 * x + 1.0)) - model.acceleration(state, still)
+    # Sharp laws are meant as they are: the rounded one of dry friction is a damper where motion is small.
+    law = ContinuedLaw(tuple(jnp.where(value >= 0.0, 1.0, -1.0) for value in model.switches(state)))
+    without = model.acceleration(state, still, law)
+    missing = -size * omega**2 * cosine - without
+    unit = model.acceleration(state, Instant(0.0 * x + 1.0), law) - without
     wanted = missing / unit
     in_phase, in_quadrature = 2.0 * jnp.mean(wanted * cosine, axis=0), 2.0 * jnp.mean(wanted * sine, axis=0)
     return Sine(in_quadrature, in_phase, frequency), internal

@@ -8,18 +8,28 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ..._types import Lanes
-from ...models import ROUNDED, ContinuedLaw, Integrator, Isolator, State
+from ...models import (
+    ROUNDED,
+    Instant,
+    Integrator,
+    Isolator,
+    State,
+    freeing_accelerations,
+    law_beside,
+    sliding_switch,
+)
 from ._sine import Sine
 
 
 class Crossings(NamedTuple):
-    """Where a motion passes kinks, in order of time.
+    """Where a motion passes switches, in order of time.
 
     Attributes:
         phases: tau at each crossing [rad]; unused places hold the end of the motion.
-        kinks: which of the model's kinks; -1 in unused places.
-        sides: signs of all kinks before the first crossing, between two, and after the last; None where each
-            state is to be taken on its own side.
+        kinks: which of the model's switches; then, one and two beyond the last, that a mass which friction
+            holds is freed forward or backward; -1 in unused places.
+        sides: signs of all switches before the first crossing, between two, and after the last; None where
+            each state is to be taken on its own side.
         complete: whether every crossing found a place.
     """
 
@@ -27,38 +37,6 @@ class Crossings(NamedTuple):
     kinks: Int[Array, " crossing"]
     sides: Float[Array, "piece kink"] | None
     complete: Bool[Array, ""]
-
-
-def find_crossings(model: Isolator, path: State, end: float, places: int) -> Crossings:
-    """Find where a sampled motion passes the kinks of a model.
-
-    Args:
-        model: the isolator.
-        path: states at equidistant phases from 0 to `end`, time first.
-        end: last phase [rad].
-        places: crossings to make room for.
-
-    Returns:
-        The crossings, by linear interpolation between samples.
-    """
-    values = jnp.stack(model.kinks(path), axis=-1) if model.kinks(path) else jnp.zeros((path[0].size, 0))
-    samples, kinks = values.shape
-    signs = jnp.where(values >= 0.0, 1.0, -1.0)
-    if not kinks:
-        nothing = jnp.full(places, end), jnp.full(places, -1)
-        return Crossings(*nothing, jnp.zeros((places + 1, 0)), jnp.array(True))
-    crossed = signs[:-1] != signs[1:]
-    before, kink = jnp.nonzero(crossed, size=places, fill_value=samples)
-    used = before < samples
-    row, column = jnp.minimum(before, samples - 2), jnp.where(used, kink, 0)
-    left, right = values[row, column], values[row + 1, column]
-    share = left / jnp.where(left == right, 1.0, left - right)
-    phases = jnp.where(used, (row + share) * (end / (samples - 1)), end)
-    order = jnp.argsort(phases)
-    phases, kink = phases[order], jnp.where(used, column, -1)[order]
-    turns = jnp.where(kink[:, None] == jnp.arange(kinks)[None], -1.0, 1.0)
-    sides = jnp.concatenate([signs[:1], signs[:1] * jnp.cumprod(turns, axis=0)])
-    return Crossings(phases, kink, sides, jnp.sum(crossed) <= places)
 
 
 def _turned(angle: tuple[Lanes, Lanes], turn: tuple[Lanes, Lanes]) -> tuple[Lanes, Lanes]:
@@ -87,15 +65,19 @@ def advance_across_kinks(
         steps: steps a piece.
 
     Returns:
-        The state at the end, and the value of the kink at each crossing, zero where the phase is right.
+        The state at the end, and the value of the switch at each crossing, zero where the phase is right.
     """
     bounds = jnp.concatenate([jnp.zeros(1), crossings.phases, jnp.reshape(end, 1)])
+    sliding = sliding_switch(model)
 
     def piece(carry: State, along: tuple[Array, Array, Array | None]) -> tuple[State, Lanes]:
         start, stop, sides = along
         length = (stop - start) / steps
         step_time = length / drive.angular_frequency
-        law = ROUNDED if sides is None else ContinuedLaw(tuple(sides))
+        law = ROUNDED if sides is None else law_beside(model, tuple(sides))
+        if sides is not None and sliding >= 0:
+            # What is held has no velocity, nor a derivative of it.
+            carry = (carry[0], jnp.where(sides[sliding] == 0.0, 0.0, carry[1]), *carry[2:])
         turn = jnp.sin(0.5 * length), jnp.cos(0.5 * length)
 
         def step(
@@ -115,9 +97,10 @@ def advance_across_kinks(
             moved, *_ = integrator.solver.step(term, 0.0, 1.0, state, None, None, False)
             return moved, finish
 
-        last, _ = jax.lax.fori_loop(0, steps, step, (carry, (jnp.sin(start), jnp.cos(start))))
-        kinks = model.kinks(last)
-        return last, jnp.stack(kinks) if kinks else jnp.zeros(0)
+        # A place that no crossing uses is a piece of no length.
+        count = jnp.where(stop > start, steps, 1)
+        last, _ = jax.lax.fori_loop(0, count, step, (carry, (jnp.sin(start), jnp.cos(start))))
+        return last, _events(model, last, drive.at(jnp.sin(stop), jnp.cos(stop)), sides)
 
     final, values = jax.lax.scan(piece, state, (bounds[:-1], bounds[1:], crossings.sides))
     if not values.shape[1]:
@@ -125,3 +108,11 @@ def advance_across_kinks(
     # The last piece ends with the period, not with a kink.
     reached = jnp.take_along_axis(values[:-1], jnp.maximum(crossings.kinks, 0)[:, None], axis=1)[:, 0]
     return final, reached
+
+
+def _events(model: Isolator, state: State, at: Instant, sides: Array | None) -> Float[Array, " event"]:
+    """Give the switches, then what says whether friction lets a mass at rest go."""
+    if sides is None:
+        return jnp.zeros(0)
+    values = (*model.switches(state), *freeing_accelerations(model, state, at, tuple(sides)))
+    return jnp.stack(values) if values else jnp.zeros(0)

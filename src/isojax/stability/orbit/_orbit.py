@@ -26,14 +26,12 @@ from ._period_map import trajectory
 from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
 from ._sine import recorded_sine
+from ._split_period_map import event_places
 from ._state_path import AbstractStatePath
 from ._symmetry import is_odd
 
-_CROSSINGS = 4
-"""Crossings of each kink in a period to make room for first."""
-
-_CROSSINGS_AT_MOST = 64
-"""Crossings of each kink in a motion beyond which no more room is made."""
+_ROOM = 16
+"""Times the events of a motion for which room is made first, beyond which no more is made."""
 
 _SYMMETRIC_TO = 1e-4
 """Distance of the two halves of a motion, over its size, up to which it counts as symmetric: its path is
@@ -117,8 +115,9 @@ def find_periodic_orbit(
 ) -> Orbit:
     """Find a periodic orbit and its Floquet multipliers.
 
-    Newton's method on the period map, with its derivative by forward mode; the motion is split at the kinks
-    of |x| and |v|, and the steps are refined until the multipliers are good to 1e-9 or better. Works
+    Newton's method on the period map, with its derivative by forward mode; the motion is split where a law
+    jumps or bends, such as |v|, dry friction and stops, and the steps are refined until the multipliers are
+    good to 1e-9 or better. Where they are not, `result` says `not_accurate` and `error` by how much. Works
     under `jax.jit`, `jax.vmap`, `jax.jacfwd` and `jax.grad` (by the implicit function theorem).
 
     Args:
@@ -170,14 +169,13 @@ def find_periodic_orbit(
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
     begin = None if start is None else frozen(jnp.stack([as_float64(value) for value in start]))
     method = ShootingMethod(integrator, periods, half)
-    kinks = len(model.kinks((jnp.zeros(()),) * size))
-    places = math.ceil(_CROSSINGS * kinks * method.turns)
+    places, most = event_places(model, method.turns), event_places(model, _ROOM * method.turns)
     solution = _solve(still, drive, method, solver, begin, places)
 
     def all_split() -> Bool[Array, ""]:
         return solution.split.complete
 
-    while not isinstance(all_split(), Tracer) and not all_split() and places < _CROSSINGS_AT_MOST * kinks:
+    while not isinstance(all_split(), Tracer) and not all_split() and places < most:
         places *= 2
         solution = _solve(still, drive, method, solver, begin, places)
     if begin is None and not isinstance(solution.found, Tracer) and not solution.found:
@@ -225,9 +223,10 @@ def _orbit(
     else:
         floquet = Floquet(multipliers(matrix), jnp.full(matrix.shape[0], jnp.nan + 0j), matrix)
     finite = jnp.all(jnp.isfinite(path))
+    good = RESULTS.promote(diffrax.RESULTS.successful)
     result = RESULTS.where(
         found,
-        RESULTS.promote(diffrax.RESULTS.successful),
+        RESULTS.where(solution.accurate, good, RESULTS.not_accurate),
         RESULTS.where(finite, RESULTS.not_converged, RESULTS.not_finite),
     )
     middle = (path.shape[0] - 1) // 2

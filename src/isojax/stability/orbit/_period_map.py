@@ -1,11 +1,17 @@
-"""The period map: the state one drive period later, by fixed steps."""
+"""The period map: the state one drive period later, by fixed steps; sharp laws from event to event."""
+
+import math
 
 import jax
 import jax.numpy as jnp
 
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State, advance
+from ._event_path import follow_events
 from ._sine import Sine, stage_table
+
+_EVENTS_A_TURN = 8
+"""Events of each switch in a period to make room for, where laws jump or bend."""
 
 
 def period_map(
@@ -54,6 +60,8 @@ def trajectory(
 def _advance(
     model: Isolator, integrator: Integrator, drive: Sine, state: State, turns: float, keep: bool
 ) -> tuple[State, State]:
+    if model.splits:
+        return _along_events(model, integrator, drive, state, turns, keep)
     steps = integrator.steps_a_period(model)
     step_time = 1.0 / (steps * drive.frequency)
     tables = tuple(jnp.asarray(table) for table in stage_table(steps, turns))
@@ -65,3 +73,23 @@ def _advance(
         return moved, carry if keep else ()
 
     return jax.lax.scan(body, state, tables)
+
+
+def _along_events(
+    model: Isolator, integrator: Integrator, drive: Sine, state: State, turns: float, keep: bool
+) -> tuple[State, State]:
+    """Step the sharp laws from event to event, lane by lane."""
+    shape = jnp.broadcast_shapes(*(jnp.shape(value) for value in (*state, *drive)))
+    steps = round(integrator.steps_a_period(model) * turns)
+    places = math.ceil(_EVENTS_A_TURN * (len(model.switches(state)) + 2) * turns)
+
+    def one(lane: State, own: tuple[Lanes, ...]) -> tuple[State, Lanes]:
+        end = 2.0 * math.pi * turns
+        motion = follow_events(model, Sine(*own), lane, end, steps, places, steps + 1 if keep else 0)
+        return motion.end, motion.path[:-1]
+
+    lanes, own = (tuple(jnp.broadcast_to(value, shape) for value in values) for values in (state, drive))
+    for _ in shape:
+        one = jax.vmap(one)
+    end, path = one(lanes, own)
+    return end, tuple(jnp.moveaxis(path[..., place], -1, 0) for place in range(len(state))) if keep else ()

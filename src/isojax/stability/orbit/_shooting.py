@@ -6,19 +6,25 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from ...excitations import Harmonic
-from ...models import Isolator
+from ...models import Isolator, sliding_switch
+from ._event_path import follow_events, same_events
 from ._jacobian import value_and_jacobian
-from ._kink_crossings import find_crossings
 from ._period_map import period_map, trajectory
 from ._shooting_method import ShootingMethod
 from ._sine import Sine, recorded_sine
-from ._split_period_map import FEWEST_STEPS, Split, kink_scale, split_image, state_scale, steps_wanted
+from ._split_period_map import Split, split_at_events, split_image, state_scale, steps_wanted
 
 _MOST_STEPS_A_PIECE = 1 << 14
 """Steps a piece at most, for an orbit."""
+
+_ROUNDS = 4
+"""Times at most that a motion is split anew because the closed one has other events."""
+
+_FINER_STEPS = 2
+"""Times the steps with which the events of a closed motion are looked at."""
 
 
 class ShootingSolution(NamedTuple):
@@ -31,6 +37,7 @@ class ShootingSolution(NamedTuple):
         matrix: derivative of the state after the turns (of minus it after half a turn) by the one before.
         error: largest change of `matrix`, in scaled units, where the steps are halved.
         found: whether the search converged.
+        accurate: whether it has the events at which it is split, and as accurate multipliers as asked.
     """
 
     root: Float[Array, " unknown"]
@@ -39,6 +46,32 @@ class ShootingSolution(NamedTuple):
     matrix: Float[Array, "state state"]
     error: Float[Array, ""]
     found: Bool[Array, ""]
+    accurate: Bool[Array, ""]
+
+
+class Accuracy(NamedTuple):
+    """How accurate multipliers are to be.
+
+    Attributes:
+        goal: integration error down to which steps are refined.
+        limit: beyond which they are not accurate enough.
+    """
+
+    goal: float
+    limit: float
+
+
+class _Round(NamedTuple):
+    """A motion that is closed with the events of the one before."""
+
+    state: Float[Array, " state"]
+    root: Float[Array, " unknown"]
+    split: Split
+    transition: Float[Array, "state state"]
+    error: Float[Array, ""]
+    mismatch: Float[Array, ""]
+    agrees: Bool[Array, ""]
+    rounds: Int[Array, ""]
 
 
 def _gap(
@@ -87,6 +120,7 @@ def shoot(
     drive: Sine,
     start: Float[Array, " state"],
     places: int,
+    accuracy: Accuracy | None = None,
 ) -> ShootingSolution:
     """Find the motion that repeats after the drive periods of a method.
 
@@ -100,10 +134,13 @@ def shoot(
         drive: the drive that acts.
         start: state at t = 0 to start from.
         places: kinks a motion to make room for.
+        accuracy: of the multipliers; that of single orbits if omitted.
 
     Returns:
         The closed motion.
     """
+    if accuracy is None:
+        accuracy = Accuracy(method.integrator.multiplier_tolerance, method.integrator.orbit_error)
     integrator, turns = method.integrator, method.turns
     scale = state_scale(trajectory(model, integrator, drive, tuple(start), turns=turns))
 
@@ -112,11 +149,46 @@ def shoot(
         return jnp.stack(moved) / scale - scaled
 
     near = optx.root_find(open_end, solver, start / scale, max_steps=50, throw=False).value
-    path = trajectory(model, integrator, drive, tuple(near * scale), turns=turns)
-    crossings = find_crossings(model, path, 2.0 * math.pi * turns, places)
-    least = max(FEWEST_STEPS, integrator.steps_a_period(model) // (places + 1))
-    sizes = kink_scale(model, path, crossings)
-    split = Split(scale, crossings, sizes, jnp.asarray(least), crossings.complete)
+
+    def again(own: _Round) -> Array:
+        return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.rounds < _ROUNDS)
+
+    def body(own: _Round) -> _Round:
+        return _closed(model, method, solver, drive, own.state, places, own.rounds, accuracy.goal)
+
+    # What is carried into the first round, but for the state, is read by nothing.
+    begun = near * scale, jnp.asarray(0)
+    shapes = jax.eval_shape(
+        lambda state, count: _closed(model, method, solver, drive, state, places, count, accuracy.goal),
+        *begun,
+    )
+    blank = jax.tree.map(lambda one: jnp.zeros(one.shape, one.dtype), shapes)
+    first = blank._replace(state=begun[0], agrees=jnp.array(False), rounds=begun[1])
+    last = jax.lax.while_loop(again, body, first)
+    matrix = last.split.scale[:, None] * last.transition / last.split.scale[None, :]
+    found = jnp.isfinite(last.mismatch) & (last.mismatch < integrator.residual_tolerance)
+    if model.slides:
+        # Held throughout, the mass may rest anywhere within the friction: that is no orbit of its own.
+        assert last.split.crossings.sides is not None
+        found = found & jnp.any(last.split.crossings.sides[:, sliding_switch(model)] != 0.0)
+    accurate = last.agrees & (last.error <= accuracy.limit)
+    return ShootingSolution(last.root, last.split, last.state, matrix, last.error, found, accurate)
+
+
+def _closed(
+    model: Isolator,
+    method: ShootingMethod,
+    solver: optx.AbstractRootFinder,
+    drive: Sine,
+    near: Float[Array, " state"],
+    places: int,
+    rounds: Int[Array, ""],
+    goal: float,
+) -> _Round:
+    """Close a motion with the events of one next to it, and see whether it has these events itself."""
+    integrator = method.integrator
+    split = split_at_events(model, method, drive, tuple(near), places)
+    scale, least = split.scale, split.steps
 
     def matrices(unknown: Array, steps: Array, polish: Array) -> tuple[Array, tuple[Array, Array]]:
         """Give the unknown, polished by a step of Newton where wanted, and before it the map's derivative
@@ -124,8 +196,8 @@ def shoot(
         """
 
         def body(unknown: Array, trial: tuple[Array, Array]) -> tuple[Array, tuple[Array, Array]]:
-            count, wanted = trial
-            finer = split._replace(steps=count)
+            steps, wanted = trial
+            finer = split._replace(steps=steps)
             left, jacobian, transition = _gap_and_transition(unknown, method, finer, model, drive)
             step = jnp.linalg.solve(jacobian, left)
             return unknown - jnp.where(wanted, step, 0.0), (transition, jnp.max(jnp.abs(left)))
@@ -133,9 +205,8 @@ def shoot(
         # Looped over, so that the motion is compiled once for all of them.
         return jax.lax.scan(body, unknown, (steps, polish))
 
-    first = jnp.concatenate([near, crossings.phases])
-    _, (trials, _) = matrices(first, jnp.array([least, 2 * least]), jnp.zeros(2, bool))
-    goal = integrator.multiplier_tolerance
+    first = jnp.concatenate([near / scale, split.crossings.phases])
+    _, (trials, _) = matrices(first, jnp.stack([least, 2 * least]), jnp.zeros(2, bool))
     steps = steps_wanted(least, trials, goal, doublings=1, most=_MOST_STEPS_A_PIECE)
     split = split._replace(steps=steps)
 
@@ -143,10 +214,10 @@ def shoot(
         return _gap(unknown, method, split, model, drive)
 
     root = optx.root_find(gap, solver, first, max_steps=20, throw=False).value
-    counts = jnp.stack([steps, steps, steps // 2])
-    root, (transitions, left) = matrices(root, counts, jnp.arange(3) < 1)
-    transition, mismatch = transitions[1], left[1]
-    error = jnp.max(jnp.abs(transition - transitions[2])) / 15.0
-    found = jnp.isfinite(mismatch) & (mismatch < integrator.residual_tolerance)
-    state, matrix = root[: scale.size] * scale, scale[:, None] * transition / scale[None, :]
-    return ShootingSolution(root, split, state, matrix, error, found)
+    root, (transitions, left) = matrices(root, jnp.stack([steps, steps, steps // 2]), jnp.arange(3) < 1)
+    error = jnp.max(jnp.abs(transitions[1] - transitions[2])) / 15.0
+    state, end = root[: scale.size] * scale, 2.0 * math.pi * method.turns
+    fine = round(_FINER_STEPS * integrator.steps_a_period(model) * method.turns)
+    own = follow_events(model, drive, tuple(state), end, fine, places).crossings
+    agrees = same_events(own, split.crossings._replace(phases=root[scale.size :]), end)
+    return _Round(state, root, split, transitions[1], error, left[1], agrees, rounds + 1)

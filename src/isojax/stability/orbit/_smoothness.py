@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._quick_jit import quick_jit
-from ...models import ContinuedLaw, Instant, Isolator
+from ...models import Instant, Isolator, law_beside
 
 _STATES_TRIED = 8
 """States on each kink at which the slopes of both sides are compared."""
@@ -17,10 +17,10 @@ _SAME_SLOPE = 1e-9
 
 @quick_jit
 def _jumps(model: Isolator, states: Float[Array, "trial state"]) -> Float[Array, "trial kink"]:
-    count = len(model.kinks(tuple(states[0])))
+    count = len(model.switches(tuple(states[0])))
 
     def kink(which: int, state: Array) -> Array:
-        return model.kinks(tuple(state))[which]
+        return model.switches(tuple(state))[which]
 
     def on(which: int, state: Array) -> Array:
         """Move a state onto a kink."""
@@ -31,10 +31,10 @@ def _jumps(model: Isolator, states: Float[Array, "trial state"]) -> Float[Array,
 
     def jump(which: int, state: Array) -> Array:
         there = on(which, state)
-        signs = [jnp.where(value >= 0.0, 1.0, -1.0) for value in model.kinks(tuple(there))]
+        signs = [jnp.where(value >= 0.0, 1.0, -1.0) for value in model.switches(tuple(there))]
 
         def slope(side: float) -> Array:
-            law = ContinuedLaw((*signs[:which], jnp.asarray(side), *signs[which + 1 :]))
+            law = law_beside(model, (*signs[:which], jnp.asarray(side), *signs[which + 1 :]))
             return jax.jacfwd(lambda s: jnp.stack(model.rates(tuple(s), Instant(0.0 * s[0]), law=law)))(there)
 
         upper, lower = slope(1.0), slope(-1.0)
@@ -46,8 +46,9 @@ def _jumps(model: Isolator, states: Float[Array, "trial state"]) -> Float[Array,
 def has_continuous_slopes(model: Isolator) -> bool:
     """Say whether the derivative of the equations by the state is continuous across every kink.
 
-    It is of |x|x, whose second derivative alone jumps; it is not of a hysteresis that turns around. Where it
-    is, the instants of the kinks move nothing to first order in the multipliers.
+    It is of |x|x, whose second derivative alone jumps; it is not of a hysteresis that turns around, nor of
+    dry friction, which itself jumps. Where it is, the instants of the kinks move nothing to first order in
+    the multipliers.
 
     Args:
         model: the isolator, with concrete numbers.
@@ -56,7 +57,9 @@ def has_continuous_slopes(model: Isolator) -> bool:
         True if the slopes of both sides agree at a sample of states on each kink.
     """
     size = 2 + model.internal_states
-    if not model.kinks((jnp.zeros(()),) * size):
+    if model.slides:
+        return False
+    if not model.switches((jnp.zeros(()),) * size):
         return True
     random = np.random.default_rng(7)
     sizes = 10.0 ** random.uniform(-5.0, -3.0, (_STATES_TRIED, 1)) * np.array(

@@ -8,13 +8,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from ...models import Isolator, State
-from ._kink_crossings import Crossings, advance_across_kinks, find_crossings
-from ._period_map import trajectory
+from ._event_path import follow_events
+from ._kink_crossings import Crossings, advance_across_kinks
 from ._shooting_method import ShootingMethod
 from ._sine import Sine
 
 FEWEST_STEPS = 16
 """Steps a piece of the coarsest trial."""
+
+_EVENTS_A_PERIOD = 4
+"""Events of each kind in a period to make room for first."""
 
 MOST_STEPS_A_PERIOD = 1 << 12
 """Steps a piece of a drive period at most, for a bifurcation."""
@@ -104,13 +107,46 @@ def first_split(
     Returns:
         The split, and the scaled state with the phases of the crossings.
     """
-    path = trajectory(model, method.integrator, drive, tuple(state), turns=method.turns)
-    crossings = find_crossings(model, path, 2.0 * math.pi * method.turns, places)
-    sizes = kink_scale(model, path, crossings)
-    steps = method.periods * method.integrator.steps_a_period(model)
-    least = jnp.asarray(max(FEWEST_STEPS, steps // (places + 1)))
-    split = Split(state_scale(path), crossings, sizes, least, crossings.complete)
-    return split, jnp.concatenate([state / split.scale, crossings.phases])
+    split = split_at_events(model, method, drive, tuple(state), places)
+    return split, jnp.concatenate([state / split.scale, split.crossings.phases])
+
+
+def split_at_events(model: Isolator, method: ShootingMethod, drive: Sine, state: State, places: int) -> Split:
+    """Split a motion at its events, with the fewest steps.
+
+    Args:
+        model: the isolator.
+        method: how the orbit is closed.
+        drive: the drive that acts.
+        state: at t = 0, SI units.
+        places: crossings to make room for.
+
+    Returns:
+        The split.
+    """
+    steps, end = method.integrator.steps_a_period(model), 2.0 * math.pi * method.turns
+    count = round(steps * method.turns)
+    motion = follow_events(model, drive, state, end, count, places, count + 1)
+    path, crossings = tuple(motion.path.T), motion.crossings
+    scale = state_scale(path)
+    sizes = _switch_scale(model, path, crossings, drive.angular_frequency**2 * scale[0])
+    least = jnp.asarray(max(FEWEST_STEPS, method.periods * steps // (places + 1)))
+    return Split(scale, crossings, sizes, least, crossings.complete)
+
+
+def event_places(model: Isolator, turns: float) -> int:
+    """Give how many events of a motion to make room for first.
+
+    Args:
+        model: the isolator.
+        turns: drive periods that the motion lasts.
+
+    Returns:
+        Places.
+    """
+    rest = tuple(jnp.zeros(()) for _ in range(2 + model.internal_states))
+    kinds = len(model.switches(rest)) + (2 if model.slides else 0)
+    return math.ceil(_EVENTS_A_PERIOD * kinds * turns)
 
 
 def steps_wanted(
@@ -153,9 +189,14 @@ def state_scale(path: State) -> Float[Array, " state"]:
     return jnp.where(jnp.isfinite(sizes) & (sizes > 0.0), sizes, 1.0)
 
 
-def kink_scale(model: Isolator, path: State, crossings: Crossings) -> Float[Array, " crossing"]:
-    """Give the size of the kink function that belongs to each crossing."""
-    kinks = model.kinks(path)
-    if not kinks:
+def _switch_scale(
+    model: Isolator, path: State, crossings: Crossings, acceleration: Array
+) -> Float[Array, " crossing"]:
+    """Give the size of the switch of each crossing; of what frees a mass, that of acceleration."""
+    switches = model.switches(path)
+    if not switches:
         return jnp.ones(crossings.phases.shape)
-    return state_scale(kinks)[jnp.maximum(crossings.kinks, 0)]
+    sizes = state_scale(switches)
+    if model.slides:
+        sizes = jnp.concatenate([sizes, jnp.stack([acceleration] * 2)])
+    return sizes[jnp.maximum(crossings.kinks, 0)]

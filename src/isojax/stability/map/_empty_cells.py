@@ -1,0 +1,204 @@
+"""Empty cells of a map tried as single orbits: from their own start, then from the cells beside."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import distance_transform_edt
+
+from ...models import Integrator, Isolator
+from ._batched_newton import FOUND, NOT_CONVERGED, Found, padded, states_at_zero
+from ._map_error import lanes_of
+from ._map_method import MapMethod
+from ._single_orbits import single_orbits
+from ._starts import Candidates
+from ._surface import MapWindow
+
+_TRIED = 128
+"""Cells of an even sample of those left empty; where none of them can be filled, the others are not tried."""
+
+_ROUNDS = 8
+"""Times at most that empty cells are tried from those next to them."""
+
+_SAME = 1e-5
+"""Distance of two orbits, over their size, up to which they are one."""
+
+_LANES = 1024
+"""Lanes of the compiled step from a start to t = 0."""
+
+
+_CLOSE = 1e-3
+"""Relative difference of the sizes of two motions up to which they are looked at as one."""
+
+
+class Cells(NamedTuple):
+    """Orbits of a map, a candidate each.
+
+    Attributes:
+        candidates: where each is sought.
+        found: what was found.
+        split: whether each is split at the kinks that the others share.
+    """
+
+    candidates: Candidates
+    found: Found
+    split: Bool[np.ndarray, " candidate"]
+
+
+def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapWindow, cells: Cells) -> Cells:
+    """Fill cells in which no orbit was found, as far as single orbits are found there.
+
+    Args:
+        model: the isolator.
+        integrator: steps and tolerances.
+        half: whether symmetric orbits are closed over half a period.
+        window: axes of the map.
+        cells: the orbits.
+
+    Returns:
+        The orbits, with those that were lacking.
+    """
+    shape = len(window.amplitudes), len(window.frequencies)
+    if (cells.found.code == FOUND).all() and np.sum(cells.candidates.order == 0) == shape[0] * shape[1]:
+        return cells
+    method = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
+    cells = _with_every_cell(cells, shape)
+    candidates, found = cells.candidates, Found(*(np.array(values) for values in cells.found))
+    split = cells.split.copy()
+    place = candidates.force.astype(int) * shape[1] + candidates.frequency
+    for attempt in range(1 + _ROUNDS):
+        held = np.zeros(shape[0] * shape[1], bool)
+        held[place[found.code == FOUND]] = True
+        lost = np.flatnonzero(~held[place] & (candidates.order == 0))
+        if not lost.size or (attempt and not held.any()):
+            break
+        beside = _beside(model, method, window, Cells(candidates, found, split), lost) if attempt else None
+        filled = 0
+        for some in _blocks(lost.size):
+            push, rate = (
+                window.amplitudes[candidates.force[lost[some]]],
+                window.frequencies[candidates.frequency[lost[some]]],
+            )
+            starts = None if beside is None else beside[some]
+            got = single_orbits(model, integrator, half, push, rate, starts)
+            good = got.code == FOUND
+            own = lost[some][good]
+            for name in ("states", "direction", "multipliers", "radius", "response", "code"):
+                getattr(found, name)[own] = getattr(got, name)[good]
+            found.phases[own] = np.nan
+            # What friction or a stop leaves inaccurate says so.
+            found.code[lost[some][~good]] = got.code[~good]
+            split[own], filled = False, filled + own.size
+            if not filled:
+                break
+        if attempt and not filled:
+            break
+    return Cells(candidates, found, split)
+
+
+def without_repeats(
+    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, cells: Cells
+) -> Cells:
+    """Leave out orbits that are another one of their cell: two starts may lead to the same.
+
+    Args:
+        model: the isolator.
+        integrator: steps and tolerances.
+        half: whether symmetric orbits are closed over half a period.
+        window: axes of the map.
+        cells: the orbits.
+
+    Returns:
+        The orbits, each once.
+    """
+    candidates, found, split = cells
+    good = found.code == FOUND
+    single = np.flatnonzero(good & ~split)
+    if not single.size:
+        return cells
+    # Orbits that are read off, or split alike, differ by how they are found.
+    place = candidates.force.astype(int) * len(window.frequencies) + candidates.frequency
+    good = np.flatnonzero(good & np.isin(place, place[single]))
+    order = good[np.lexsort((found.response[good], place[good]))]
+    size = found.response[order]
+    close = (np.diff(place[order]) == 0) & (np.diff(size) <= _CLOSE * size[1:])
+    if not close.any():
+        return cells
+    method = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
+    pairs = np.stack([order[:-1][close], order[1:][close]])
+    first, second = (states_of(model, method, window, cells, own)[:, :2] for own in pairs)
+    scale = np.stack(
+        [found.response[pairs[0]], 2.0 * np.pi * window.frequencies[candidates.frequency[pairs[0]]]]
+    )
+    scale[1] *= scale[0]
+    same = np.all(np.abs(first - second) <= _SAME * scale.T, axis=1)
+    gone = np.maximum(*pairs)[same]
+    found = Found(*(np.array(values) for values in found))
+    found.code[gone] = NOT_CONVERGED
+    for values in (found.states, found.multipliers, found.radius, found.response):
+        values[gone] = np.nan
+    return Cells(candidates, found, split)
+
+
+def _blocks(count: int) -> list[np.ndarray]:
+    """Give places of an even sample, then those of the others."""
+    first = np.unique(np.linspace(0, count - 1, min(count, _TRIED)).astype(int))
+    others = np.setdiff1d(np.arange(count), first)
+    return [first, others] if others.size else [first]
+
+
+def _with_every_cell(cells: Cells, shape: tuple[int, int]) -> Cells:
+    """Add the cells in which the surface holds no orbit."""
+    candidates, found, split = cells
+    has = np.zeros(shape, bool)
+    has[candidates.force, candidates.frequency] = True
+    force, column = (places.astype(np.int32) for places in np.nonzero(~has))
+    if not force.size:
+        return cells
+    none = np.zeros(force.size, np.int32)
+    added = Candidates(force, column, none, none)
+    blank = {
+        name: np.full((force.size, *values.shape[1:]), np.nan, values.dtype)
+        for name, values in found._asdict().items()
+        if name != "code"
+    }
+    missing = Found(**blank, code=np.full(force.size, NOT_CONVERGED, np.int8))
+    return Cells(
+        joined([candidates, added]),
+        joined([found, missing]),
+        np.concatenate([split, np.zeros(force.size, bool)]),
+    )
+
+
+def joined(lists: list[Any]) -> Any:
+    """Join lists of orbits."""
+    return type(lists[0])(*(np.concatenate(own) for own in zip(*lists, strict=True)))
+
+
+def _beside(
+    model: Isolator, method: MapMethod, window: MapWindow, cells: Cells, lost: Int[np.ndarray, " cell"]
+) -> Float[np.ndarray, "cell state"]:
+    """Give the states at t = 0 of the orbits in the cells next to some."""
+    candidates, found, _ = cells
+    holder = np.full((len(window.amplitudes), len(window.frequencies)), -1)
+    good = np.flatnonzero((found.code == FOUND) & (candidates.order == 0))
+    holder[candidates.force[good], candidates.frequency[good]] = good
+    row, column = np.asarray(distance_transform_edt(holder < 0, return_distances=False, return_indices=True))
+    own = candidates.force[lost], candidates.frequency[lost]
+    source = holder[row[own], column[own]]
+    return states_of(model, method, window, cells, source)
+
+
+def states_of(
+    model: Isolator, method: MapMethod, window: MapWindow, cells: Cells, picked: Int[np.ndarray, " orbit"]
+) -> Float[np.ndarray, "orbit state"]:
+    """Give the states of some orbits at t = 0 of the recorded drive."""
+    parts = []
+    for begin in range(0, picked.size, _LANES):
+        block = picked[begin : begin + _LANES]
+        lanes = lanes_of(cells.found, cells.candidates, window, padded(block, _LANES))
+        parts.append(
+            np.stack(states_at_zero(model, method, lanes._replace(phases=())), axis=-1)[: block.size]
+        )
+    return np.concatenate(parts)

@@ -1,0 +1,141 @@
+"""Cells of a map found as single orbits: where nothing can be read off, and where Newton failed."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jax.sharding import NamedSharding
+from jaxtyping import Array, Float
+
+from ...models import Integrator, Isolator
+from ..orbit import (
+    Accuracy,
+    ShootingMethod,
+    event_places,
+    modulus,
+    multipliers,
+    recorded_sine,
+    response_start,
+    shoot,
+    trajectory,
+)
+from ._batched_newton import (
+    FOUND,
+    NOT_ACCURATE,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    Found,
+    padded,
+    states_at_zero,
+    surface_lanes,
+)
+from ._map_method import MapMethod
+from ._nodes import half_peak_to_peak
+from ._starts import Candidates, PlacedSurface
+
+_AT_ONCE = 128
+"""Orbits found at once."""
+
+
+class SingleOrbits(eqx.Module):
+    """What finds the orbits of any list of candidates one by one, as `find_periodic_orbit` does.
+
+    Attributes:
+        model: the isolator.
+        method: how to integrate starts.
+        surface: the orbits over displacement and frequency, with the axes of the map.
+        sharding: how a chunk is spread over devices.
+    """
+
+    model: Isolator
+    method: MapMethod
+    surface: PlacedSurface
+    sharding: NamedSharding = eqx.field(static=True)
+
+    @property
+    def states(self) -> int:
+        """Count of states of the model."""
+        return 2 + self.model.internal_states
+
+    def __call__(self, candidates: Candidates, size: int) -> Found:
+        """Find the orbits of candidates.
+
+        Args:
+            candidates: at most `size` of them.
+            size: lanes of the compiled starts.
+
+        Returns:
+            Their orbits.
+        """
+        where = [jnp.asarray(padded(values, size)) for values in candidates[:3]]
+        lanes = surface_lanes(self.model, self.surface, where)
+        starts = np.stack(states_at_zero(self.model, self.method, lanes), axis=-1)[: candidates.force.size]
+        push = np.asarray(self.surface.amplitudes)[candidates.force]
+        rate = np.asarray(self.surface.frequencies)[candidates.frequency]
+        found = single_orbits(self.model, self.method.integrator, self.method.half, push, rate, starts)
+        kinks = self.surface.polynomials.shape[2] - self.states - 3
+        return found._replace(phases=np.full((push.size, kinks), np.nan))
+
+
+def single_orbits(
+    model: Isolator,
+    integrator: Integrator,
+    half: bool,
+    amplitude: Float[np.ndarray, " orbit"],
+    frequency: Float[np.ndarray, " orbit"],
+    starts: Float[np.ndarray, "orbit state"] | None,
+) -> Found:
+    """Find orbits from starts.
+
+    Args:
+        model: the isolator.
+        integrator: steps and tolerances.
+        half: whether symmetric orbits are closed over half a period.
+        amplitude: of the drive of each [N, or m/s^2 for base excitation].
+        frequency: of the drive of each [Hz].
+        starts: states at t = 0; the one-harmonic balance if omitted.
+
+    Returns:
+        The orbits, each from t = 0 of its recorded drive, without phases of kinks.
+    """
+    method, parts = ShootingMethod(integrator, 1, half), []
+    for begin in range(0, amplitude.size, _AT_ONCE):
+        block = [amplitude[begin : begin + _AT_ONCE], frequency[begin : begin + _AT_ONCE]]
+        block += [] if starts is None else [starts[begin : begin + _AT_ONCE]]
+        count = block[0].size
+        values = [jnp.asarray(padded(value, _AT_ONCE)) for value in block]
+        parts.append(
+            jax.tree.map(lambda it, count=count: np.asarray(it)[:count], _shoot(model, method, *values))
+        )
+    return Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))
+
+
+@eqx.filter_jit
+def _shoot(
+    model: Isolator, method: ShootingMethod, amplitude: Array, frequency: Array, starts: Array | None = None
+) -> tuple[Array, ...]:
+    goal = method.integrator.orbit_tolerance
+    accuracy = Accuracy(method.integrator.map_orbit_tolerance, method.integrator.map_orbit_error)
+    solver, places = optx.Newton(rtol=goal, atol=goal), event_places(model, method.turns)
+
+    def one(push: Array, rate: Array, start: Array | None) -> tuple[Array, ...]:
+        drive = recorded_sine(model, push, rate)
+        begin = response_start(model, push, rate) if start is None else start
+        solution = shoot(model, method, solver, drive, begin, places, accuracy)
+        path = trajectory(model, method.integrator, drive, tuple(solution.state), turns=method.turns)[0]
+        finite = jnp.all(jnp.isfinite(path)) & jnp.all(jnp.isfinite(solution.matrix))
+        code = jnp.where(solution.accurate, FOUND, NOT_ACCURATE)
+        code = jnp.where(finite, jnp.where(solution.found, code, NOT_CONVERGED), NOT_FINITE)
+        blank = jnp.where(code == FOUND, 1.0, jnp.nan)
+        roots = multipliers(solution.matrix)
+        roots = (roots * roots if method.half else roots) * blank
+        unit = recorded_sine(model, jnp.ones(()), rate)
+        direction = jnp.stack([unit.sine, jnp.asarray(unit.cosine, dtype=float)])
+        size = half_peak_to_peak(path, method.half) * blank
+        state = solution.state * blank
+        return state, direction, jnp.zeros(0), roots, modulus(roots[0]), size, code.astype(jnp.int8)
+
+    if starts is None:
+        return jax.vmap(lambda push, rate: one(push, rate, None))(amplitude, frequency)
+    return jax.vmap(one)(amplitude, frequency, starts)
