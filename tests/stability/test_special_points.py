@@ -101,7 +101,8 @@ def test_the_broken_orbit_doubles_at_minus_one_by_scipy(broken):
 def test_the_doubled_branch_repeats_after_two_periods_by_scipy(doubled):
     assert doubled.periods == 2
     assert ij.is_successful(doubled.result)
-    place = doubled.points.value.size // 2
+    # Near its start; far along it the orbits are so unstable that the error of the steps grows tenfold.
+    place = int(np.argmin(np.abs(np.asarray(doubled.points.value) - 6.0)))
     y0, force = np.asarray(doubled.points.y0[place]), float(doubled.points.value[place])
     once, _, _ = scipy_map.after(UEDA_LAW, 1.0, force, ONE, y0, 1.0)
     twice, _, _ = scipy_map.after(UEDA_LAW, 1.0, force, ONE, y0, 2.0)
