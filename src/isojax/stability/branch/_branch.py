@@ -60,6 +60,7 @@ class BranchPoints(eqx.Module):
         return f"{int(known.sum())} points, {int(stable.sum())} of them stable"
 
 
+@shown
 class BranchEvent(eqx.Module):
     """Something to look out for along a branch: a named number of its orbits whose zero is located.
 
@@ -75,6 +76,9 @@ class BranchEvent(eqx.Module):
 
     name: str = eqx.field(static=True)
     function: Callable[[BranchPoints], Scalar] = eqx.field(static=True)
+
+    def _headline(self) -> str:
+        return self.name
 
 
 @shown
