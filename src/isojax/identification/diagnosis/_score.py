@@ -188,12 +188,12 @@ class _Law(NamedTuple):
     """Law of the scores without any effect at one scatter of the stiffness, and the scores.
 
     Attributes:
-        weight: chance of this scatter, given the data.
+        weight: chance of this scatter, given the data and each probe by itself.
         correlation: of the scores that are seen.
         z: scores over their standard deviations, of all probes.
     """
 
-    weight: float
+    weight: Float[np.ndarray, " score"]
     correlation: Float[np.ndarray, "seen seen"]
     z: Float[np.ndarray, " score"]
 
@@ -218,12 +218,12 @@ def _laws(
         all_scatters = scores_over_scatters(reduced, fitted.point.nuisances, inflation, len(fitted.places))
     if all_scatters is None:
         own = traces.information[None] / inflation, traces.score[None] / inflation
-        all_scatters = ScatteredScores(np.ones(1), *own)
+        all_scatters = ScatteredScores(np.ones((1, seen.size)), *own)
     laws = []
     for weight, information, score in zip(*all_scatters, strict=True):
         size = np.where(seen, np.sqrt(np.maximum(np.diag(information), 1e-300)), np.inf)
         correlation = (information / np.outer(size, size))[np.ix_(seen, seen)]
-        laws.append(_Law(float(weight), correlation, (score / size - shift[0]) / shift[1]))
+        laws.append(_Law(weight, correlation, (score / size - shift[0]) / shift[1]))
     return laws
 
 
@@ -248,16 +248,20 @@ def _family_wise(
     if not order:
         return np.zeros(0)
     random = np.random.default_rng(seed)
-    share = np.round(NULL_DRAWS * np.cumsum([law.weight for law in laws])).astype(int)
+    typical = np.mean([law.weight[order] for law in laws], axis=1)
+    counts = np.diff(np.round(NULL_DRAWS * np.cumsum(typical)).astype(int), prepend=0)
     drawn, bound = np.zeros(len(order)), np.zeros(len(order))
-    for law, count in zip(laws, np.diff(share, prepend=0), strict=True):
-        sizes = np.where(either, np.abs(law.z), law.z)[order]
-        bound += law.weight * stats.norm.sf(sizes)
-        if count:
-            values, vectors = np.linalg.eigh(law.correlation)
-            root = vectors * np.sqrt(np.maximum(values, 0.0))
-            draws = random.standard_normal((count, root.shape[0])) @ root.T
-            largest = np.where(either[seen], np.abs(draws), draws).max(axis=1)
-            drawn += np.sum(largest[:, None] >= sizes, axis=0) / NULL_DRAWS
-    bound = np.minimum(1.0, (np.sum(seen) + np.sum(either[seen])) * bound)
+    most = np.sum(seen) + np.sum(either[seen])
+    for law, count in zip(laws, counts.tolist(), strict=True):
+        sizes, weight = np.where(either, np.abs(law.z), law.z)[order], law.weight[order]
+        tail = np.minimum(1.0, most * stats.norm.sf(sizes))
+        bound += weight * tail
+        if count < FEWEST_EXCEEDANCES:
+            drawn += weight * tail
+            continue
+        values, vectors = np.linalg.eigh(law.correlation)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        draws = random.standard_normal((count, root.shape[0])) @ root.T
+        largest = np.where(either[seen], np.abs(draws), draws).max(axis=1)
+        drawn += weight * np.mean(largest[:, None] >= sizes, axis=0)
     return np.where(drawn > FEWEST_EXCEEDANCES / NULL_DRAWS, drawn, bound)

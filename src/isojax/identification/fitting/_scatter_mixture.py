@@ -126,12 +126,12 @@ class ScatteredScores(NamedTuple):
     """Scores of absent effects at each scatter of the stiffness; noise scaled to one.
 
     Attributes:
-        weight: of each scatter, given the data without any of the effects; they add up to one.
+        weight: of each scatter, given the data and each effect by itself; they add up to one.
         information: g' g, with g the trace of an effect that the coefficients leave.
         score: g' r, with r the whitened residual.
     """
 
-    weight: Float[np.ndarray, " scatter"]
+    weight: Float[np.ndarray, "scatter effect"]
     information: Float[np.ndarray, "scatter effect effect"]
     score: Float[np.ndarray, "scatter effect"]
 
@@ -140,6 +140,9 @@ def scores_over_scatters(
     reduced: Reduced, nuisances: Nuisances, inflation: float, coefficients: int
 ) -> ScatteredScores | None:
     """Give the scores of absent effects at all scatters that the records allow.
+
+    What the records allow is judged beside the effect itself, as a t test takes the variance that is left:
+    without it a stiffness that follows the pressure would pass for scatter.
 
     Args:
         reduced: equations at the solution: of the fitted coefficients, then of the effects.
@@ -163,14 +166,17 @@ def scores_over_scatters(
         left = whole[:, count:, count:] - np.swapaxes(cross, 1, 2) @ np.linalg.solve(base, cross)
     except np.linalg.LinAlgError:
         return None
-    weight = _weights(logarithm - 0.5 * (left[:, -1, -1] + np.linalg.slogdet(base)[1]))
-    return ScatteredScores(weight, left[:, :-1, :-1], left[:, :-1, -1])
+    logarithm = logarithm - 0.5 * (left[:, -1, -1] + np.linalg.slogdet(base)[1])
+    information, score = left[:, :-1, :-1], left[:, :-1, -1]
+    own = np.maximum(np.diagonal(information, axis1=1, axis2=2), 1e-300)
+    beside = logarithm[:, None] + 0.5 * (score**2 / own - np.log(own))
+    return ScatteredScores(_weights(beside), information, score)
 
 
-def _weights(logarithm: Float[np.ndarray, " scatter"]) -> Float[np.ndarray, " scatter"]:
+def _weights(logarithm: Float[np.ndarray, "scatter *column"]) -> Float[np.ndarray, "scatter *column"]:
     """Give weights that add up to one from their logarithms."""
-    weight = np.exp(logarithm - logarithm.max())
-    return weight / weight.sum()
+    weight = np.exp(logarithm - logarithm.max(axis=0))
+    return weight / weight.sum(axis=0)
 
 
 def expect_uncertainty(

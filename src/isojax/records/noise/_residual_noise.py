@@ -127,8 +127,9 @@ def _words_of(campaign: Campaign, law: Colour, known: float, band: NoiseBand) ->
         return words
     drives = [dataclasses.replace(one, output=one.input) for one in campaign.fit_records]
     seen = [own for drive in drives if (own := cycle_scatter(drive, band) or period_scatter(drive, band))]
-    own = f", whose own noise is {number(float(np.sqrt(np.mean([one.square for one in seen]))))} rms"
+    squares = [one.square for one in seen]
+    own = f", whose own noise is {number(float(np.sqrt(np.mean(squares))))} rms" if seen else ""
     return (
         f"{words}; the response without the drive's harmonics shows {number(known)} rms: the rest is slower, "
-        f"or comes through the drive channel{own if seen else ''}"
+        f"or comes through the drive channel{own}"
     )

@@ -18,17 +18,17 @@ from ._surface import MapWindow
 _TRIED = 128
 """Cells of an even sample of those left empty; where none of them can be filled, the others are not tried."""
 
-_ROUNDS = 8
+_RETRIES = 8
 """Times at most that empty cells are tried from those next to them."""
 
 _SAME = 1e-5
 """Distance of two orbits, over their size, up to which they are one."""
 
-_LANES = 1024
+_STARTS_TOGETHER = 1024
 """Lanes of the compiled step from a start to t = 0."""
 
 
-_CLOSE = 1e-3
+_NEIGHBOURING = 1e-3
 """Relative difference of the sizes of two motions up to which they are looked at as one."""
 
 
@@ -67,7 +67,7 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
     candidates, found = cells.candidates, Found(*(np.array(values) for values in cells.found))
     split = cells.split.copy()
     place = candidates.force.astype(int) * shape[1] + candidates.frequency
-    for attempt in range(1 + _ROUNDS):
+    for attempt in range(1 + _RETRIES):
         held = np.zeros(shape[0] * shape[1], bool)
         held[place[found.code == FOUND]] = True
         lost = np.flatnonzero(~held[place] & (candidates.order == 0))
@@ -122,7 +122,7 @@ def without_repeats(
     good = np.flatnonzero(good & np.isin(place, place[single]))
     order = good[np.lexsort((found.response[good], place[good]))]
     size = found.response[order]
-    close = (np.diff(place[order]) == 0) & (np.diff(size) <= _CLOSE * size[1:])
+    close = (np.diff(place[order]) == 0) & (np.diff(size) <= _NEIGHBOURING * size[1:])
     if not close.any():
         return cells
     method = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
@@ -195,9 +195,9 @@ def states_of(
 ) -> Float[np.ndarray, "orbit state"]:
     """Give the states of some orbits at t = 0 of the recorded drive."""
     parts = []
-    for begin in range(0, picked.size, _LANES):
-        block = picked[begin : begin + _LANES]
-        lanes = lanes_of(cells.found, cells.candidates, window, padded(block, _LANES))
+    for begin in range(0, picked.size, _STARTS_TOGETHER):
+        block = picked[begin : begin + _STARTS_TOGETHER]
+        lanes = lanes_of(cells.found, cells.candidates, window, padded(block, _STARTS_TOGETHER))
         parts.append(
             np.stack(states_at_zero(model, method, lanes._replace(phases=())), axis=-1)[: block.size]
         )

@@ -34,7 +34,7 @@ from ._map_method import MapMethod
 from ._nodes import half_peak_to_peak
 from ._starts import Candidates, PlacedSurface
 
-_AT_ONCE = 128
+_ORBITS_TOGETHER = 128
 """Orbits found at once."""
 
 
@@ -100,11 +100,11 @@ def single_orbits(
         The orbits, each from t = 0 of its recorded drive, without phases of kinks.
     """
     method, parts = ShootingMethod(integrator, 1, half), []
-    for begin in range(0, amplitude.size, _AT_ONCE):
-        block = [amplitude[begin : begin + _AT_ONCE], frequency[begin : begin + _AT_ONCE]]
-        block += [] if starts is None else [starts[begin : begin + _AT_ONCE]]
+    for begin in range(0, amplitude.size, _ORBITS_TOGETHER):
+        block = [amplitude[begin : begin + _ORBITS_TOGETHER], frequency[begin : begin + _ORBITS_TOGETHER]]
+        block += [] if starts is None else [starts[begin : begin + _ORBITS_TOGETHER]]
         count = block[0].size
-        values = [jnp.asarray(padded(value, _AT_ONCE)) for value in block]
+        values = [jnp.asarray(padded(value, _ORBITS_TOGETHER)) for value in block]
         parts.append(
             jax.tree.map(lambda it, count=count: np.asarray(it)[:count], _shoot(model, method, *values))
         )

@@ -34,7 +34,7 @@ _LARGEST_RESPONSE = 2.0
 """Half the peak-to-peak displacement over the largest from rest, beyond which a motion did not close: it
 starts at its largest displacement."""
 
-_ROOM = 2
+_ROWS_BEYOND = 2
 """Nodes of the first grid beyond the largest displacement that is held."""
 
 PARTS = 8
@@ -257,7 +257,7 @@ def _ends_needed(grid: _Grid, window: MapWindow) -> tuple[float, float]:
     """Give the least and largest logarithm of the displacements that the forces hold, with some room."""
     force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
     held = np.flatnonzero((force <= window.amplitudes[-1]).any(axis=0))
-    last = min(int(held.max(initial=0)) + _ROOM, len(grid.logarithms) - 1)
+    last = min(int(held.max(initial=0)) + _ROWS_BEYOND, len(grid.logarithms) - 1)
     return float(grid.logarithms[0]), float(grid.logarithms[last])
 
 

@@ -19,7 +19,7 @@ from ...models import (
 from ._kink_crossings import Crossings
 from ._sine import Sine
 
-_ROUNDING = 1e-12
+_PHASE_ROUNDING = 1e-12
 """Share of the size of a switch that it may be off by, and share of a step that an instant may be."""
 
 _HALVINGS, _NEWTON_STEPS = 6, 3
@@ -97,7 +97,7 @@ def follow_events(
     walk = _Walk(begin, state, sides, crossings, jnp.asarray(0), path.at[:1].set(jnp.stack(state)))
 
     def unfinished(walk: _Walk) -> Array:
-        return (walk.phase < end * (1.0 - _ROUNDING)) & (walk.events <= places)
+        return (walk.phase < end * (1.0 - _PHASE_ROUNDING)) & (walk.events <= places)
 
     def body(walk: _Walk) -> _Walk:
         number = jnp.floor(jax.lax.stop_gradient(walk.phase) / length + 1e-6) + 1.0
@@ -190,7 +190,7 @@ def _step(
     share = jnp.where(event >= 0, shares[first], 1.0)
     value, slope = jax.jvp(lambda s: ahead(s)[first], (share,), (jnp.ones(()),))
     moved = share - value / jax.lax.stop_gradient(jnp.where(slope == 0.0, 1.0, slope))
-    inside = (moved >= -_ROUNDING) & (moved <= 1.0 + _ROUNDING)
+    inside = (moved >= -_PHASE_ROUNDING) & (moved <= 1.0 + _PHASE_ROUNDING)
     share = jnp.where(event >= 0, jnp.where(inside, moved, share), 1.0)
     return share, event, *_after(model, acting(share), at(share), sides, event)
 
@@ -255,7 +255,7 @@ def _first_root(values: Float[Array, "4 switch"]) -> tuple[Int[Array, ""], Float
     root = jnp.sqrt(jnp.maximum(b * b - 3.0 * a * c, 0.0))
     lowest = -a / jnp.where(b + root == 0.0, 1.0, b + root)
     lowest = jnp.where((b * b > 3.0 * a * c) & (lowest > 0.0) & (lowest < 1.0), lowest, 1.0)
-    limit = -_ROUNDING * jnp.max(jnp.abs(values), axis=0)
+    limit = -_PHASE_ROUNDING * jnp.max(jnp.abs(values), axis=0)
     dips, ends = value(lowest) < limit, value(jnp.ones_like(lowest)) < limit
     high = jnp.where(dips, lowest, 1.0)
     low = jnp.zeros_like(high)

@@ -30,7 +30,7 @@ from ._split_period_map import event_places
 from ._state_path import AbstractStatePath
 from ._symmetry import is_odd
 
-_ROOM = 16
+_EVENT_ROOM = 16
 """Times the events of a motion for which room is made first, beyond which no more is made."""
 
 _SYMMETRIC_TO = 1e-4
@@ -169,7 +169,7 @@ def find_periodic_orbit(
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
     begin = None if start is None else frozen(jnp.stack([as_float64(value) for value in start]))
     method = ShootingMethod(integrator, periods, half)
-    places, most = event_places(model, method.turns), event_places(model, _ROOM * method.turns)
+    places, most = event_places(model, method.turns), event_places(model, _EVENT_ROOM * method.turns)
     solution = _solve(still, drive, method, solver, begin, places)
 
     def all_split() -> Bool[Array, ""]:

@@ -39,7 +39,13 @@ def period_map(
 
 
 def trajectory(
-    model: Isolator, integrator: Integrator, drive: Sine, state: State, *, turns: float = 1.0
+    model: Isolator,
+    integrator: Integrator,
+    drive: Sine,
+    state: State,
+    *,
+    turns: float = 1.0,
+    rounded: bool = False,
 ) -> State:
     """Give the states along the motion.
 
@@ -49,18 +55,26 @@ def trajectory(
         drive: the drive that acts.
         state: state at t = 0.
         turns: periods.
+        rounded: whether sharp laws are rounded over their width instead of split at events: a motion that
+            begins at a reversal has an event at its start, which no derivative can follow.
 
     Returns:
         Each state at the start of each step and at the end of the last, time first.
     """
-    end, path = _advance(model, integrator, drive, state, turns, keep=True)
+    end, path = _advance(model, integrator, drive, state, turns, keep=True, rounded=rounded)
     return tuple(jnp.concatenate([along, last[None]]) for along, last in zip(path, end, strict=True))
 
 
 def _advance(
-    model: Isolator, integrator: Integrator, drive: Sine, state: State, turns: float, keep: bool
+    model: Isolator,
+    integrator: Integrator,
+    drive: Sine,
+    state: State,
+    turns: float,
+    keep: bool,
+    rounded: bool = False,
 ) -> tuple[State, State]:
-    if model.splits:
+    if model.splits and not rounded:
         return _along_events(model, integrator, drive, state, turns, keep)
     steps = integrator.steps_a_period(model)
     step_time = 1.0 / (steps * drive.frequency)

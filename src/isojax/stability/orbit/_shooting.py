@@ -20,10 +20,10 @@ from ._split_period_map import Split, split_at_events, split_image, state_scale,
 _MOST_STEPS_A_PIECE = 1 << 14
 """Steps a piece at most, for an orbit."""
 
-_ROUNDS = 4
+_SPLITS_ANEW = 4
 """Times at most that a motion is split anew because the closed one has other events."""
 
-_FINER_STEPS = 2
+_CHECKING_STEPS = 2
 """Times the steps with which the events of a closed motion are looked at."""
 
 
@@ -151,7 +151,7 @@ def shoot(
     near = optx.root_find(open_end, solver, start / scale, max_steps=50, throw=False).value
 
     def again(own: _Round) -> Array:
-        return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.rounds < _ROUNDS)
+        return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.rounds < _SPLITS_ANEW)
 
     def body(own: _Round) -> _Round:
         return _closed(model, method, solver, drive, own.state, places, own.rounds, accuracy.goal)
@@ -217,7 +217,7 @@ def _closed(
     root, (transitions, left) = matrices(root, jnp.stack([steps, steps, steps // 2]), jnp.arange(3) < 1)
     error = jnp.max(jnp.abs(transitions[1] - transitions[2])) / 15.0
     state, end = root[: scale.size] * scale, 2.0 * math.pi * method.turns
-    fine = round(_FINER_STEPS * integrator.steps_a_period(model) * method.turns)
+    fine = round(_CHECKING_STEPS * integrator.steps_a_period(model) * method.turns)
     own = follow_events(model, drive, tuple(state), end, fine, places).crossings
     agrees = same_events(own, split.crossings._replace(phases=root[scale.size :]), end)
     return _Round(state, root, split, transitions[1], error, left[1], agrees, rounds + 1)

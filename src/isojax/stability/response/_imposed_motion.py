@@ -224,7 +224,7 @@ def _closed(
         own = jnp.concatenate([jnp.stack([a, a * 2.0 * np.pi * f]), size[2:]])
         state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), unknown[2:]]) + shift * own
         drive = Sine(unknown[0], unknown[1], f)
-        path = trajectory(isolator, integrator, drive, tuple(state), turns=turns)
+        path = trajectory(isolator, integrator, drive, tuple(state), turns=turns, rounded=True)
         left = (sign * jnp.stack([along[-1] for along in path]) - state) / own
         phase = 2.0 * np.pi * turns / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
         at = drive.at(jnp.asarray(np.sin(phase)), jnp.asarray(np.cos(phase)))
