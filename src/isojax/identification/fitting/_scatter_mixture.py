@@ -173,7 +173,7 @@ def scores_over_scatters(
     return ScatteredScores(_weights(beside), information, score)
 
 
-def _weights(logarithm: Float[np.ndarray, "scatter *column"]) -> Float[np.ndarray, "scatter *column"]:
+def _weights(logarithm: Float[np.ndarray, "scatter ..."]) -> Float[np.ndarray, "scatter ..."]:
     """Give weights that add up to one from their logarithms."""
     weight = np.exp(logarithm - logarithm.max(axis=0))
     return weight / weight.sum(axis=0)
