@@ -54,5 +54,5 @@ def _is_known_or_forward(leaf: Any) -> bool:
     if not isinstance(leaf, Tracer):
         return True
     kind = type(leaf).__name__
-    parts = {"JVPTracer": ("primal", "tangent"), "BatchTracer": ("val",)}.get(kind, ())
-    return bool(parts) and all(_is_known_or_forward(getattr(leaf, part, leaf)) for part in parts)
+    held = {"JVPTracer": ("primal", "tangent"), "BatchTracer": ("val",)}.get(kind, ())
+    return bool(held) and all(_is_known_or_forward(getattr(leaf, name, leaf)) for name in held)

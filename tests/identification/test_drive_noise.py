@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.signal import freqz, lsim, welch
 
+from isojax._progress import silent
 from isojax.elements import LinearDamping, LinearStiffness
-from isojax.identification import diagnose, fit
-from isojax.identification.fitting import drive_noise, fit_by_output
+from isojax.identification import Rules, diagnose, fit
+from isojax.identification.fitting import DEFAULT_SOLVER, drive_noise, search_of, weighted_by_output
 from isojax.models import Isolator
 from isojax.records import Dwell, Record
 
@@ -64,7 +65,7 @@ def noisy_record(seed, measured, acting, period=None):
     )
 
 
-def fitted(campaign_of, records, fit=fit):
+def fitted(campaign_of, records):
     campaign = campaign_of(records, stiffness=("linear",), damping=("linear",), input={"hold": "linear"})
     return fit(Isolator(MASS, (LinearStiffness(0.97e6), LinearDamping(5e3))), campaign)
 
@@ -94,14 +95,15 @@ def test_noise_of_the_force_channel_weighs_the_residual(campaign_of, period):
 @pytest.mark.parametrize("period", [None, 1250])
 def test_noise_of_the_force_channel_is_named_as_the_cause(campaign_of, period):
     records = tuple(noisy_record(place, FORCE, 0.0, period) for place in range(2))
-    found = fitted(campaign_of, records, fit_by_output)
+    weighted = fitted(campaign_of, records)
+    found = weighted_by_output(weighted, search_of(weighted.campaign, Rules(), DEFAULT_SOLVER, silent))
     assert found.stats.chi2 / found.stats.dof > 1.2
     seen = drive_noise(found)
     assert seen is not None
     assert seen.drive == pytest.approx(FORCE, rel=0.05)
     assert seen.output == pytest.approx(SENSOR, rel=0.05)
     if period is None:
-        verdict = diagnose(fitted(campaign_of, records))
+        verdict = diagnose(weighted)
         assert verdict.verdict == "unexplained"
         assert "The drive channel carries noise of" in verdict.reason
 

@@ -83,8 +83,8 @@ def rig_orbit(
     """
     y0 = np.array(start, dtype=float)
     omega = 2.0 * math.pi * frequency
-    swing = math.hypot(y0[0], y0[1] / omega)
-    sizes = np.array([swing, swing * omega, *np.maximum(np.abs(y0[2:]), 0.05 * swing)])
+    displacement = math.hypot(y0[0], y0[1] / omega)
+    sizes = np.array([displacement, displacement * omega, *np.maximum(np.abs(y0[2:]), 0.05 * displacement)])
     closed, matrix = False, np.full((y0.size, y0.size), np.nan)
     for _ in range(NEWTON_STEPS):
         end = after_a_period(plant, amplitude, frequency, y0)

@@ -21,7 +21,7 @@ def crossings_of(model, drive, state, steps=512, places=8):
 
 
 def test_crossings_are_those_of_a_free_sine():
-    # Kinks of laws that have no strength: what is left swings as a sine, one turn in one period of the drive.
+    # Kinks of laws that have no strength: the rest moves as a sine, one cycle a period of the drive.
     model = Isolator(
         1.0,
         (

@@ -89,7 +89,7 @@ def _grazing_force():
 
 
 def test_a_contact_within_one_step_is_not_stepped_over():
-    # Half a swing: the stop is met and left in the middle of the eighth of fifteen steps.
+    # Half an oscillation: the stop is met and left in the middle of the eighth of fifteen steps.
     spring, omega, depth = 100.0, 10.0, 1e-3
     model = Isolator(1.0, (elements.LinearStiffness(spring), elements.EndStop(5e3, 1.0 - depth, 1.0, 1e-9)))
     drive = recorded_sine(model, 0.0, omega / (2.0 * math.pi))

@@ -15,7 +15,7 @@ from .._progress import LOOP_SHARES, REPLACE_SHARE, KeyFigure, Stage, silent
 from .._results import RESULTS, is_successful
 from .._show import Row, number, shown
 from ..elements import CATALOGUE
-from ..models import Isolator
+from ..models import Isolator, as_isolator
 from ..records import Campaign, Suspicion, find_suspicions, refuse_contradictions
 from ._rules import Rules
 from .diagnosis import (
@@ -220,9 +220,9 @@ def _loop(
     progress(Stage("classical guess", _GUESS, LOOP_SHARES[1:]))
     guess = classical_guess(campaign)
     progress(Stage("fit of the declared model", _FIT, LOOP_SHARES[2:]))
-    before = fit_by_output(guess.model, campaign, solver=solver, progress=progress, rules=rules, anyway=True)
-    progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     search = search_of(campaign, rules, solver, progress)
+    before = fit_by_output(as_isolator(guess.model, recorded=True), campaign, search)
+    progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     extensions, verdict = search_effects(before, search, max_iterations, excluded)
     if extensions:
         progress(Stage("search for separating experiments", _EXPERIMENT, (_LAWS, _RUNS)))

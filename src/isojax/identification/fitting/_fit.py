@@ -82,25 +82,6 @@ def fit(
         >>> fitted.parameters["k1"].unit, fitted.parameters["k1"].standard_error < 1e4
         ('N/m', True)
     """
-    found = fit_by_output(
-        model, campaign, free, fixed, solver, integrator, max_steps, progress, rules, anyway
-    )
-    return weighted_by_residual(found, search_of(found.campaign, rules, solver, progress, max_steps))
-
-
-def fit_by_output(
-    model: Isolator | Modelled | Campaign | str | Path,
-    campaign: Campaign | str | Path | None = None,
-    free: tuple[str, ...] | None = None,
-    fixed: tuple[str, ...] = (),
-    solver: Any = DEFAULT_SOLVER,
-    integrator: Integrator | None = None,
-    max_steps: int = MOST_EVALUATIONS,
-    progress: Callable[[str], None] = silent,
-    rules: Rules = Rules(),
-    anyway: bool = False,
-) -> Fit:
-    """Fit as `fit` does, weighted by the noise that the output shows; the arguments are its own."""
     check_float64()
     if campaign is None and isinstance(model, Campaign | str | Path):
         campaign = as_campaign(model)
@@ -114,20 +95,47 @@ def fit_by_output(
         # A delay or a skew that the model stands for contradicts nothing.
         named = tuple(element.name for element in model.elements)
         refuse_contradictions(dataclasses.replace(campaign, elements=named))
+    search = search_of(campaign, rules, solver, progress, max_steps)
+    return weighted_by_residual(fit_by_output(model, campaign, search, places, integrator), search)
+
+
+def fit_by_output(
+    model: Isolator,
+    campaign: Campaign,
+    search: Search,
+    places: tuple[int, ...] | None = None,
+    integrator: Integrator | None = None,
+) -> Fit:
+    """Fit a model, weighted by the noise that the output shows.
+
+    Args:
+        model: start.
+        campaign: the measurements.
+        search: how to search.
+        places: coefficients to fit, in `list_parameters`; those that the campaign frees if omitted.
+        integrator: solver and steps, or None to choose them.
+
+    Returns:
+        The fit.
+
+    Raises:
+        ValueError: if records differ in sampling rate, or their noise is neither declared nor can be
+            estimated.
+    """
+    places = free_places(model, (), None, campaign.mass_free) if places is None else places
     noise = estimate_noise(campaign)
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
         raise ValueError(
             f"{campaign.file}: the noise of the output must be above 0, but the records, so short or so "
             f"clean, show {noise.sigma:g}; declare it: [output] noise = its rms"
         )
-    search = search_of(campaign, rules, solver, progress, max_steps)
 
     def fit_from(start: Isolator) -> Estimate:
         return estimate(simulator_for(start, campaign, noise, integrator), start, places, search)
 
     found = fit_from(model)
     if found.result == RESULTS.not_finite:
-        progress("the simulation from the start values diverges: again from their linear part")
+        search.progress("the simulation from the start values diverges: again from their linear part")
         again = fit_from(_linear_part(model, places))
         found = found if again.result == RESULTS.not_finite else again
     return complete(found, model, campaign, noise)

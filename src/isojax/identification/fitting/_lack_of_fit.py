@@ -74,7 +74,7 @@ def lack_of_fit(fit: Fit) -> LackOfFit:
 
 
 def shows_noise(record: Record) -> bool:
-    """Say whether noise and what repeats with the drive are told apart in a record: not in a free decay.
+    """Say whether a record distinguishes noise from what repeats with the drive: a free decay does not.
 
     Args:
         record: the record.

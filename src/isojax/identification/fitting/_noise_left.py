@@ -19,7 +19,7 @@ def noise_left(
     """Give the noise that a good fit leaves, if it is another than the output shows.
 
     A fit is good here where nothing of its residual is locked to the drive; how large the residual is does
-    not matter. Only records in which noise and what is locked are told apart have a say.
+    not matter. Only records that distinguish noise from what is locked count.
 
     Args:
         found: the estimate, weighted by the noise that the output shows.

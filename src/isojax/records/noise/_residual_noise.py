@@ -12,11 +12,18 @@ from .._record import Record
 from ..spectrum import NoiseBand, Rest, harmonic_basis, hum_lines
 from ._colour import Colour, Piece
 from ._levels import record_levels
-from ._noise import NoiseEstimate, NoiseMethod, coloured, output_scatters, words_of_colour
-from ._scatter import Scatter, cycle_scatter, period_scatter, piece_scatter
+from ._noise import (
+    NoiseEstimate,
+    NoiseMethod,
+    coloured,
+    estimate_noise,
+    output_scatters,
+    words_of_colour,
+)
+from ._scatter import Scatter, piece_scatter
 
 _AS_SEEN = 1.05
-"""Residual noise over that of the output, up to which the reader is told of no other cause."""
+"""Residual noise over that of the output, up to which the note names no other cause."""
 
 
 def residual_noise(
@@ -41,8 +48,8 @@ def residual_noise(
 
     Source: Pintelon & Schoukens 2012, System Identification: A Frequency Domain Approach, secs. 9.2 and 10.
     """
-    told = campaign.output.noise is not None or campaign.filter is not None
-    if told or any(record.floor is not None for record in campaign.records):
+    declared = campaign.output.noise is not None or campaign.filter is not None
+    if declared or any(record.floor is not None for record in campaign.records):
         return None
     pieces = [
         [_piece(window, record) for window in own]
@@ -58,7 +65,7 @@ def residual_noise(
         sigma=law.sigma,
         method="residual",
         methods=_methods(known, counts),
-        note=_words_of(campaign, law, known.sigma, band),
+        note=_words_of(campaign, law, known.sigma),
         levels=levels,
         share=law.share,
         colour=law,
@@ -120,15 +127,15 @@ def _piece(residual: Float[np.ndarray, " time"], record: Record) -> Piece:
     return Piece(Rest(residual - basis @ (basis.T @ residual), taken, removed))
 
 
-def _words_of(campaign: Campaign, law: Colour, known: float, band: NoiseBand) -> str:
+def _words_of(campaign: Campaign, law: Colour, known: float) -> str:
     """Gives what a reader must know of noise that the residual shows."""
     words = words_of_colour(law, " of what a good fit leaves")
     if law.sigma <= _AS_SEEN * known:
         return words
-    drives = [dataclasses.replace(one, output=one.input) for one in campaign.fit_records]
-    seen = [own for drive in drives if (own := cycle_scatter(drive, band) or period_scatter(drive, band))]
-    squares = [one.square for one in seen]
-    own = f", whose own noise is {number(float(np.sqrt(np.mean(squares))))} rms" if seen else ""
+    drives = tuple(dataclasses.replace(one, output=one.input) for one in campaign.fit_records)
+    drive = estimate_noise(dataclasses.replace(campaign, records=drives))
+    shows = drive.method in ("cycle_scatter", "periods")
+    own = f", whose own noise is {number(drive.sigma)} rms" if shows else ""
     return (
         f"{words}; the response without the drive's harmonics shows {number(known)} rms: the rest is slower, "
         f"or comes through the drive channel{own}"

@@ -14,14 +14,14 @@ from ..._types import check_float64
 from ...models import EndsEstimated, Estimated, Integrator, Isolator, Modelled, as_isolator, find_band
 from ..orbit import ShootingMethod, is_odd, refuse_traced
 from ._arc_length import Stride
-from ._bifurcation_curves import FoldCurve, NeimarkSackerCurve, PeriodDoublingCurve
+from ._bifurcation_curves import CodimensionTwoPoint, FoldCurve, NeimarkSackerCurve, PeriodDoublingCurve
 from ._branch import SpecialPoint
 from ._branch_switching import switch_branch
 from ._continuation import continue_branch, follow_branches, swept_family, tracing_steps
 from ._criticality import BifurcationKind
 from ._extended_system import Polished
 from ._locating import BranchCurves, locate
-from ._orbit_curve import CurveStart, OrbitCurve, Whole
+from ._orbit_curve import CurvePoints, CurveStart, OrbitCurve, Whole
 from ._parameter_family import ParameterFamily
 from ._tracing import room_for
 
@@ -76,10 +76,7 @@ def fold_curve(
     model = as_isolator(model)
     search_for = _Search("fold", (amplitude_range, frequency_range), search, Stride(step, most))
     curve = _curve(model, search_for, start, integrator)
-    followed = curve.follow()
-    found = curve.polished(followed)
-    special = curve.special_points(followed, found)
-    points = curve.numbers(found)
+    followed, points, special = _followed(curve)
     method, closed = curve.method, jnp.array(followed.closed)
 
     def across(isolator: Isolator) -> Array:
@@ -120,10 +117,7 @@ def period_doubling_curve(
     """
     search_for = _Search("period_doubling", (amplitude_range, frequency_range), search, Stride(step, most))
     curve = _curve(as_isolator(model), search_for, start, integrator)
-    followed = curve.follow()
-    found = curve.polished(followed)
-    special = curve.special_points(followed, found)
-    points = curve.numbers(found)
+    followed, points, special = _followed(curve)
     closed, result = jnp.array(followed.closed), followed.result(points.found)
     return PeriodDoublingCurve(*points[:4], special, closed, curve.method.periods, result)
 
@@ -178,6 +172,13 @@ def neimark_sacker_curve(
     closed, result = jnp.array(followed.closed), followed.result(points.found)
     method = curve.method
     return NeimarkSackerCurve(*points[:4], special, closed, method.periods, method.half, result)
+
+
+def _followed(curve: OrbitCurve) -> tuple[Whole, CurvePoints, tuple[CodimensionTwoPoint, ...]]:
+    """Give a curve as followed, its points found anew, and its special points."""
+    followed = curve.follow()
+    found = curve.polished(followed)
+    return followed, curve.numbers(found), curve.special_points(followed, found)
 
 
 _ENDS = ("resonance_1_1", "resonance_1_2")

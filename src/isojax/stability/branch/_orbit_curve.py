@@ -144,8 +144,8 @@ class OrbitCurve(eqx.Module):
                 [jnp.asarray(values) for values in (whole.scale, whole.unknowns[part], whole.tangents[part])]
                 for part in places
             ]
-            parts = [_polish_points(still, room, *row) for row in rows]
-            found = jax.tree.map(lambda *values: np.concatenate(values)[:count], *parts)
+            blocks = [_polish_points(still, room, *row) for row in rows]
+            found = jax.tree.map(lambda *values: np.concatenate(values)[:count], *blocks)
             if np.all(found.complete) or room > MOST_PLACES:
                 return found
             room *= 2

@@ -1,6 +1,6 @@
 """Empty cells of a map tried as single orbits: from their own start, then from the cells beside."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +12,7 @@ from ._batched_newton import FOUND, NOT_CONVERGED, Found, padded, states_at_zero
 from ._map_error import lanes_of
 from ._map_method import MapMethod
 from ._single_orbits import single_orbits
-from ._starts import Candidates
+from ._starts import Candidates, joined
 from ._surface import MapWindow
 
 _TRIED = 128
@@ -26,7 +26,6 @@ _SAME = 1e-5
 
 _STARTS_TOGETHER = 1024
 """Lanes of the compiled step from a start to t = 0."""
-
 
 _NEIGHBOURING = 1e-3
 """Relative difference of the sizes of two motions up to which they are looked at as one."""
@@ -76,10 +75,8 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
         beside = _beside(model, method, window, Cells(candidates, found, split), lost) if attempt else None
         filled = 0
         for some in _blocks(lost.size):
-            push, rate = (
-                window.amplitudes[candidates.force[lost[some]]],
-                window.frequencies[candidates.frequency[lost[some]]],
-            )
+            push = window.amplitudes[candidates.force[lost[some]]]
+            rate = window.frequencies[candidates.frequency[lost[some]]]
             starts = None if beside is None else beside[some]
             got = single_orbits(model, integrator, half, push, rate, starts)
             good = got.code == FOUND
@@ -171,11 +168,6 @@ def _with_every_cell(cells: Cells, shape: tuple[int, int]) -> Cells:
     )
 
 
-def joined(lists: list[Any]) -> Any:
-    """Join lists of orbits."""
-    return type(lists[0])(*(np.concatenate(own) for own in zip(*lists, strict=True)))
-
-
 def _beside(
     model: Isolator, method: MapMethod, window: MapWindow, cells: Cells, lost: Int[np.ndarray, " cell"]
 ) -> Float[np.ndarray, "cell state"]:
@@ -194,11 +186,11 @@ def states_of(
     model: Isolator, method: MapMethod, window: MapWindow, cells: Cells, picked: Int[np.ndarray, " orbit"]
 ) -> Float[np.ndarray, "orbit state"]:
     """Give the states of some orbits at t = 0 of the recorded drive."""
-    parts = []
+    states = []
     for begin in range(0, picked.size, _STARTS_TOGETHER):
         block = picked[begin : begin + _STARTS_TOGETHER]
         lanes = lanes_of(cells.found, cells.candidates, window, padded(block, _STARTS_TOGETHER))
-        parts.append(
+        states.append(
             np.stack(states_at_zero(model, method, lanes._replace(phases=())), axis=-1)[: block.size]
         )
-    return np.concatenate(parts)
+    return np.concatenate(states)

@@ -28,12 +28,12 @@ from ..orbit import Sine, ascending, is_odd, refuse_transformed
 from ._batched_newton import FOUND, NOT_ACCURATE, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
-from ._empty_cells import Cells, fill_empty, joined, without_repeats
+from ._empty_cells import Cells, fill_empty, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
 from ._single_orbits import SingleOrbits
 from ._sought import Sought, seek
-from ._starts import Candidates
+from ._starts import Candidates, joined
 from ._surface import MapWindow
 
 _READING_SHARE = 0.2

@@ -8,6 +8,7 @@ import optimistix as optx
 from jax.sharding import NamedSharding
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
 from ..orbit import (
     Accuracy,
@@ -32,7 +33,7 @@ from ._batched_newton import (
 )
 from ._map_method import MapMethod
 from ._nodes import half_peak_to_peak
-from ._starts import Candidates, PlacedSurface
+from ._starts import Candidates, PlacedSurface, joined
 
 _ORBITS_TOGETHER = 128
 """Orbits found at once."""
@@ -99,19 +100,17 @@ def single_orbits(
     Returns:
         The orbits, each from t = 0 of its recorded drive, without phases of kinks.
     """
-    method, parts = ShootingMethod(integrator, 1, half), []
+    method, orbits = ShootingMethod(integrator, 1, half), []
     for begin in range(0, amplitude.size, _ORBITS_TOGETHER):
         block = [amplitude[begin : begin + _ORBITS_TOGETHER], frequency[begin : begin + _ORBITS_TOGETHER]]
         block += [] if starts is None else [starts[begin : begin + _ORBITS_TOGETHER]]
         count = block[0].size
         values = [jnp.asarray(padded(value, _ORBITS_TOGETHER)) for value in block]
-        parts.append(
-            jax.tree.map(lambda it, count=count: np.asarray(it)[:count], _shoot(model, method, *values))
-        )
-    return Found(*(np.concatenate(own) for own in zip(*parts, strict=True)))
+        orbits.append(Found(*(np.asarray(own)[:count] for own in _shoot(model, method, *values))))
+    return joined(orbits)
 
 
-@eqx.filter_jit
+@quick_jit
 def _shoot(
     model: Isolator, method: ShootingMethod, amplitude: Array, frequency: Array, starts: Array | None = None
 ) -> tuple[Array, ...]:

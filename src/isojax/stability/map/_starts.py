@@ -1,6 +1,6 @@
 """Which orbits of the surface a force holds, and what the surface says of them."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -111,7 +111,19 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexi
         cell = np.flatnonzero(parts >= 0)
         force, column = (places.astype(np.int32) for places in np.divmod(cell, shape[1]))
         lists.append(Candidates(force, column, parts[cell], np.full(cell.size, order, np.int32)))
-    return Candidates(*(np.concatenate(own) for own in zip(*lists, strict=True)))
+    return joined(lists)
+
+
+def joined(lists: list[Any]) -> Any:
+    """Join lists of cells or of orbits.
+
+    Args:
+        lists: named tuples of one kind, of arrays with a leading axis.
+
+    Returns:
+        One such tuple.
+    """
+    return type(lists[0])(*(np.concatenate(own) for own in zip(*lists, strict=True)))
 
 
 def read_surface(

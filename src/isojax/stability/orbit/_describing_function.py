@@ -67,26 +67,28 @@ def imposed_internal(
     def rates(internal: tuple[Lanes, ...], x: Lanes, v: Lanes) -> tuple[Lanes, ...]:
         return model.rates((x, v, *internal), Instant(zero))[2:]
 
-    # Bristles relax within a part of a sample.
-    parts = model.substeps**2
+    # Bristles relax within a fraction of a sample.
+    fractions = model.substeps**2
 
-    def part(
+    def advanced(
         number: int | Array, internal: tuple[Lanes, ...], ends: list[tuple[Lanes, Lanes]]
     ) -> tuple[Lanes, ...]:
         def at(share: Array | float) -> list[Lanes]:
             return [a + share * (b - a) for a, b in zip(*ends, strict=True)]
 
-        k1 = rates(internal, *at(number / parts))
-        half = tuple(s + 0.5 * step / parts * k for s, k in zip(internal, k1, strict=True))
-        k2 = rates(half, *at((number + 0.5) / parts))
-        return tuple(s + step / parts * k for s, k in zip(internal, k2, strict=True))
+        k1 = rates(internal, *at(number / fractions))
+        half = tuple(s + 0.5 * step / fractions * k for s, k in zip(internal, k1, strict=True))
+        k2 = rates(half, *at((number + 0.5) / fractions))
+        return tuple(s + step / fractions * k for s, k in zip(internal, k2, strict=True))
 
     def body(internal: tuple[Lanes, ...], place: Array) -> tuple[tuple[Lanes, ...], tuple[Lanes, ...]]:
         following = (place + 1) % count
         ends = [(displacement[place], velocity[place]), (displacement[following], velocity[following])]
-        if parts == 1:
-            return part(0, internal, ends), internal
-        return jax.lax.fori_loop(0, parts, lambda number, own: part(number, own, ends), internal), internal
+        if fractions == 1:
+            return advanced(0, internal, ends), internal
+        return jax.lax.fori_loop(
+            0, fractions, lambda number, own: advanced(number, own, ends), internal
+        ), internal
 
     start = (zero,) * model.internal_states
     _, along = jax.lax.scan(body, start, jnp.asarray(np.tile(places, _IMPOSED_CYCLES)))
