@@ -87,6 +87,43 @@ def test_bounds_hold_and_draws_that_fail_are_counted(wide):
     assert drawn.curved
     found = ij.uncertainty(wide, lambda m: jnp.where(m[STIFFNESS] > seen * 1.05, jnp.nan, m[STIFFNESS]))
     assert found.failed == pytest.approx(norm.sf(0.5), abs=0.05)
+    # A third of the draws may lie anywhere: the lower end is known no more than the upper one.
+    assert np.isnan(found.interval).all()
+    assert float(found.standard_error) == pytest.approx(0.1 * seen, rel=1e-9)
+    assert "the quantity is not finite" in str(found)
+
+
+def test_a_draw_that_fails_may_lie_anywhere(wide):
+    """A hundredth of the draws fails: the quantiles of the rest are those of 1.5 and 98.5 % of it."""
+    centre = float(wide.model[STIFFNESS])
+
+    def quantity(model):
+        value = jnp.exp(8.0 * model[STIFFNESS] / centre)
+        return jnp.where(value < np.exp(norm.ppf(0.01, 8.0, 0.8)), jnp.nan, value)
+
+    found = ij.uncertainty(wide, quantity, draws=20_000)
+    # All that failed lie low. Taken as low they change nothing there; taken as high they raise the upper end.
+    expected = np.exp(norm.ppf([0.025, 0.985], 8.0, 0.8))
+    np.testing.assert_allclose(found.interval, expected, rtol=0.05)
+
+
+def test_draws_without_a_fold_have_failed_with_the_reason(wide):
+    limit, asked = float(wide.model[STIFFNESS]) * 1.05, []
+
+    def first_fold(model):
+        folds = [model[STIFFNESS]] if bool(model[STIFFNESS] < limit) else []
+        return folds[0]
+
+    found = ij.uncertainty(wide, first_fold, draws=200, progress=asked.append)
+    assert found.failed == pytest.approx(norm.sf(0.5), abs=0.1)
+    assert found.reason == "IndexError: list index out of range"
+    assert len(asked) == 20
+    assert np.isnan(found.draws).sum() == round(200 * found.failed)
+
+
+def test_a_quantity_that_leaves_jax_is_told_how_to_stay(wide):
+    with pytest.raises(ValueError, match=r"`quantity` must be differentiable by `jax.jacfwd`, .*`float`"):
+        ij.uncertainty(wide, lambda model: float(model[STIFFNESS]))
 
 
 def test_fits_that_the_data_do_not_separate_are_mixed_by_their_evidence(wide):
@@ -131,6 +168,10 @@ def test_what_cannot_be_carried_is_refused(wide):
     lost[0] = lost[:, 0] = np.nan
     with pytest.raises(ValueError, match=f"do not determine {wide.free[0]}"):
         ij.uncertainty(wide._replace(covariance=lost), lambda model: model[STIFFNESS])
+    negative = np.array(wide.covariance)
+    negative[0, 0] = -1.0
+    with pytest.raises(ValueError, match=f"variances of 0 or above, but not for {wide.free[0]}"):
+        ij.uncertainty(wide._replace(covariance=negative), lambda model: model[STIFFNESS])
     with pytest.raises(ValueError, match="finite real numbers"):
         ij.uncertainty(wide, lambda model: 1j * model[STIFFNESS])
     with pytest.raises(ValueError, match="`confidence` must lie between 0 and 1"):

@@ -1,5 +1,6 @@
 """Sobol's indices: which share of the variance of a quantity each input causes, over its whole range."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -10,7 +11,7 @@ from scipy import stats
 
 from .._parameters import find_parameter, list_parameters, replace_parameters
 from .._progress import silent
-from .._results import RESULTS, CellResults, cell_results
+from .._results import RESULTS, cell_results
 from .._show import Row, brief, number, shown
 from .._types import check_float64
 from ..models import Isolator
@@ -111,7 +112,8 @@ def global_sensitivity(
         quantity: function that gives real numbers: one, or an array; or a pair of these and a `RESULTS`,
             which then says why a sample failed. With a `model` it is a function of the isolator, as in
             `sensitivity` and `uncertainty`; without, of a dictionary of numbers by the names in `ranges`.
-            Where `jax.vmap` cannot go through it, it is evaluated sample by sample.
+            Where `jax.vmap` cannot go through it, it is evaluated sample by sample; where it raises, the
+            sample has failed.
         ranges: for each input its least and greatest value, between which all are equally likely, or a law
             of `scipy.stats`, such as `stats.norm(value, standard_error)`. With a `model` the names are those
             of its parameters.
@@ -163,10 +165,10 @@ def global_sensitivity(
         value, result = answer if isinstance(answer, tuple) else (answer, None)
         return jnp.asarray(value), result
 
-    values, result = evaluate(at, flat, progress)
+    (values, result), raised = evaluate(at, flat, progress)
     if np.iscomplexobj(values):
         raise ValueError("Argument `quantity` must give real numbers, but gave complex ones.")
-    failed, reason = _failures(values, result)
+    failed, reason = _failures(values, result, raised)
     kept = ~failed.reshape(points.shape[:2]).any(axis=1)
     if not 2 * kept.sum() >= samples:
         raise ValueError(
@@ -243,9 +245,12 @@ def _check_bounds(model: Isolator, names: tuple[str, ...], points: Float[np.ndar
             )
 
 
-def _failures(values: np.ndarray, result: CellResults | Any) -> tuple[np.ndarray, str]:
+def _failures(values: np.ndarray, result: Any, raised: tuple[str, ...]) -> tuple[np.ndarray, str]:
     """Say which samples failed, and why."""
     failed = np.asarray(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
+    messages = Counter(message for message in raised if message)
+    if messages:
+        return failed, messages.most_common(1)[0][0]
     if result is None:
         return failed, "the quantity is not finite" if failed.any() else ""
     outcomes = cell_results(result)

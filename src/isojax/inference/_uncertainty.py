@@ -1,5 +1,6 @@
 """Value, standard error and interval of a quantity of a fitted model."""
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.special import ndtri
 
+from .._progress import silent
 from .._show import Row, brief, shown
 from .._types import check_float64
 from ..models import CoefficientErrors, EndsEstimated, Estimated, Isolator, coefficient_errors
@@ -23,13 +25,17 @@ class UncertainQuantity(NamedTuple):
 
     Attributes:
         value: at the fitted coefficients, in the quantity's own shape.
-        standard_error: by the delta method; where `curved`, standard deviation of the draws.
-        interval: lower and upper end, first axis; where `curved`, quantiles of the draws.
+        standard_error: by the delta method; where `curved`, and the interval is known, standard deviation of
+            the draws.
+        interval: lower and upper end, first axis; where `curved`, quantiles of the draws. A draw that failed
+            may lie anywhere, so it counts as below the lower end and as above the upper one; an end is NaN
+            where that leaves it unknown.
         confidence: chance that the interval is meant to hold the truth.
         curved: where the quantity bends so much within the error of the coefficients that an end of the
             interval by the delta method differs from that by draws by more than a tenth of its width.
         draws: the quantity at coefficients drawn from their normal distribution, draw first.
-        failed: share of the draws that gave no finite number; they count nowhere.
+        failed: share of the draws that gave no finite number.
+        reason: why most of them failed; "" where none did.
         weights: of the fits that the answer rests on, in their order.
     """
 
@@ -40,6 +46,7 @@ class UncertainQuantity(NamedTuple):
     curved: np.ndarray
     draws: Float[np.ndarray, "draw ..."]
     failed: float
+    reason: str = ""
     weights: tuple[float, ...] = (1.0,)
 
     def _headline(self) -> str:
@@ -50,6 +57,9 @@ class UncertainQuantity(NamedTuple):
         shares = ", ".join(f"{weight:.0%}" for weight in self.weights)
         several = f", of {len(self.weights)} fits weighed {shares}" if len(self.weights) > 1 else ""
         return f"{self.confidence:.0%} interval, {len(self.draws)} draws{several}{bent}{lost}"
+
+    def _lines(self) -> list[str]:
+        return [f"Draws failed: {self.reason}"] if self.failed else []
 
     def _rows(self) -> list[Row]:
         flat = [np.ravel(one) for one in (self.value, self.standard_error, *self.interval)]
@@ -66,6 +76,7 @@ def uncertainty(
     confidence: float = 0.95,
     draws: int = 1000,
     seed: int = 0,
+    progress: Callable[[str], None] = silent,
 ) -> UncertainQuantity:
     """Carry the error of a fit into a quantity of its model.
 
@@ -76,10 +87,12 @@ def uncertainty(
     Args:
         fit: a fit, a saved one, or what ends with one: an extension, a closed loop.
         quantity: function of an isolator that gives real numbers: one, or an array. It must be differentiable
-            by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one.
+            by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one; `find_again`
+            lets it go through folds and orbits. A draw where it raises has failed.
         confidence: chance that the interval is to hold the truth.
         draws: how many; at least 100.
         seed: of the draws.
+        progress: receives a line a chunk of draws.
 
     Returns:
         Value, standard error and interval; of several fits the value is that of the best.
@@ -114,13 +127,14 @@ def uncertainty(
     weights = _evidence(fits) if len(fits) > 1 else np.ones(1)
     counts = np.maximum(np.round(weights * draws), weights == weights.max()).astype(int)
     parts = [
-        _carried(coefficient_errors(fits[place]), quantity, int(counts[place]), seed + int(place))
+        _carried(coefficient_errors(fits[place]), quantity, int(counts[place]), seed + int(place), progress)
         for place in np.argsort(-weights, kind="stable")
         if counts[place]
     ]
-    value, error, _ = parts[0]
+    value, error, _, _ = parts[0]
     drawn = np.concatenate([part[2] for part in parts])
     finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
+    raised = Counter(reason for part in parts for reason in part[3] if reason)
     if not finite.any():
         raise ValueError(
             "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
@@ -128,26 +142,33 @@ def uncertainty(
     half = 0.5 * (1.0 - confidence)
     spread = -float(ndtri(half)) * error
     straight = np.stack([value - spread, value + spread])
-    ends = np.quantile(drawn[finite], [half, 1.0 - half], axis=0)
-    curved = np.max(np.abs(ends - straight), axis=0) > _BEND * 2.0 * spread
+    ends = np.stack([_quantile(drawn, half), _quantile(drawn, 1.0 - half)])
+    curved = ~(np.max(np.abs(ends - straight), axis=0) <= _BEND * 2.0 * spread)
     # The delta method knows one law.
     curved = np.asarray(curved | (len(fits) > 1))
     return UncertainQuantity(
         value,
-        np.where(curved, np.std(drawn[finite], axis=0), error),
+        np.where(curved & np.isfinite(ends).all(axis=0), np.std(drawn[finite], axis=0), error),
         np.where(curved, ends, straight),
         confidence,
         curved,
         drawn,
         float(1.0 - finite.mean()),
+        "" if finite.all() else raised.most_common(1)[0][0] if raised else "the quantity is not finite",
         tuple(weights.tolist()),
     )
 
 
 def _carried(
-    errors: CoefficientErrors, quantity: Callable[[Isolator], Any], draws: int, seed: int
-) -> tuple[Float[np.ndarray, "..."], Float[np.ndarray, "..."], Float[np.ndarray, "draw ..."]]:
-    """Give value, standard error by the delta method, and draws of the quantity of one fit."""
+    errors: CoefficientErrors,
+    quantity: Callable[[Isolator], Any],
+    draws: int,
+    seed: int,
+    progress: Callable[[str], None],
+) -> tuple[
+    Float[np.ndarray, "..."], Float[np.ndarray, "..."], Float[np.ndarray, "draw ..."], tuple[str, ...]
+]:
+    """Give value, standard error by the delta method, draws of the quantity, and why some raised."""
 
     def at(steps: Float[Array, " step"]) -> Array:
         return jnp.asarray(quantity(errors.moved(steps)))
@@ -159,8 +180,15 @@ def _carried(
             f"{brief(value)}."
         )
     error = np.asarray(np.linalg.norm(np.asarray(change), axis=-1))
-    drawn = np.asarray(evaluate(at, errors.draw(draws, seed)), dtype=float)
-    return np.asarray(value, dtype=float), error, drawn
+    drawn, raised = evaluate(at, errors.draw(draws, seed), progress)
+    return np.asarray(value, dtype=float), error, np.asarray(drawn, dtype=float), raised
+
+
+def _quantile(drawn: Float[np.ndarray, "draw ..."], chance: float) -> Float[np.ndarray, "..."]:
+    """Give a quantile of draws, those that failed taken to lie beyond it; NaN where it is one of these."""
+    lost, method = (-np.inf, "lower") if chance < 0.5 else (np.inf, "higher")
+    found = np.quantile(np.where(np.isfinite(drawn), drawn, lost), chance, axis=0, method=method)
+    return np.where(np.isfinite(found), found, np.nan)
 
 
 def _evidence(fits: list[Any]) -> Float[np.ndarray, " fit"]:

@@ -102,13 +102,22 @@ class CoefficientErrors(NamedTuple):
 
         Returns:
             Both.
+
+        Raises:
+            ValueError: if JAX cannot differentiate the quantity.
         """
 
         def twice(steps: Array) -> tuple[Array, Array]:
             value = jnp.asarray(quantity(self.moved(steps)))
             return value, value
 
-        change, value = jax.jacfwd(twice, has_aux=True)(jnp.zeros(self.steps))
+        try:
+            change, value = jax.jacfwd(twice, has_aux=True)(jnp.zeros(self.steps))
+        except jax.errors.JAXTypeError as problem:
+            raise ValueError(
+                "Argument `quantity` must be differentiable by `jax.jacfwd`, but makes a traced number "
+                "a plain one, as `float`, `if` and NumPy do. Use `jax.numpy` throughout."
+            ) from problem
         return value, change
 
     def inside(self, steps: Float[np.ndarray, "draw step"]) -> Bool[np.ndarray, " draw"]:
@@ -183,7 +192,13 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
                 f"{', '.join(other) or 'its elements'}."
             )
     covariance = np.asarray(held.covariance, dtype=float)
-    size = np.sqrt(np.diag(covariance))
+    variances = np.diag(covariance)
+    negative = [name for name, one in zip(held.free, variances, strict=True) if one < 0.0]
+    if negative:
+        raise ValueError(
+            f"Argument `fit` must have variances of 0 or above, but not for {', '.join(negative)}."
+        )
+    size = np.sqrt(variances)
     lost = [name for name, one in zip(held.free, size, strict=True) if not np.isfinite(one)]
     if lost:
         raise ValueError(

@@ -12,12 +12,12 @@ from ...models import Isolator, Modelled, as_isolator
 from ..branch import BifurcationKind, ParameterFamily, PointGuess, SpecialPoint, special_point
 from ..map import StabilityMap, found_again
 from ..orbit import Orbit, find_periodic_orbit
-from ..response import Resonance, resonance_near
+from ..response import Resonance, Transmissibility, resonance_near, transmissibility_again
 
 _MOVED_WITHIN = 1.0
 """Share of the range of its branch by which a bifurcation may move: it does so with the model."""
 
-Answer = TypeVar("Answer", Orbit, SpecialPoint, StabilityMap, Resonance)
+Answer = TypeVar("Answer", Orbit, SpecialPoint, StabilityMap, Resonance, Transmissibility)
 
 
 def find_again(
@@ -27,15 +27,16 @@ def find_again(
     amplitude: Scalar | float | None = None,
     frequency: Scalar | float | None = None,
 ) -> Answer:
-    """Find a known orbit, bifurcation, resonance or map again for a model close by.
+    """Find a known orbit, bifurcation, resonance, transmissibility or map again for a model close by.
 
     From the known one by Newton's method, so that the shape of the answer is known beforehand: `jax.jit`,
     `jax.vmap`, `jax.jacfwd` and `jax.grad` go through, also where those that found it in the first place
     refuse. What vanishes on the way, as an orbit does past its fold, is NaN.
 
     Args:
-        answer: an orbit; a special point of a branch, such as a fold; a resonance; or a map, of which each
-            cell is found again. Its numbers must be known: find it outside what JAX transforms.
+        answer: an orbit; a special point of a branch, such as a fold; a resonance; a transmissibility; or a
+            map, of which each cell is found again. Its numbers must be known: find it outside what JAX
+            transforms.
         model: the isolator, with the same elements; its numbers may be traced.
         amplitude: of the drive, in place of that of the answer [N, or m/s^2 for base excitation].
         frequency: of the drive, in place of that of the answer [Hz].
@@ -44,7 +45,7 @@ def find_again(
         The answer for this model.
 
     Raises:
-        ValueError: if `answer` is none of the four or is traced, or a drive is given that it solves for or
+        ValueError: if `answer` is none of these or is traced, or a drive is given that it solves for or
             that differs from cell to cell.
         RuntimeError: if JAX is not in 64-bit mode.
 
@@ -66,11 +67,12 @@ def find_again(
         SpecialPoint: _special_point,
         StabilityMap: _map,
         Resonance: _resonance,
+        Transmissibility: _transmissibility,
     }
     if type(answer) not in finders:
         raise ValueError(
-            "Argument `answer` must be an orbit, a special point, a resonance or a map, but is of type "
-            f"{type(answer).__name__}."
+            "Argument `answer` must be an orbit, a special point, a resonance, a transmissibility or a map, "
+            f"but is of type {type(answer).__name__}."
         )
     if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(answer)):
         raise ValueError(
@@ -134,3 +136,11 @@ def _resonance(resonance: Resonance, model: Isolator, amplitude: Any, frequency:
     push = as_float64(orbit.excitation.amplitude if amplitude is None else amplitude)
     half = _closed_by_half(orbit)
     return resonance_near(model, push, orbit.y0, resonance.frequency, half, resonance.integrator)
+
+
+def _transmissibility(
+    curve: Transmissibility, model: Isolator, amplitude: Any, frequency: Any
+) -> Transmissibility:
+    if frequency is not None:
+        raise ValueError(f"Argument `frequency` must be omitted for a transmissibility, but is {frequency}.")
+    return transmissibility_again(curve, model, None if amplitude is None else as_float64(amplitude))

@@ -19,7 +19,8 @@ def refuse_traced(*values: object) -> None:
         raise ValueError(
             "Argument `model` must hold known numbers, because how many points a curve has depends on them, "
             "but it is being traced. Call outside jax.jit and jax.vmap (jax.jacfwd and jax.grad work); under "
-            "them, `isojax.find_again` finds a known orbit, bifurcation, resonance or map again."
+            "them, `isojax.find_again` finds a known orbit, bifurcation, resonance, "
+            "transmissibility or map again."
         )
 
 

@@ -21,3 +21,4 @@ from ._response_bands import ResponseCurve as ResponseCurve
 from ._response_bands import response_bands as response_bands
 from ._transmissibility import Transmissibility as Transmissibility
 from ._transmissibility import transmissibility as transmissibility
+from ._transmissibility import transmissibility_again as transmissibility_again

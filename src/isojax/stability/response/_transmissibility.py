@@ -1,5 +1,6 @@
 """What passes through the isolator: force to the ground, or motion from it."""
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -23,7 +24,7 @@ from ...models import (
     as_isolator,
     find_band,
 )
-from ..map import StabilityMap, stability_map
+from ..map import StabilityMap, found_again, stability_map
 from ..orbit import Sine, ascending, period_map, recorded_sine, refuse_traced, trajectory, value_and_jacobian
 from ._frequency_response import fundamental
 
@@ -44,6 +45,7 @@ class Transmissibility(eqx.Module):
         peak: of half the peak-to-peak values, the harmonics included: of the forces, or of the displacements.
         spectral_radius: of each orbit; constant to JAX: `sensitivity` of a map has its derivatives.
         result: whether the orbit was found; beside NaN, why not.
+        orbits: the map of one row that holds the orbits.
         band: of the magnitude, where a fit was given.
     """
 
@@ -53,6 +55,7 @@ class Transmissibility(eqx.Module):
     peak: Float[Array, "*orbit frequency"]
     spectral_radius: Float[Array, "*orbit frequency"]
     result: RESULTS
+    orbits: StabilityMap
     band: Band | None = None
 
     @property
@@ -123,32 +126,57 @@ def transmissibility(
     if held.ndim or not np.isfinite(held) or not held > 0.0:
         raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
     orbits = stability_map(frozen(model), held[None], grid, coexisting=coexisting, integrator=integrator)
-    starts = orbits.y0[..., 0, :, :]
-    ratio, peak = _passed(model, force, orbits, starts)
 
     def curve(isolator: Isolator) -> Array:
-        return jnp.abs(_passed(isolator, force, orbits, starts)[0])[None]
+        return jnp.abs(_of_orbits(isolator, force, orbits).ratio)[None]
 
     band = None if fit is None else find_band(fit, model, ("magnitude",), curve)
+    return dataclasses.replace(_of_orbits(model, force, orbits), band=band)
+
+
+def transmissibility_again(
+    known: Transmissibility, model: Isolator, amplitude: Float[Array, ""] | None = None
+) -> Transmissibility:
+    """Find the orbits of a curve again for another model, and what they pass on.
+
+    Args:
+        known: the curve, of known numbers.
+        model: the isolator; traced or not.
+        amplitude: of the recorded drive; that of the curve if omitted [N, or m/s^2 for base excitation].
+
+    Returns:
+        The transmissibility, without a band.
+    """
+    force = known.amplitude if amplitude is None else amplitude
+    orbits = found_again(known.orbits, model, force - known.amplitude)
+    return _of_orbits(model, force, orbits)
+
+
+def _of_orbits(model: Isolator, force: Float[Array, ""], orbits: StabilityMap) -> Transmissibility:
+    """Give what the orbits pass on, with derivatives by `model` and `force`, near which they were found."""
+    starts, grid = orbits.y0[..., 0, :, :], orbits.frequencies
+    ratio, peak = _passed(model, force, grid, starts, orbits.integrator, orbits.symmetric)
     result = jax.tree.map(lambda values: values[..., 0, :], orbits.result)
     radius = orbits.spectral_radius[..., 0, :]
-    return Transmissibility(force, jnp.asarray(grid), ratio, peak, radius, result, band)
+    return Transmissibility(force, grid, ratio, peak, radius, result, orbits)
 
 
 @quick_jit
 def _passed(
     model: Isolator,
     amplitude: Float[Array, ""],
-    orbits: StabilityMap,
+    frequencies: Float[Array, " frequency"],
     y0: Float[Array, "*orbit frequency state"],
+    integrator: Integrator,
+    half: bool,
 ) -> tuple[Complex[Array, "*orbit frequency"], Float[Array, "*orbit frequency"]]:
     shape = y0.shape[:-1]
-    frequency = jnp.broadcast_to(orbits.frequencies, shape).ravel()
+    frequency = jnp.broadcast_to(frequencies, shape).ravel()
     # From the phase zero of the recorded drive: one that moved with the orbit would move the steps along it.
     drive = recorded_sine(model, jnp.broadcast_to(amplitude, frequency.shape), frequency)
     drive = drive._replace(cosine=jnp.broadcast_to(jnp.asarray(drive.cosine), frequency.shape))
-    state = _closed(model, orbits, drive, y0.reshape(-1, y0.shape[-1]))
-    path = trajectory(model, orbits.integrator, drive, tuple(state.T))
+    state = _closed(model, integrator, half, drive, y0.reshape(-1, y0.shape[-1]))
+    path = trajectory(model, integrator, drive, tuple(state.T))
     turn = 2.0 * np.pi / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
     at = jax.vmap(drive.at)(jnp.asarray(np.sin(turn)), jnp.asarray(np.cos(turn)))
     acted, _ = model.drive(at)
@@ -166,14 +194,13 @@ def _passed(
 
 
 def _closed(
-    model: Isolator, orbits: StabilityMap, drive: Sine, start: Float[Array, "lane state"]
+    model: Isolator, integrator: Integrator, half: bool, drive: Sine, start: Float[Array, "lane state"]
 ) -> Float[Array, "lane state"]:
     """Close each orbit to machine precision: only there do its equations have the derivative of the orbit."""
-    half = orbits.symmetric
 
     def lane(sine: Array, cosine: Array, frequency: Array, state: Array) -> Array:
         live = model, Sine(sine, cosine, frequency)
-        held = orbits.integrator, half
+        held = integrator, half
 
         def closing(_: Array | int, here: Array) -> Array:
             left, slope = value_and_jacobian(lambda it: _open_end(it, frozen(live), held)[0], here)
