@@ -26,17 +26,17 @@ class Fitted(NamedTuple):
     result: ij.RESULTS
 
 
-def scaled_map(model, force, frequencies):
-    """Mass and every coefficient grow together by 2 % of standard deviation: all forces grow with them."""
+def scaled_map(model, force, frequencies, share=SHARE):
+    """Mass and every coefficient grow together by a standard deviation: all forces grow with them."""
     numbers = {entry.name: float(entry.value) for entry in PAPER.parameters}
-    covariance = SHARE**2 * np.outer(list(numbers.values()), list(numbers.values()))
+    covariance = share**2 * np.outer(list(numbers.values()), list(numbers.values()))
     fit = Fitted(model, tuple(numbers), covariance, SUCCESS)
     return ij.stability_map(model, force, np.array(frequencies), fit=fit)
 
 
-def scaled_folds(force, frequency):
+def scaled_folds(force, frequency, share=SHARE):
     upper, lower = FOLDS[frequency]
-    return norm.cdf((force / lower - 1.0) / SHARE) - norm.cdf((force / upper - 1.0) / SHARE)
+    return norm.cdf((force / lower - 1.0) / share) - norm.cdf((force / upper - 1.0) / share)
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +51,16 @@ def test_the_chance_of_several_orbits_is_that_of_the_scaled_folds(smap):
         found = np.asarray(smap.probability_coexisting)[:, column]
         # At 4 Hz, beside the cusp, the lens is 0.36 N high, a third of a cell.
         np.testing.assert_allclose(found, expected, atol=0.01)
+    assert smap.chance_error < 0.01
+    assert "chances off by" in str(smap)
+
+
+def test_a_chance_that_is_off_says_so():
+    """Where the error of the forces is a fifth, quadratics between the maps no longer hold."""
+    found = scaled_map(PAPER, np.linspace(100.0, 320.0, 111), [4.2], share=0.2)
+    force, several = np.asarray(found.amplitudes), np.asarray(found.probability_coexisting)[:, 0]
+    off = np.nanmax(np.abs(several - scaled_folds(force, 4.2, share=0.2)))
+    assert max(off, 0.02) < found.chance_error < 0.2
 
 
 def test_so_it_is_where_the_lens_is_lower_than_a_row():

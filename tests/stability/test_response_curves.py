@@ -177,6 +177,21 @@ def test_derivative_of_transmissibility_is_the_textbooks():
 
 
 @pytest.mark.slow
+def test_found_again_it_is_the_textbooks_under_vmap():
+    band, dampers = np.array([0.5, 0.9, 1.6]), jnp.array([0.6, 1.0])
+    known = ij.transmissibility(LINEAR, 1.5, band)
+
+    def again(damper):
+        return ij.find_again(known, LINEAR.replace(linear_damping__coefficient=damper), amplitude=3.0).ratio
+
+    omega = TURN * band
+    through = 50.0 + 1j * omega * np.asarray(dampers)[:, None]
+    expected = through / (through - 2.0 * omega**2)
+    np.testing.assert_allclose(jax.jit(jax.vmap(again))(dampers), expected, rtol=3e-6)
+    with pytest.raises(ValueError, match=r"`frequency` must be omitted for a transmissibility, but is 1\.0"):
+        ij.find_again(known, LINEAR, frequency=1.0)
+
+
 def test_derivatives_of_transmissibility_at_resonance_are_those_of_differences():
     band, model = np.array([4.9, 5.0, 5.1]), ij.paper.y_direction()
 

@@ -47,7 +47,7 @@ def map_arrays(smap: StabilityMap) -> dict[str, np.ndarray]:
         `result_words`, and `model` what `save_model` writes.
     """
     arrays = {name: np.asarray(getattr(smap, name)) for name in _ARRAYS}
-    for name in ("probability_stable", "probability_coexisting"):
+    for name in ("probability_stable", "probability_coexisting", "chance_error"):
         if getattr(smap, name) is not None:
             arrays[name] = np.asarray(getattr(smap, name))
     for name, error in (smap.standard_errors or {}).items():

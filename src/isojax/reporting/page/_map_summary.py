@@ -110,6 +110,8 @@ def _chance_words(smap: StabilityMap) -> str:
         sure = int(np.sum(values >= 1.0 - _IN_DOUBT))
         doubtful = int(np.sum((values > _IN_DOUBT) & (values < 1.0 - _IN_DOUBT)))
         words.append(f"{name}: at least 95 % in {sure} cells, uncertain in {doubtful}")
+    if smap.chance_error is not None and np.isfinite(smap.chance_error):
+        words.append(f"a chance near a half is off by at most about {smap.chance_error:.2g}")
     return "; ".join(words)
 
 

@@ -41,6 +41,10 @@ _SAME, _FLAT = 1e-9, 0.2
 """Difference of log displacement below which two orbits are one; slope of log force over log displacement
 below which the determinant knows it better than a spline."""
 
+_SHARE_OF_DOUBT = 1.0 / (2.0**1.5 * np.pi)
+"""Of a normal boundary that is misplaced by a small `d`: the error of the chance at its median,
+`d / (s sqrt(2 pi))`, over `d` as a share of the integral of `P (1 - P)`, which is `s / sqrt(pi)`."""
+
 DRAWS = 512
 """Draws of the coefficients: quasi-random, so that their chances scatter by less than 0.01."""
 
@@ -52,11 +56,14 @@ class Chances(NamedTuple):
         stable: chance that a cell holds no unstable orbit.
         coexisting: chance that it holds several orbits.
         standard_errors: of `response` and `spectral_radius` of each orbit; NaN where not every map has it.
+        error: of a chance near a half, at most, on average over the map: what one map more shows, of a draw
+            that moves all coefficients at once; NaN where no chance is in doubt.
     """
 
     stable: Float[np.ndarray, "amplitude frequency"]
     coexisting: Float[np.ndarray, "amplitude frequency"]
     standard_errors: Mapping[str, Float[np.ndarray, "orbit amplitude frequency"]]
+    error: float
 
 
 def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarray, "draw step"]:
@@ -107,16 +114,14 @@ def find_chances(
             away = np.zeros(errors.steps)
             away[place] = sign * _REACH
             found.append(find(errors.moved(jnp.asarray(away)), wide))
+    # One draw of the usual length, which no map of one step knows of, tells how good the chances are.
+    check = int(np.argmin(np.abs(np.linalg.norm(steps, axis=1) - errors.steps**0.5)))
+    found.append(find(errors.moved(jnp.asarray(steps[check])), wide))
     maps = [smap for smap, _ in found]
-    along = steps / _REACH
-    # The quadratic through three nodes of each step.
-    sides = np.stack([0.5 * along * (along + 1.0), 0.5 * along * (along - 1.0)], axis=-1).reshape(
-        len(steps), -1
-    )
-    weights = np.concatenate([1.0 - np.sum(along**2, axis=1, keepdims=True), sides], axis=1)
+    weights = _weights(steps)
     forces, still = np.log(amplitudes), np.log(np.asarray(maps[0].response))[:, inner]
     shape = (forces.size, maps[0].frequencies.size)
-    stable, coexisting = np.ones(shape), np.zeros(shape)
+    stable, coexisting, wrong = np.ones(shape), np.zeros(shape), np.zeros((2, *shape))
     read = np.all([sought.read_columns for _, sought in found], axis=0)
     of_maps = [] if read.all() else [_MapOrbits(one) for one in maps]
     for column in range(shape[1]):
@@ -131,11 +136,24 @@ def find_chances(
         grid = _in_doubt(known, np.linspace(low, high, _DISPLACEMENTS))
         if grid.size:
             table = _tables(known, grid)
-            stable[:, column], coexisting[:, column] = _counted(weights, table, forces)
+            stable[:, column], coexisting[:, column] = _counted(weights, table[:, :-1], forces)
+            told = _counted(weights[check][None], table[:, :-1], forces)
+            wrong[..., column] = np.abs(np.subtract(told, _counted(np.ones((1, 1)), table[:, -1:], forces)))
         least, most = known[0].response(np.array([low, high]))
         beyond = np.any((still[..., column] < least) | (still[..., column] > most), axis=0)
         stable[beyond, column] = coexisting[beyond, column] = np.nan
-    return Chances(stable, coexisting, _standard_errors(maps, inner))
+    doubt = np.nansum(stable * (1.0 - stable) + coexisting * (1.0 - coexisting))
+    error = _SHARE_OF_DOUBT * wrong[:, np.isfinite(stable)].sum() / doubt if doubt > 0.0 else np.nan
+    return Chances(stable, coexisting, _standard_errors(maps[:-1], inner), float(error))
+
+
+def _weights(steps: Float[np.ndarray, "draw step"]) -> Float[np.ndarray, "draw map"]:
+    """Give the weights of the maps in each draw: of the quadratic through three nodes of each step."""
+    along = steps / _REACH
+    sides = np.stack([0.5 * along * (along + 1.0), 0.5 * along * (along - 1.0)], axis=-1)
+    return np.concatenate(
+        [1.0 - np.sum(along**2, axis=1, keepdims=True), sides.reshape(len(steps), -1)], axis=1
+    )
 
 
 class _Column(NamedTuple):

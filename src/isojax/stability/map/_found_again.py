@@ -123,6 +123,7 @@ def found_again(
         probability_stable=None,
         probability_coexisting=None,
         standard_errors=None,
+        chance_error=None,
     )
 
 

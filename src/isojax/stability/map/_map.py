@@ -78,6 +78,8 @@ class StabilityMap(eqx.Module):
         probability_coexisting: chance that the cell holds several orbits, where a fit was given.
         standard_errors: of `response` and `spectral_radius` of each orbit, where a fit was given; NaN where
             orbits may appear or vanish.
+        chance_error: of a chance near a half, at most, on average over the map, where a fit was given: what a
+            map of one draw of all coefficients shows. Where it is large, map drawn models and count.
     """
 
     model: Isolator
@@ -99,6 +101,7 @@ class StabilityMap(eqx.Module):
     probability_stable: Float[Array, "amplitude frequency"] | None = None
     probability_coexisting: Float[Array, "amplitude frequency"] | None = None
     standard_errors: Mapping[str, Float[Array, "*orbit amplitude frequency"]] | None = None
+    chance_error: float | None = None
 
     @property
     def stable(self) -> Array:
@@ -147,11 +150,13 @@ class StabilityMap(eqx.Module):
         rows = np.unique(np.linspace(0, forces.size - 1, min(_ROWS, forces.size)).round().astype(int))
         columns = np.unique(np.linspace(0, band.size - 1, min(_COLUMNS, band.size)).round().astype(int))
         drawn = [f"  {forces[row]:>10.4g} |{''.join(marks[row, columns])}" for row in rows[::-1]]
+        chances = "" if self.chance_error is None else f"  chances off by at most {self.chance_error:.2g}"
         return [
             *drawn,
             f"  {'F0':>10} +{'-' * columns.size}",
             f"  {'f [Hz]':>10}  {band[0]:.4g} to {band[-1]:.4g}",
             "  . one stable orbit, x one unstable orbit, 2 to 9 coexisting orbits, ? none found",
+            *([chances] if chances else []),
         ]
 
 
@@ -192,7 +197,8 @@ def stability_map(
         progress: called with a line now and then.
         devices: devices to spread each chunk over; all of this process if omitted.
         fit: with whose errors each cell is given its chances; `model` is its model. None for none. That takes
-            two more maps an independent step of its covariance, and as long again as two.
+            two more maps an independent step of its covariance, one more to check them, and as long again as
+            two.
 
     Returns:
         The map. Where nothing converged the numbers are NaN and `result` says why.
@@ -238,12 +244,18 @@ def stability_map(
     orbits = smap.response.shape[0]
     own = slice(orbits) if coexisting else 0
     return eqx.tree_at(
-        lambda one: (one.probability_stable, one.probability_coexisting, one.standard_errors),
+        lambda one: (
+            one.probability_stable,
+            one.probability_coexisting,
+            one.standard_errors,
+            one.chance_error,
+        ),
         smap,
         (
             jnp.asarray(chances.stable),
             jnp.asarray(chances.coexisting),
             {name: jnp.asarray(error[own]) for name, error in chances.standard_errors.items()},
+            chances.error,
         ),
         is_leaf=lambda one: one is None,
     )
