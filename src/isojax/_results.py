@@ -23,6 +23,7 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "much. It grazes a stop or turns where friction all but holds it. Try more steps in `Integrator`, "
         "or a drive a little beside this one."
     )
+    no_further_orbit = "The cell holds no further orbit; others have more."
     not_finite = (
         "The simulated response left every bound (it is not finite). Try a smaller step, or a start whose "
         "stiffness and damping stay positive over the motion that was measured."

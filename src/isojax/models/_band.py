@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from scipy.special import ndtri
 
 from .._show import Row, brief, shown
-from ._coefficient_errors import EndsEstimated, Estimated, coefficient_errors
+from ._coefficient_errors import CoefficientErrors
 from ._isolator import Isolator
 
 CONFIDENCE = 0.95
@@ -48,8 +48,7 @@ class Band(eqx.Module):
 
 
 def find_band(
-    fit: Estimated | EndsEstimated,
-    model: Isolator,
+    errors: CoefficientErrors,
     names: tuple[str, ...],
     curve: Callable[[Isolator], Float[Array, "quantity ..."]],
     *,
@@ -58,19 +57,15 @@ def find_band(
     """Carry the error of a fit into a curve of its model.
 
     Args:
-        fit: the fit.
-        model: its isolator.
+        errors: of the coefficients. Take them before the curve is worked out: a fit that has none is refused.
         names: of the quantities of the curve.
         curve: gives these quantities for an isolator, differentiable by `jax.jacfwd`.
         across: whether there are two quantities, and each point moves across the curve through them.
 
     Returns:
         The band.
-
-    Raises:
-        ValueError: if the fit failed, leaves a coefficient undetermined, or is of another model.
     """
-    values, change = (np.asarray(one) for one in coefficient_errors(fit, model).carry(curve))
+    values, change = (np.asarray(one) for one in errors.carry(curve))
     return band_around(names, values, change, across=across)
 
 

@@ -175,8 +175,8 @@ def _captions(bands: ResponseBands, measured: tuple[MeasuredResponse, ...]) -> t
     worst = max((float(np.max(np.abs(one - 1.0))) for one in departures), default=0.0)
     if worst > _VARIES:
         response += (
-            f" The measured drive departs from its level by up to {100.0 * worst:.0f} %, and so do the "
-            "dwells from their curve."
+            f" The measured drive departs from its level by up to {100.0 * worst:.0f} %, so that dwells lie "
+            "off their curve, and further off where the response is steep."
         )
     passes = (
         "Absolute motion over that of the base" if based else "Force on the ground over the force on the mass"

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..._results import is_successful
 from ...identification import Fit
-from ...models import Band, Isolator, find_band
+from ...models import Band, Isolator, coefficient_errors, find_band
 from ...records import Record, measured_state
 from ._draw_band import PALE
 from ._force_cycles import trace_cycles
@@ -157,7 +157,8 @@ def force_band(fit: Fit, grid: Float[np.ndarray, " point"], what: Slice) -> Band
     Raises:
         ValueError: if the fit failed or leaves a coefficient undetermined.
     """
-    return find_band(fit, fit.model, ("force",), lambda model: _force_along(model, grid, what)[None])
+    errors = coefficient_errors(fit)
+    return find_band(errors, ("force",), lambda model: _force_along(model, grid, what)[None])
 
 
 def effect_on_its_own(model: Isolator, effect: str) -> Isolator:

@@ -11,7 +11,16 @@ from jaxtyping import Array
 from ..._implicit import frozen
 from ..._results import is_successful
 from ..._types import check_float64
-from ...models import EndsEstimated, Estimated, Integrator, Isolator, Modelled, as_isolator, find_band
+from ...models import (
+    EndsEstimated,
+    Estimated,
+    Integrator,
+    Isolator,
+    Modelled,
+    as_isolator,
+    coefficient_errors,
+    find_band,
+)
 from ..orbit import ShootingMethod, is_odd, refuse_traced
 from ._arc_length import Stride
 from ._bifurcation_curves import CodimensionTwoPoint, FoldCurve, NeimarkSackerCurve, PeriodDoublingCurve
@@ -74,6 +83,7 @@ def fold_curve(
         True
     """
     model = as_isolator(model)
+    errors = None if fit is None else coefficient_errors(fit, model)
     search_for = _Search("fold", (amplitude_range, frequency_range), search, Stride(step, most))
     curve = _curve(model, search_for, start, integrator)
     followed, points, special = _followed(curve)
@@ -85,7 +95,7 @@ def fold_curve(
         return jnp.stack([own.frequency, own.amplitude])
 
     names = ("frequency", "amplitude")
-    band = None if fit is None else find_band(fit, model, names, across, across=True)
+    band = None if errors is None else find_band(errors, names, across, across=True)
     result = followed.result(points.found)
     return FoldCurve(*points[:4], special, closed, method.periods, method.half, result, band)
 

@@ -36,7 +36,7 @@ _WIDE = {"xla_cpu_prefer_vector_width": 512}
 WHOLE_STEPS = 4
 """Times the steps of orbits that are not split at kinks."""
 
-FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE = 0, 1, 2, 3
+FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE, NO_FURTHER_ORBIT = range(5)
 """Codes of how the search in a cell ended."""
 
 

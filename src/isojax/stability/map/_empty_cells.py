@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
 from ...models import Integrator, Isolator
-from ._batched_newton import FOUND, NOT_CONVERGED, Found, padded, states_at_zero
+from ._batched_newton import FOUND, NO_FURTHER_ORBIT, NOT_CONVERGED, Found, padded, states_at_zero
 from ._map_error import lanes_of
 from ._map_method import MapMethod
 from ._single_orbits import single_orbits
@@ -132,7 +132,7 @@ def without_repeats(
     same = np.all(np.abs(first - second) <= _SAME * scale.T, axis=1)
     gone = np.maximum(*pairs)[same]
     found = Found(*(np.array(values) for values in found))
-    found.code[gone] = NOT_CONVERGED
+    found.code[gone] = NO_FURTHER_ORBIT
     for values in (found.states, found.multipliers, found.radius, found.response):
         values[gone] = np.nan
     return Cells(candidates, found, split)

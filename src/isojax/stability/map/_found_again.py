@@ -1,6 +1,7 @@
 """The cells of a map found again for another model: pure JAX, so that every transformation goes through."""
 
 import dataclasses
+import functools
 from typing import NamedTuple
 
 import diffrax
@@ -104,7 +105,8 @@ def found_again(
         blank = _put(blank, places, found._replace(phases=phases[places]))
     radius = modulus(blank.multipliers[:, 0]).reshape(shape)
     good = blank.found.reshape(shape)
-    ending = _ending
+    # A place that held no orbit holds none now.
+    ending = functools.partial(_ending, len(shape) == 3)
     for _ in shape:
         ending = jax.vmap(ending)
     return dataclasses.replace(
@@ -119,7 +121,7 @@ def found_again(
         phases=blank.phases.reshape(smap.phases.shape),
         response=blank.response.reshape(shape),
         count=jnp.sum(good, axis=0) if len(shape) == 3 else good.astype(int),
-        result=ending(good),
+        result=ending(good, jnp.asarray(held).reshape(shape)),
         probability_stable=None,
         probability_coexisting=None,
         standard_errors=None,
@@ -127,8 +129,11 @@ def found_again(
     )
 
 
-def _ending(good: Bool[Array, ""]) -> RESULTS:
-    return RESULTS.where(good, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
+def _ending(coexisting: bool, good: Bool[Array, ""], held: Bool[Array, ""]) -> RESULTS:
+    failed = RESULTS.not_converged
+    if coexisting:
+        failed = RESULTS.where(held, failed, RESULTS.no_further_orbit)
+    return RESULTS.where(good, RESULTS.promote(diffrax.RESULTS.successful), failed)
 
 
 def _put(cells: _Cells, places: np.ndarray, found: _Cells) -> _Cells:

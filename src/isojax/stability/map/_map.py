@@ -25,7 +25,16 @@ from ...models import (
     coefficient_errors,
 )
 from ..orbit import Sine, ascending, is_odd, refuse_transformed
-from ._batched_newton import FOUND, NOT_ACCURATE, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
+from ._batched_newton import (
+    FOUND,
+    NO_FURTHER_ORBIT,
+    NOT_ACCURATE,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    CellSolver,
+    Found,
+    states_at_zero,
+)
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._empty_cells import Cells, fill_empty, without_repeats
@@ -344,6 +353,7 @@ def _ending(code: Array) -> RESULTS:
     """Give the outcome that a code of the search stands for."""
     failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
     failed = RESULTS.where(code == NOT_ACCURATE, RESULTS.not_accurate, failed)
+    failed = RESULTS.where(code == NO_FURTHER_ORBIT, RESULTS.no_further_orbit, failed)
     return RESULTS.where(code == FOUND, RESULTS.promote(diffrax.RESULTS.successful), failed)
 
 
@@ -372,6 +382,8 @@ def _gridded(
     for name, public in names.items():
         arrays[public] = onto_grid(getattr(found, name), np.nan)
     arrays["split"] = onto_grid(split, False)
-    arrays["code"] = onto_grid(found.code, NOT_CONVERGED)
-    arrays["count"] = (arrays["code"] == FOUND).reshape(orbits, rows, columns).sum(axis=0)
+    code = onto_grid(found.code, NO_FURTHER_ORBIT)
+    arrays["count"] = (code == FOUND).reshape(orbits, rows, columns).sum(axis=0)
+    nothing = (arrays["count"] == 0) & (code == NO_FURTHER_ORBIT)
+    arrays["code"] = np.where(nothing, NOT_CONVERGED, code)
     return arrays

@@ -24,6 +24,7 @@ from ...models import (
     Modelled,
     State,
     as_isolator,
+    coefficient_errors,
     find_band,
 )
 from ..map import Lane, MapMethod, states_at_zero
@@ -101,6 +102,7 @@ def backbone_curve(
     """
     model = as_isolator(model)
     check_float64()
+    errors = None if fit is None else coefficient_errors(fit, model)
     amplitudes = jnp.asarray(ascending("displacements", displacements))
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
 
@@ -112,11 +114,11 @@ def backbone_curve(
         return jnp.stack([found.natural_frequency, found.frequency, found.force])
 
     curve = curve_of(model)
-    if fit is None:
+    if errors is None:
         return curve
     names = ("natural_frequency", "frequency", "force")
     return eqx.tree_at(
-        lambda one: one.band, curve, find_band(fit, model, names, quantities), is_leaf=lambda x: x is None
+        lambda one: one.band, curve, find_band(errors, names, quantities), is_leaf=lambda x: x is None
     )
 
 

@@ -23,6 +23,7 @@ from ...models import (
     Modelled,
     State,
     as_isolator,
+    coefficient_errors,
     find_band,
 )
 from ..branch import Branch, SpecialPoint, continue_branch
@@ -143,6 +144,7 @@ def frequency_response(
     """
     model = as_isolator(model)
     check_float64()
+    errors = None if fit is None else coefficient_errors(fit, model)
     forces, ends = np.asarray(amplitude, dtype=float), np.asarray(frequencies, dtype=float)
     if forces.ndim > 1 or not forces.size or not np.all(np.isfinite(forces) & (forces > 0.0)):
         raise ValueError(
@@ -177,7 +179,7 @@ def frequency_response(
 
     branch = branch_of(model, periods)
     names = ("frequency", "amplitude")
-    band = None if fit is None else find_band(fit, model, names, curve, across=True)
+    band = None if errors is None else find_band(errors, names, curve, across=True)
     others = tuple(FrequencyResponse(one, _receptance(model, one)) for one in branch.others)
     return FrequencyResponse(branch, _receptance(model, branch), band, others)
 

@@ -22,6 +22,7 @@ from ...models import (
     Isolator,
     Modelled,
     as_isolator,
+    coefficient_errors,
     find_band,
 )
 from ..map import StabilityMap, found_again, stability_map
@@ -118,6 +119,7 @@ def transmissibility(
     """
     model = as_isolator(model)
     check_float64()
+    errors = None if fit is None else coefficient_errors(fit, model)
     integrator = Integrator(steps_per_period=256) if integrator is None else integrator
     grid = ascending("frequencies", frequencies)
     force = as_float64(amplitude)
@@ -130,7 +132,7 @@ def transmissibility(
     def curve(isolator: Isolator) -> Array:
         return jnp.abs(_of_orbits(isolator, force, orbits).ratio)[None]
 
-    band = None if fit is None else find_band(fit, model, ("magnitude",), curve)
+    band = None if errors is None else find_band(errors, ("magnitude",), curve)
     return dataclasses.replace(_of_orbits(model, force, orbits), band=band)
 
 
