@@ -8,7 +8,9 @@ Run `python benchmarks/design.py`; it takes five minutes of one core. Two proble
    springs (linear, |x|x and cubic, each within a fifth) that push this force to 175 N. Then the same with a
    chance of 0.99, each coefficient known to 0.3 %.
 
-Printed: target and value, objective, closed form where there is one, and the scan of other coefficients.
+Printed: target and value, objective, closed form where there is one, and the scan of other coefficients; PASS
+or FAIL for every limit kept, the closed form to 1e-6 and no better point in the scan. The exit status is 1
+after a FAIL.
 """
 
 import argparse
@@ -19,6 +21,7 @@ import jax
 import numpy as np
 
 import isojax as ij
+from _marks import Marks
 from isojax import compile_quickly
 from isojax.inference import at_least, at_most
 
@@ -39,7 +42,13 @@ class Known(NamedTuple):
     result: ij.RESULTS = ij.RESULTS.successful
 
 
-def linear(scan: int) -> None:
+def judge(marks: Marks, found: ij.inference.Design) -> None:
+    """Judge what holds of every design."""
+    marks.judge("every limit is kept", all(one.kept for one in found.outcomes))
+    marks.judge(f"nothing better in the scan: {found.scan.words}", found.scan.better == 0)
+
+
+def linear(marks: Marks, scan: int) -> None:
     """Print the linear problem."""
     damping, rates, limits = 4e3, 2.0 * np.pi * np.array([10.0, 15.0]), np.array([0.5, 0.2])
     model = ij.Isolator(800.0, (ij.LinearStiffness(2e5), ij.LinearDamping(damping)))
@@ -66,10 +75,12 @@ def linear(scan: int) -> None:
         for rate, limit in zip(rates, limits, strict=True)
     ]
     print(repr(found), flush=True)
-    print(f"closed form {min(roots):.7g} N/m, off by {found.values[0] / min(roots) - 1.0:+.1e}\n")
+    off = found.values[0] / min(roots) - 1.0
+    marks.judge(f"closed form {min(roots):.7g} N/m, off by {off:+.1e} (mark 1e-6)", abs(off) < 1e-6)
+    judge(marks, found)
 
 
-def nonlinear(scan: int, chance: float | None) -> None:
+def nonlinear(marks: Marks, scan: int, chance: float | None) -> None:
     """Print the nonlinear problem."""
     model = ij.paper.y_direction()
 
@@ -92,13 +103,14 @@ def nonlinear(scan: int, chance: float | None) -> None:
     )
     print(f"fold force before: {float(fold_force(model)):.5g} N")
     print(repr(found))
+    judge(marks, found)
     print(f"{time.perf_counter() - begin:.0f} s\n")
 
 
 PROBLEMS = {
     "linear": linear,
-    "nonlinear": lambda scan: nonlinear(scan, None),
-    "chance": lambda scan: nonlinear(scan, 0.99),
+    "nonlinear": lambda marks, scan: nonlinear(marks, scan, None),
+    "chance": lambda marks, scan: nonlinear(marks, scan, 0.99),
 }
 
 
@@ -112,8 +124,10 @@ def main() -> None:
     options = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
     compile_quickly()
+    marks = Marks()
     for name in options.problems:
-        PROBLEMS[name](options.scan)
+        PROBLEMS[name](marks, options.scan)
+    marks.leave()
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ The full maps take minutes of one core. `--times 8` shows what is left of the ch
 """
 
 import argparse
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -19,6 +18,7 @@ import jax
 import numpy as np
 
 import isojax as ij
+from _marks import Marks
 from _trial_campaign import sketch
 from coverage import records_of
 from isojax import compile_quickly, rig
@@ -100,7 +100,7 @@ def main() -> None:
     print(
         f"{len(steps)} draws, {int(np.sum(np.asarray(plain.count) > 1))} of {plain.count.size} cells coexist"
     )
-    passed = []
+    marks = Marks()
     for name, counted, given in (
         ("P(stable)", stable, chances.stable),
         ("P(coexisting)", coexisting, chances.coexisting),
@@ -110,21 +110,21 @@ def main() -> None:
         between = known & (truth > 0.05) & (truth < 0.95)
         off = np.abs(given - truth)[known]
         between = between[known]
-        passed.append(off[between].max() <= MARK)
-        print(
-            f"{'PASS' if passed[-1] else 'FAIL'}  {name}: {int(between.sum())} cells between 0.05 and 0.95, "
+        marks.judge(
+            f"{name}: {int(between.sum())} cells between 0.05 and 0.95, "
             f"there off by {off[between].max():.4f} at most (mark {MARK}), "
             f"{np.sqrt(np.mean(off[between] ** 2)):.4f} rms; "
             f"elsewhere {off[~between].max():.4f} at most; above {MARK} in {int(np.sum(off > MARK))} cells, "
-            f"not known in {int(np.sum(~known))}"
+            f"not known in {int(np.sum(~known))}",
+            off[between].max() <= MARK,
         )
     print(f"      the map itself says {chances.error:.4f}")
-    passed.append(seconds[1] <= MOST_COST * seconds[0])
-    print(
-        f"{'PASS' if passed[-1] else 'FAIL'}  plain map {seconds[0]:.2f} s, with chances {seconds[1]:.2f} s "
-        f"of processor time: {seconds[1] / seconds[0]:.1f} times (mark {MOST_COST:g})"
+    marks.judge(
+        f"plain map {seconds[0]:.2f} s, with chances {seconds[1]:.2f} s "
+        f"of processor time: {seconds[1] / seconds[0]:.1f} times (mark {MOST_COST:g})",
+        seconds[1] <= MOST_COST * seconds[0],
     )
-    sys.exit(not all(passed))
+    marks.leave()
 
 
 if __name__ == "__main__":

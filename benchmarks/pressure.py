@@ -26,6 +26,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from _marks import Marks
 from _trial_campaign import CYCLES, SIGNIFICANT, Sketch, sketch
 from _trial_effects import generator, log_uniform
 from _trial_judge import wilson
@@ -109,12 +110,14 @@ def report(rows: list[dict[str, Any]]) -> None:
         if any(row["hidden"] not in names and set(HIDDEN) & set(names) for names in row["named"])
     ]
     clean = [row for row in absent if row not in wrong]
-    for words, hits, count in (
-        ("found where it is", len(found), len(there)),
-        ("not found where it is not", len(clean), len(absent)),
+    marks = Marks()
+    for words, hits, count, mark in (
+        ("found where it is", len(found), len(there), 0.90),
+        ("not found where it is not", len(clean), len(absent), 0.95),
     ):
         low, high = wilson(hits, count)
-        print(f"{words}: {hits} of {count} (95 %: {low:.2f} to {high:.2f})")
+        words = f"{words}: {hits} of {count} (95 %: {low:.2f} to {high:.2f}; mark {mark})"
+        marks.judge(words, hits >= mark * count)
     for name in HIDDEN:
         own = [row for row in there if row["hidden"] == name]
         print(f"  {name}: {sum(row in found for row in own)} of {len(own)}")
@@ -133,19 +136,20 @@ def report(rows: list[dict[str, Any]]) -> None:
             print(f"missed: seed {row['seed']}, {row['hidden']}, {size:.1f} limits, named {row['named']}")
     for row in [*wrong, *others]:
         print(f"wrong: seed {row['seed']}, hidden {row['hidden'] or 'nothing'}, named {row['named']}")
+    marks.leave()
 
 
 def main() -> None:
     """Run seeds, or report the file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", default="500000:500030", help="FIRST:STOP")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="one line a campaign")
     parser.add_argument("--report", action="store_true")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="stop after so long")
     asked = parser.parse_args()
-    rows = [json.loads(line) for line in RESULTS.read_text().splitlines()] if RESULTS.exists() else []
+    rows = [json.loads(line) for line in asked.out.read_text().splitlines()] if asked.out.exists() else []
     if asked.report:
         report(rows)
-        return
     jax.config.update("jax_enable_x64", True)
     compile_quickly()
     begin, done = time.perf_counter(), {row["seed"] for row in rows}
@@ -153,8 +157,7 @@ def main() -> None:
         if seed in done or time.perf_counter() - begin > asked.seconds:
             continue
         line = json.dumps(run_one(seed))
-        RESULTS.parent.mkdir(exist_ok=True)
-        with RESULTS.open("a") as file:
+        with asked.out.open("a") as file:
             file.write(line + "\n")
             file.flush()
             os.fsync(file.fileno())
