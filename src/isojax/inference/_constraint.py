@@ -71,8 +71,8 @@ def at_least(
 ) -> Constraint:
     """Ask a quantity to stay at or above a limit: the force at a fold, for one.
 
-    With `chance = 0.99` and the force at the fold as the quantity, the response at any smaller force has not
-    jumped with a probability of 0.99.
+    Of the force at the fold, a limit of 150 N and `chance=0.99` say: with a probability of 0.99 the response
+    has not jumped at 150 N.
 
     Args:
         quantity: as in `at_most`.

@@ -64,8 +64,13 @@ class UncertainQuantity(NamedTuple):
     def _rows(self) -> list[Row]:
         flat = [np.ravel(one) for one in (self.value, self.standard_error, *self.interval)]
         return [
-            Row(f"[{place}]", f"{value:.6g} ± {error:.2g}", f"{low:.6g} to {high:.6g}")
-            for place, (value, error, low, high) in enumerate(zip(*flat, strict=True))
+            # Where the draws are not symmetric a standard error would mislead beside their interval.
+            Row(
+                f"[{place}]", f"{value:.6g}" + ("" if bent else f" ± {error:.2g}"), f"{low:.6g} to {high:.6g}"
+            )
+            for place, (value, error, low, high, bent) in enumerate(
+                zip(*flat, np.ravel(self.curved), strict=True)
+            )
         ]
 
 
