@@ -85,7 +85,9 @@ def test_the_best_record_measured_and_refitted_shrinks_the_errors_as_predicted(f
     best = stepped[0]
     rows = [row.split(",") for row in best.schedule.split()[1:]]
     pieces = tuple(
-        rig.IDEAL_SHAKER.sine(best.level, float(frequency), float(start), float(start) + found.seconds / 6.0)
+        rig.IDEAL_SHAKER.sine(
+            best.level, float(frequency), float(start), float(start) + found.seconds / len(rows)
+        )
         for start, frequency, _ in rows
     )
 
@@ -154,6 +156,7 @@ def test_the_declaration_is_one_of_campaign_toml(found):
         (record,) = tomllib.loads(one.declaration)["record"]
         assert record["role"] == "fit"
         assert ("schedule" in record) == (one.experiment.waveform == "stepped sine") == bool(one.schedule)
+    assert {one.schedule.count("\n") - 1 for one in found.proposals} == {-1, 3, 6, 12}
     stepped = next(one for one in found.proposals if one.experiment.waveform == "stepped sine")
     # The drive of the campaign is a sine of its nominal level.
     assert stepped.level == pytest.approx(np.sqrt(2.0) * np.std(stepped.experiment.drive), rel=2e-3)
@@ -197,6 +200,8 @@ def test_mistakes_are_refused(fitted):
         next_test(fitted, levels=())
     with pytest.raises(ValueError, match="0 < lowest < highest"):
         next_test(fitted, bands=((7.0, 4.0),))
+    with pytest.raises(ValueError, match="`dwells` must hold divisors of 12"):
+        next_test(fitted, dwells=(5,))
     with pytest.raises(ValueError, match="`farthest` must be positive"):
         next_test(fitted, farthest=0.0)
     with pytest.raises(ValueError, match="finite real numbers"):

@@ -30,6 +30,7 @@ class Experiment(NamedTuple):
         load: known static force on the mass [N].
         lacking: why the campaign's test rig cannot make it; empty if it can.
         backward: whether the frequency falls in the first record; the next goes the other way.
+        dwells: of a stepped sine, in each record.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Experiment(NamedTuple):
     load: float = 0.0
     lacking: str = ""
     backward: bool = False
+    dwells: int = 6
 
     @property
     def seconds(self) -> float:

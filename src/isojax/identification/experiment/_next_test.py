@@ -19,7 +19,13 @@ from ..fitting import Fit, Fitted, Point, Uncertainty, as_fit, expect_uncertaint
 from ..guess import scales as campaign_scales
 from ._candidate_experiments import repeated_campaign
 from ._proposals import NextTest, Proposal, rank_proposals
-from ._record_candidates import outline_of_record, record_candidates, usual_bands, usual_levels
+from ._record_candidates import (
+    USUAL_DWELLS,
+    outline_of_record,
+    record_candidates,
+    usual_bands,
+    usual_levels,
+)
 from ._simulated_records import TrialRun
 from ._test_outline import TestOutline, find_test_outline
 from ._trial_information import (
@@ -71,6 +77,7 @@ def next_test(
     seconds: float | None = None,
     levels: Sequence[float] | None = None,
     bands: Sequence[tuple[float, float]] | None = None,
+    dwells: Sequence[int] = USUAL_DWELLS,
     farthest: float = 1.2,
 ) -> NextTest:
     """Find the record that shrinks the intervals most, or that separates two effects best.
@@ -93,6 +100,7 @@ def next_test(
             omitted.
         bands: lowest and highest frequency of each [Hz]; the campaign's, parts of it, and to half the lowest
             and twice the highest frequency if omitted.
+        dwells: of a stepped sine; each lasts the same share of the record.
         farthest: largest displacement over that of the campaign; records that go beyond it are left out,
             because neither the model nor the room for motion was tested there.
 
@@ -113,7 +121,7 @@ def next_test(
 
         >>> test = ij.next_test(fitted, levels=[60.0], bands=[(4.0, 7.0), (5.0, 6.0)])
         >>> bool(0.3 < test.best.shrinkage < 1.0), len(test.proposals)
-        (True, 10)
+        (True, 18)
         >>> print(test.best.declaration.splitlines()[0])
         [[record]]
     """
@@ -121,7 +129,7 @@ def next_test(
     fit = as_fit(fit)
     if not is_successful(fit.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[fit.result]}")
-    _check_plan(seconds, levels, bands, farthest)
+    _check_plan(seconds, levels, bands, dwells, farthest)
     asked = _ask(fit, quantity, rivals)
     campaign, problem = fit.campaign, fit.estimate.problem
     steps = problem.integrator.record_steps(fit.model)
@@ -135,10 +143,11 @@ def next_test(
         outline_of_record(outline, seconds, steps),
         usual_levels(outline) if levels is None else levels,
         usual_bands(outline) if bands is None else bands,
+        dwells,
     )
     largest = _largest_motion(asked.columns, campaign, outline)
     proposals = []
-    for _, group in itertools.groupby(candidates, lambda one: one.waveform):
+    for _, group in itertools.groupby(candidates, lambda one: (one.waveform, one.dwells)):
         alike = tuple(group)
         for first in range(0, len(alike), _SIDE_BY_SIDE):
             proposals += _proposals(
@@ -163,6 +172,7 @@ def _check_plan(
     seconds: float | None,
     levels: Sequence[float] | None,
     bands: Sequence[tuple[float, float]] | None,
+    dwells: Sequence[int],
     farthest: float,
 ) -> None:
     if not farthest > 0.0:
@@ -173,6 +183,9 @@ def _check_plan(
         raise ValueError(f"Argument `levels` must hold positive numbers, but is {levels}.")
     if bands is not None and not (len(bands) and all(0.0 < low < high < np.inf for low, high in bands)):
         raise ValueError(f"Argument `bands` must hold pairs 0 < lowest < highest, but is {bands}.")
+    # A record is as long as six segments, each of an even number of samples.
+    if not (len(dwells) and all(count in (1, 2, 3, 4, 6, 12) for count in dwells)):
+        raise ValueError(f"Argument `dwells` must hold divisors of 12, but is {tuple(dwells)}.")
 
 
 def _ask(

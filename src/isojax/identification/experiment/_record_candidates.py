@@ -11,13 +11,15 @@ from ._candidate_experiments import HIGHEST, WAVEFORM_WORDS
 from ._test_outline import DWELLS, MOST_STEPS, TestOutline
 from ._trial_drive import drive_of
 
-_HOW: tuple[tuple[Waveform, bool], ...] = (
-    ("stepped sine", False),
-    ("stepped sine", True),
-    ("swept sine", False),
-    ("swept sine", True),
-    ("multisine", False),
+_OTHERS: tuple[tuple[Waveform, bool, int], ...] = (
+    ("swept sine", False, 0),
+    ("swept sine", True, 0),
+    ("multisine", False, 0),
 )
+"""Waveform, whether downwards, dwells."""
+
+USUAL_DWELLS = 3, 6, 12
+"""Dwells of a stepped sine: long ones tell more of each motion, many more of the curve."""
 
 
 def outline_of_record(outline: TestOutline, seconds: float, substeps: int) -> TestOutline:
@@ -32,7 +34,8 @@ def outline_of_record(outline: TestOutline, seconds: float, substeps: int) -> Te
         The outline; a long record is simulated in part.
     """
     samples = min(seconds * outline.rate / DWELLS, max(MOST_STEPS / substeps, outline.samples))
-    return outline._replace(samples=int(np.ceil(samples)))
+    # Even, so that each of twice as many dwells has whole samples.
+    return outline._replace(samples=2 * int(np.ceil(0.5 * samples)))
 
 
 def usual_levels(outline: TestOutline) -> tuple[float, ...]:
@@ -61,25 +64,34 @@ def record_candidates(
     outline: TestOutline,
     levels: Sequence[float],
     bands: Sequence[tuple[float, float]],
+    dwells: Sequence[int],
 ) -> tuple[Experiment, ...]:
-    """Give the records, in the order of their waveforms.
+    """Give the records, in the order of their waveforms and numbers of dwells.
 
     Args:
         campaign: the measurements.
         outline: length and sampling rate.
         levels: rms of the drive [its SI unit].
         bands: lowest and highest frequency of each [Hz].
+        dwells: of a stepped sine.
 
     Returns:
         Experiments of one record each.
     """
     unit = "m/s²" if campaign.input.quantity == "base_acceleration" else "N"
     found = []
-    for (waveform, backward), level, (low, high) in itertools.product(_HOW, levels, bands):
+    stepped: list[tuple[Waveform, bool, int]] = [
+        ("stepped sine", backward, count) for count in dwells for backward in (False, True)
+    ]
+    hows = (*stepped, *_OTHERS)
+    for (waveform, backward, count), level, (low, high) in itertools.product(hows, levels, bands):
+        steps = f" in {count} dwells" if count else ""
         way = "" if waveform == "multisine" else ", downwards" if backward else ", upwards"
-        words = f"{WAVEFORM_WORDS[waveform]} of {level:.3g} {unit} rms, {low:.3g} to {high:.3g} Hz{way}"
-        name = f"{waveform}_{level:.3g}_{low:.3g}_{high:.3g}{way}".replace(", ", "_").replace(" ", "_")
-        drive = drive_of(outline, (level,), low, high, waveform, backward)
+        words = (
+            f"{WAVEFORM_WORDS[waveform]} of {level:.3g} {unit} rms, {low:.3g} to {high:.3g} Hz{way}{steps}"
+        )
+        name = f"{waveform}_{level:.3g}_{low:.3g}_{high:.3g}{way}{steps}".replace(", ", "_").replace(" ", "_")
+        drive = drive_of(outline, (level,), low, high, waveform, backward, count or DWELLS)
         found.append(
             Experiment(
                 name,
@@ -90,6 +102,7 @@ def record_candidates(
                 waveform,
                 lacking="" if high <= HIGHEST * outline.rate else "the sampling rate is too low for its band",
                 backward=backward,
+                dwells=count or DWELLS,
             )
         )
     return tuple(found)

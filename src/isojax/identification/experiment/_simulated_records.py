@@ -16,7 +16,6 @@ from ...records import Dwell, ExcitationKind, Record
 from ..diagnosis import Experiment, Waveform
 from ..fitting import Problem
 from ..jacobian import carries, channel_table, drive_table
-from ._test_outline import DWELLS
 
 
 class TrialRun(NamedTuple):
@@ -89,7 +88,9 @@ def blank_records(experiment: Experiment, clock: tuple[float, float] | None = No
             if (row % 2 == 1) != experiment.backward
             else "forward",
             period=None if sines else total,
-            dwells=dwells_of(drive, experiment.rate) if experiment.waveform == "stepped sine" else (),
+            dwells=dwells_of(drive, experiment.rate, experiment.dwells)
+            if experiment.waveform == "stepped sine"
+            else (),
             kind=kinds[experiment.waveform],
             clock=(row / rows, (row + 1) / rows) if clock is None else clock,
         )
@@ -97,18 +98,19 @@ def blank_records(experiment: Experiment, clock: tuple[float, float] | None = No
     )
 
 
-def dwells_of(drive: Float[np.ndarray, " time"], rate: float) -> tuple[Dwell, ...]:
-    """Give the dwells of a record whose segments are sines of whole cycles.
+def dwells_of(drive: Float[np.ndarray, " time"], rate: float, dwells: int) -> tuple[Dwell, ...]:
+    """Give the dwells of a record of equally long sines of whole cycles.
 
     Args:
         drive: of the record.
         rate: samples a second [Hz].
+        dwells: how many.
 
     Returns:
-        A dwell a segment.
+        The dwells.
     """
-    length = drive.size // DWELLS
-    cycles = np.argmax(np.abs(np.fft.rfft(drive.reshape(DWELLS, length), axis=1)), axis=1)
+    length = drive.size // dwells
+    cycles = np.argmax(np.abs(np.fft.rfft(drive.reshape(dwells, length), axis=1)), axis=1)
     return tuple(
         Dwell(place * length, (place + 1) * length, count * rate / length, float(count))
         for place, count in enumerate(cycles.tolist())

@@ -14,17 +14,19 @@ def drive_of(
     highest: float,
     waveform: Waveform,
     backward: bool = False,
+    dwells: int = DWELLS,
 ) -> Float[np.ndarray, "record time"]:
-    """Give the drive of a test: one record a level, of `DWELLS` segments.
+    """Give the drive of a test: one record a level, as long as `DWELLS` segments.
 
     Args:
         outline: sampling rate and length of a segment.
         levels: rms of each record [SI unit of the drive].
         lowest: lowest frequency [Hz].
         highest: highest frequency [Hz].
-        waveform: sines in steps, a whole number of cycles in each segment, or swept evenly, up in one record
+        waveform: sines in steps, a whole number of cycles in each, or swept evenly, up in one record
             and down in the next; or random-phase multisines whose period is the record.
         backward: whether the first record goes down.
+        dwells: steps of a stepped sine.
 
     Returns:
         The drive.
@@ -36,14 +38,15 @@ def drive_of(
             rows.append(level * _multisine(outline, lowest, highest, row))
             continue
         first, last = (highest, lowest) if down else (lowest, highest)
-        sine = _steps(outline, first, last) if waveform == "stepped sine" else _sweep(outline, first, last)
+        stepped = waveform == "stepped sine"
+        sine = _steps(outline, first, last, dwells) if stepped else _sweep(outline, first, last)
         rows.append(np.sqrt(2.0) * level * sine)
     return np.stack(rows)
 
 
-def _steps(outline: TestOutline, first: float, last: float) -> Float[np.ndarray, " time"]:
-    samples = outline.samples
-    cycles = np.maximum(1, np.round(np.linspace(first, last, DWELLS) * samples / outline.rate))
+def _steps(outline: TestOutline, first: float, last: float, dwells: int) -> Float[np.ndarray, " time"]:
+    samples = DWELLS * outline.samples // dwells
+    cycles = np.maximum(1, np.round(np.linspace(first, last, dwells) * samples / outline.rate))
     return np.sin(2.0 * np.pi * cycles[:, None] * np.arange(samples) / samples).ravel()
 
 
