@@ -60,7 +60,8 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
         ):
             np.testing.assert_array_equal(stored[name], np.asarray(getattr(z_map, name)))
         assert not stored["result"].any()
-        assert list(stored["result_names"]) == ["successful", "not_converged", "not_finite", "not_accurate"]
+        names = ["successful", "not_converged", "not_finite", "not_accurate", "sticks"]
+        assert list(stored["result_names"]) == names
         assert "stopped before it converged" in stored["result_words"][1]
         assert json.loads(str(stored["model"])) == json.loads(Path(z_file).read_text(encoding="utf-8"))
     text = shown.out

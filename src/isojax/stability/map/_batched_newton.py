@@ -15,8 +15,9 @@ from jaxtyping import Array, Complex, Float, Int
 from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Sine, modulus, multipliers
+from ..orbit import Sine, modulus, multipliers, trajectory
 from ._map_method import Lane, MapMethod, advance, kinks_between
+from ._nodes import half_peak_to_peak
 from ._starts import Candidates, PlacedSurface, read_surface
 from ._surface import Surface
 
@@ -36,7 +37,7 @@ _WIDE = {"xla_cpu_prefer_vector_width": 512}
 WHOLE_STEPS = 4
 """Times the steps of orbits that are not split at kinks."""
 
-FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE = 0, 1, 2, 3
+FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE, STICKS = 0, 1, 2, 3, 4
 """Codes of how the search in a cell ended."""
 
 
@@ -126,6 +127,12 @@ def _newton_steps(
     return moved, phases, size, roots, modulus(roots[..., 0])
 
 
+@quick_jit
+def _sizes(model: Isolator, method: MapMethod, state: State, drive: Sine) -> Lanes:
+    path = trajectory(model, method.integrator, drive, state, turns=0.5 if method.half else 1.0)[0]
+    return half_peak_to_peak(path, method.half)
+
+
 @functools.partial(quick_jit, options=_WIDE)
 def surface_lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
     """Give starts as the surface has them.
@@ -190,7 +197,19 @@ class CellSolver(eqx.Module):
         """
         where = jax.device_put([padded(values, size) for values in candidates[:3]], self.sharding)
         lanes = surface_lanes(self.model, self.surface, where)
-        return self.improve(self.method, lanes, candidates.force.size, limit)
+        found = self.improve(self.method, lanes, candidates.force.size, limit)
+        if self.method.sides is not None:
+            return found
+        # Where orbits share no order of kinks the surface is rough, and an orbit may lie far from its start.
+        push = np.asarray(self.surface.amplitudes)[candidates.force, None] * found.direction
+        drive = Sine(*push.T, np.asarray(self.surface.frequencies)[candidates.frequency])
+        response = np.empty(found.response.shape)
+        for begin in range(0, response.size, SAMPLED):
+            own = slice(begin, begin + SAMPLED)
+            lanes = jax.tree.map(lambda it, own=own: padded(it[own], SAMPLED), (tuple(found.states.T), drive))
+            sizes = _sizes(self.model, self.method, *jax.device_put(lanes, self.sharding))
+            response[own] = np.asarray(sizes)[: response[own].size]
+        return found._replace(response=response)
 
     def improve(self, method: MapMethod, lanes: Lane, count: int, limit: float | None = None) -> Found:
         """Improve starts until each has converged or failed.

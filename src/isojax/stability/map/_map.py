@@ -25,7 +25,16 @@ from ...models import (
     coefficient_errors,
 )
 from ..orbit import Sine, ascending, is_odd, refuse_transformed
-from ._batched_newton import FOUND, NOT_ACCURATE, NOT_CONVERGED, NOT_FINITE, CellSolver, Found, states_at_zero
+from ._batched_newton import (
+    FOUND,
+    NOT_ACCURATE,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    STICKS,
+    CellSolver,
+    Found,
+    states_at_zero,
+)
 from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._empty_cells import Cells, fill_empty, without_repeats
@@ -332,6 +341,7 @@ def _ending(code: Array) -> RESULTS:
     """Give the outcome that a code of the search stands for."""
     failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
     failed = RESULTS.where(code == NOT_ACCURATE, RESULTS.not_accurate, failed)
+    failed = RESULTS.where(code == STICKS, RESULTS.sticks, failed)
     return RESULTS.where(code == FOUND, RESULTS.promote(diffrax.RESULTS.successful), failed)
 
 
