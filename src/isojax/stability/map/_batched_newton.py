@@ -133,8 +133,9 @@ def _newton_steps(
 
 
 @quick_jit
-def _sizes(model: Isolator, method: MapMethod, state: State, drive: Sine) -> Lanes:
-    path = trajectory(model, method.integrator, drive, state, turns=0.5 if method.half else 1.0)[0]
+def _sizes(model: Isolator, method: MapMethod, states: Array, push: Array, frequency: Array) -> Lanes:
+    drive, turns = Sine(push[:, 0], push[:, 1], frequency), 0.5 if method.half else 1.0
+    path = trajectory(model, method.integrator, drive, tuple(states.T), turns=turns)[0]
     return half_peak_to_peak(path, method.half)
 
 
@@ -207,14 +208,12 @@ class CellSolver(eqx.Module):
             return found
         # Where orbits share no order of kinks the surface is rough, and an orbit may lie far from its start.
         push = np.asarray(self.surface.amplitudes)[candidates.force, None] * found.direction
-        drive = Sine(push[:, 0], push[:, 1], np.asarray(self.surface.frequencies)[candidates.frequency])
+        frequency = np.asarray(self.surface.frequencies)[candidates.frequency]
         response = np.empty(found.response.shape)
         for begin in range(0, response.size, TOGETHER):
             own = slice(begin, begin + TOGETHER)
-            lanes = jax.tree.map(
-                lambda it, own=own: padded(it[own], TOGETHER), (tuple(found.states.T), drive)
-            )
-            sizes = _sizes(self.model, self.method, *jax.device_put(lanes, self.sharding))
+            rows = [padded(values[own], TOGETHER) for values in (found.states, push, frequency)]
+            sizes = _sizes(self.model, self.method, *jax.device_put(rows, self.sharding))
             response[own] = np.asarray(sizes)[: response[own].size]
         return found._replace(response=response)
 
