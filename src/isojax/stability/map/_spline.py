@@ -47,7 +47,7 @@ class Pieces(NamedTuple):
 def _polynomials(basis: Array, to_powers: Array) -> Array:
     pieces, powers, _ = to_powers.shape
     along = basis.swapaxes(1, 2)[..., None]
-    terms = (along[:, k : k + pieces] * to_powers[:, None, :, k] for k in range(powers))
+    terms = (along[:, k : k + pieces] * to_powers[None, :, None, :, k] for k in range(powers))
     return functools.reduce(jnp.add, terms)
 
 
