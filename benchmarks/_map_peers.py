@@ -11,14 +11,19 @@ import ctypes
 import math
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange, set_num_threads
 from scipy.integrate import solve_ivp
+
+# Numba asks for the package of this name, and would find the script beside this file.
+sys.modules.setdefault("coverage", None)  # pyright: ignore[reportArgumentType]
+
+from numba import njit, prange, set_num_threads  # noqa: E402  (after the line above)
 
 C_FLAGS = ("-O3", "-march=native")
 DEGREE = 2

@@ -65,6 +65,7 @@ def test_map_writes_arrays_that_equal_the_map_and_pictures(z_file, z_map, tmp_pa
             "not_converged",
             "not_finite",
             "not_accurate",
+            "sticks",
             "no_further_orbit",
         ]
         assert "stopped before it converged" in stored["result_words"][1]

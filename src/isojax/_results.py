@@ -23,6 +23,10 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "much. It grazes a stop or turns where friction all but holds it. Try more steps in `Integrator`, "
         "or a drive a little beside this one."
     )
+    sticks = (
+        "Dry friction holds the mass for the whole period: it may rest anywhere within the friction, so that "
+        "no orbit is isolated and there are no multipliers. Raise the drive."
+    )
     no_further_orbit = "The cell holds no further orbit; others have more."
     not_finite = (
         "The simulated response left every bound (it is not finite). Try a smaller step, or a start whose "

@@ -93,7 +93,9 @@ def test_the_quadratic_coefficient_vanishes_at_the_cusps_by_scipy(lens):
 @pytest.mark.slow
 def test_derivatives_of_the_cusps_are_central_differences():
     def cusps(model):
-        curve = ij.fold_curve(model, **WINDOW)
+        # The cusps do not depend on the points between which they are found.
+        window = {"amplitude_range": (100.0, 250.0), "frequency_range": (3.8, 4.8)}
+        curve = ij.fold_curve(model, **window, search=3, step=0.08)
         return jnp.stack([number for cusp in curve.cusps for number in (cusp.amplitude, cusp.frequency)])
 
     slopes = jax.jacfwd(cusps)(MODEL)

@@ -12,6 +12,10 @@ import pytest
 
 from isojax import Harmonic, Isolator, elements, find_periodic_orbit, paper, stability_map
 from isojax._results import RESULTS
+from isojax.stability.map._batched_newton import FOUND, Found
+from isojax.stability.map._empty_cells import Cells, without_repeats
+from isojax.stability.map._starts import Candidates
+from isojax.stability.map._surface import MapWindow
 
 FORCES, BAND = np.linspace(20.0, 120.0, 9), np.linspace(4.0, 8.0, 7)
 
@@ -228,3 +232,18 @@ def test_two_processes_give_the_numbers_of_one(tmp_path, alone):
     for own, process in enumerate(processes):
         assert finished(process) == ["1", "2"]
         assert_same_as(tmp_path / f"map{own}.npz", alone)
+
+
+def test_of_starts_that_led_to_one_orbit_one_is_left(small):
+    # Rounding of their sizes puts the three in any order; a fourth has the same size, but another state.
+    cell = small.start[4, 3], small.direction[4, 3], small.phases[4, 3], small.multipliers[4, 3]
+    turned = cell[0] * np.array([1.0, -1.0]) + np.array([0.0, 1e-3])
+    rows = [[cell[0], cell[0], cell[0], turned], *([own] * 4 for own in cell[1:])]
+    sizes = float(small.response[4, 3]) * (1.0 + 1e-15 * np.array([0.0, 4.0, 2.0, 0.0]))
+    found = Found(*(np.stack(own) for own in rows), np.ones(4), sizes, np.full(4, FOUND, np.int8))
+    column, row, order = np.full(4, 3), np.full(4, 4), np.arange(4)
+    cells = Cells(Candidates(row, column, column, order), found, np.zeros(4, bool))
+    window = MapWindow(FORCES, BAND, 3.0)
+    left = without_repeats(small.model, small.integrator, True, window, cells)
+    np.testing.assert_array_equal(left.found.code == FOUND, [True, False, False, True])
+    np.testing.assert_array_equal(np.isnan(left.found.response), [False, True, True, False])

@@ -117,10 +117,13 @@ def test_the_period_map_of_friction_has_the_derivative_of_differences():
 
 
 def test_a_mass_that_friction_never_lets_go_has_no_orbit_of_its_own():
+    # From rest it is freed by a drive above its friction, and by no other.
     model = paper.y_direction().with_elements(elements.CoulombFriction(40.0, 1e-4))
-    orbit = find_periodic_orbit(model, Harmonic(20.0, 5.0))
-    assert orbit.result in (RESULTS.not_converged, RESULTS.not_finite)
-    assert not np.any(np.isfinite(orbit.floquet.multipliers))
+    for force in (20.0, 39.9):
+        orbit = find_periodic_orbit(model, Harmonic(force, 5.0))
+        assert orbit.result == RESULTS.sticks
+        assert not np.any(np.isfinite(orbit.floquet.multipliers))
+    assert not find_periodic_orbit(model, Harmonic(40.1, 5.0)).result == RESULTS.sticks
 
 
 def test_steps_that_are_too_few_for_the_accuracy_say_so():
@@ -139,11 +142,14 @@ def test_steps_that_are_too_few_for_the_accuracy_say_so():
 @pytest.mark.slow
 def test_a_map_with_friction_holds_the_orbits_of_the_rig():
     model = paper.y_direction().with_elements(elements.CoulombFriction(4.0, 1e-4))
-    forces, band = np.array([5.5, 20.0]), np.array([4.4, 5.9])
+    forces, band = np.array([2.0, 5.5, 20.0]), np.array([4.4, 5.9])
     smap = stability_map(model, forces, band)
     plant, y0 = rig.y_plant().plus(rig.CoulombFriction(4.0)), np.asarray(smap.y0)
-    np.testing.assert_array_equal(smap.count, 1)
-    for row, column in np.ndindex(2, 2):
+    np.testing.assert_array_equal(smap.count, [[0, 0], [1, 1], [1, 1]])
+    np.testing.assert_array_equal(
+        smap.result == RESULTS.sticks, [[True, True], [False, False], [False, False]]
+    )
+    for row, column in [(1, 0), (1, 1), (2, 0), (2, 1)]:
         exact = rig_orbit(plant, forces[row], band[column], y0[row, column])
         error = multiplier_error(np.asarray(smap.multipliers)[row, column], exact.multipliers)
         assert exact.closed

@@ -13,7 +13,7 @@ from ...stability import FoldCurve, StabilityMap, continue_branch, fold_curve
 from ..plots import plot_fold_curve, plot_response_curves, plot_response_map, plot_stability_map
 from ._png import png_bytes
 
-_CODES = ("successful", "not_converged", "not_finite", "not_accurate", "no_further_orbit")
+_CODES = ("successful", "not_converged", "not_finite", "not_accurate", "sticks", "no_further_orbit")
 """Codes of a cell's result, 0 first."""
 
 _ARRAYS = (
@@ -70,7 +70,7 @@ def result_codes(smap: StabilityMap) -> np.ndarray:
         smap: the map.
 
     Returns:
-        Places in `_CODES`.
+        Places in `result_names`.
     """
     codes = np.ones(smap.spectral_radius.shape, dtype=np.int8)
     for code, name in enumerate(_CODES):

@@ -11,7 +11,7 @@ from ._map_files import result_codes
 _IN_DOUBT = 0.05
 """Chance below which, or below which of the contrary, a cell counts as sure."""
 
-_REASONS = {1: "not converged", 2: "left every bound", 3: "multipliers not accurate"}
+_REASONS = {1: "not converged", 2: "left every bound", 3: "multipliers not accurate", 4: "held by friction"}
 
 
 def map_summary(

@@ -38,6 +38,7 @@ MARKS: Mapping[str, Mark] = {
     "neimark_sacker": Mark("Neimark-Sacker", "^", "#2a9d8f"),
     "symmetry_breaking": Mark("symmetry breaking", "D", "#9b5de5"),
     "cusp": Mark("cusp", "*", "#222222"),
+    "generalised_doubling": Mark("generalised doubling", "p", "#e9c46a"),
     "resonance_1_1": Mark("1:1 resonance", "P", BEFORE),
     "resonance_1_2": Mark("1:2 resonance", "X", "#e9c46a"),
     "resonance_1_3": Mark("1:3 resonance", "v", "#2a9d8f"),

@@ -4,8 +4,9 @@ In: an isolator, the parameter and its range. Out: `Branch` with its `SpecialPoi
 period doublings and Neimark-Sacker bifurcations, nearest folds. Read _parameter_family, _arc_length (how a
 curve is followed), _branch, _continuation with _tracing; then _other_branches (what the branch does not
 reach) with _orbit_search and _orbit_starts; _criticality (what vanishes where an orbit bifurcates),
-_locating and _special_points (what is found along a branch) with _extended_system (its exact equations);
-then _branch_switching, _codimension_two with _orbit_curve and _bifurcation_curves, and _nearest_folds.
+_locating and _special_points (what is found along a branch) with _bifurcation_system (its exact equations)
+and _extended_system (their solution); then _branch_switching, _codimension_two with _orbit_curve and
+_bifurcation_curves, and _nearest_folds.
 """
 
 from ._bifurcation_curves import CodimensionTwoPoint as CodimensionTwoPoint

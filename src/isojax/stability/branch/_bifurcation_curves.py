@@ -12,6 +12,7 @@ from ..orbit import pair_angle
 
 WORDS = {
     "cusp": "cusp",
+    "generalised_doubling": "generalised period doubling (the doubled orbit turns unstable)",
     "resonance_1_1": "1:1 resonance (fold meets Neimark-Sacker)",
     "resonance_1_2": "1:2 resonance (doubling meets Neimark-Sacker)",
     "resonance_1_3": "1:3 resonance",
@@ -24,10 +25,11 @@ class CodimensionTwoPoint(eqx.Module):
     """A special point of a curve of bifurcations: two conditions meet there.
 
     Attributes:
-        kind: "cusp", where two folds meet and end; "resonance_1_1", a pair of multipliers +1;
-            "resonance_1_2", a pair -1; "resonance_1_3" and "resonance_1_4", a pair `exp(+-i theta)` with
-            theta of 120 and of 90 degrees. The multipliers are those of the map that closes the orbit: for
-            symmetric orbits over half a period.
+        kind: "cusp", where two folds meet and end; "generalised_doubling", where the orbit of twice the
+            period turns from stable to unstable, and from which a curve of its folds starts;
+            "resonance_1_1", a pair of multipliers +1; "resonance_1_2", a pair -1; "resonance_1_3" and
+            "resonance_1_4", a pair `exp(+-i theta)` with theta of 120 and of 90 degrees. The multipliers are
+            those of the map that closes the orbit: for symmetric orbits over half a period.
         amplitude: F0 [N, or m/s^2 for base excitation].
         frequency: f [Hz].
         y0: state at t = 0, SI units. Its derivative by the model leaves out, at a cusp, what moves along the
@@ -102,7 +104,7 @@ class PeriodDoublingCurve(eqx.Module):
         frequency: f [Hz].
         y0: state at t = 0 of the orbit that doubles, SI units.
         multipliers: in falling modulus; one is -1.
-        special_points: 1:2 resonances, in the order of the curve.
+        special_points: generalised doublings and 1:2 resonances, in the order of the curve.
         closed: whether the last point is the first.
         periods: drive periods after which the orbits that double repeat.
         result: see `FoldCurve`.

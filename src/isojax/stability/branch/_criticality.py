@@ -1,7 +1,9 @@
 """What vanishes of a map's derivative where an orbit bifurcates: polynomials of its entries."""
 
+from collections.abc import Callable
 from typing import Literal
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
@@ -12,6 +14,9 @@ BifurcationKind = Literal["fold", "period_doubling", "neimark_sacker", "symmetry
 
 CRITICAL: dict[str, float] = {"fold": 1.0, "period_doubling": -1.0, "symmetry_breaking": -1.0}
 """The real multiplier that turns critical, of the half-period map for a broken symmetry."""
+
+_SHIFT = 1e-3
+"""Shift of the scaled state for second and third derivatives: their error is about a millionth."""
 
 
 def criticality(kind: BifurcationKind, matrix: Float[Array, "state state"]) -> Float[Array, ""]:
@@ -116,6 +121,44 @@ def critical_direction(
     vector = vector * jnp.exp(-0.5j * jnp.angle(jnp.sum(vector**2)))
     real = jnp.real(vector)
     return real / jnp.linalg.norm(real)
+
+
+def cubic_coefficient(
+    matrix: Float[Array, "state state"],
+    matrix_beside: Callable[[Float[Array, " state"]], Float[Array, "state state"]],
+) -> Float[Array, ""]:
+    """Give the coefficient c of a period doubling, along whose direction W the motion goes `s -> -s + c s^3`.
+
+    `c = w (D^3 P [W, W, W] / 6 + D^2 P [W, (I - D P)^-1 D^2 P [W, W]] / 2)` with `w W = 1`. Where it is
+    positive a stable orbit of twice the period takes over; where it is negative a saddle of twice the period
+    stands beside the orbit as long as this is stable. Derivatives are central differences of `D P W`.
+
+    Args:
+        matrix: derivative of the map at the doubling.
+        matrix_beside: gives it at a shift of the state.
+
+    Returns:
+        The coefficient, in the unit of the states.
+
+    Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, secs. 5.4.2 and 9.3.
+    """
+    unit = jnp.eye(matrix.shape[0])
+    right, left = null_direction(matrix + unit), null_direction((matrix + unit).T)
+
+    def along(direction: Array, _: None) -> tuple[Array, tuple[Array, Array, Array]]:
+        def moved(sign: Array) -> Array:
+            return matrix_beside(sign * _SHIFT * direction) @ right
+
+        ahead, behind = jax.vmap(moved)(jnp.array([1.0, -1.0]))
+        slope, bend = (ahead - behind) / (2.0 * _SHIFT), (ahead + behind - 2.0 * matrix @ right) / _SHIFT**2
+        answer = jnp.linalg.solve(unit - matrix, slope)
+        size = jnp.linalg.norm(answer)
+        return answer / size, (slope, bend, size)
+
+    # One traced step serves both directions: the critical one, and what answers its square.
+    _, (slopes, bends, sizes) = jax.lax.scan(along, right, None, length=2)
+    whole = bends[0] / 6.0 + 0.5 * sizes[0] * slopes[1]
+    return jnp.dot(left, whole) / jnp.dot(left, right)
 
 
 def _determinant(matrix: Float[Array, "row row"]) -> Float[Array, ""]:

@@ -13,14 +13,15 @@ from ..._types import Scalar
 from ..orbit import (
     MOST_STEPS_A_PERIOD,
     ShootingMethod,
-    Split,
     first_split,
-    multipliers,
-    split_image,
-    split_jacobian,
     steps_wanted,
 )
-from ._criticality import BifurcationKind, critical_direction, criticality, null_direction, pair_cosine
+from ._bifurcation_system import BifurcationSystem, PointValues
+from ._criticality import (
+    BifurcationKind,
+    null_direction,
+    pair_cosine,
+)
 from ._parameter_family import ParameterFamily
 
 _SPLIT_ERROR = 1e-10
@@ -39,92 +40,6 @@ _TRIALS, _MOST_STEPS = 2, 22
 """Motions by which the steps are chosen, and evaluations at most, those included."""
 
 
-class _System(eqx.Module):
-    """The equations of a bifurcation next to a guess, the motion split at its kinks.
-
-    Attributes:
-        method: how the orbit is closed.
-        kind: which bifurcation.
-        split: where the motion is split.
-        across: in two parameters, normal of the plane across the curve over scaled state and shares; empty
-            in one.
-        origin: point of this plane.
-        cosine: in two parameters, in place of the plane, that of the critical pair's angle; None for the
-            plane.
-    """
-
-    method: ShootingMethod
-    kind: BifurcationKind = eqx.field(static=True)
-    split: Split
-    across: Float[Array, " unknown"]
-    origin: Float[Array, " unknown"]
-    cosine: Float[Array, ""] | None = None
-
-    @property
-    def states(self) -> int:
-        """Count of states."""
-        return self.split.scale.shape[0]
-
-    @property
-    def whole(self) -> int:
-        """Count of states and crossings."""
-        return self.states + self.split.crossings.phases.shape[0]
-
-    def at_cosine(self, cosine: float) -> "_System":
-        """Give the equations with the angle of the critical pair in place of the plane."""
-        nothing = jnp.zeros(0)
-        return _System(self.method, self.kind, self.split, nothing, nothing, jnp.asarray(cosine))
-
-    def image(self, at: ParameterFamily, unknown: Array) -> Float[Array, " component"]:
-        """Give the state after the turns, and how far each kink is missed, of place and shares."""
-        setting, place = at.at(unknown[self.whole :]), unknown[: self.whole]
-        return jnp.concatenate(split_image(setting.model, self.method, setting.drive, self.split, place))
-
-    def matrix(self, at: ParameterFamily, unknown: Array) -> Float[Array, "state state"]:
-        """Give the derivative of the map, in scaled units."""
-        setting, place = at.at(unknown[self.whole :]), unknown[: self.whole]
-        return split_jacobian(setting.model, self.method, setting.drive, self.split, place)[0]
-
-    def tests(self, matrix: Array) -> Float[Array, " equation"]:
-        """Give what vanishes of the derivative of the map."""
-        tests = [criticality(self.kind, matrix)]
-        if self.cosine is not None:
-            tests.append(pair_cosine(matrix) - self.cosine)
-        return jnp.stack(tests)
-
-    def plane(self, unknown: Array) -> Float[Array, " equation"]:
-        """Give the distance from the plane across the curve, where there is one."""
-        if self.cosine is not None or not self.across.size:
-            return jnp.zeros(0)
-        here = jnp.concatenate([unknown[: self.states], unknown[self.whole :]])
-        return jnp.dot(self.across, here - self.origin)[None]
-
-    def residual(self, unknown: Array, at: ParameterFamily) -> Float[Array, " equation"]:
-        """Give what vanishes at the bifurcation."""
-        moved = self.image(at, unknown)
-        gap = moved.at[: self.states].add(-unknown[: self.states])
-        return jnp.concatenate([gap, self.tests(self.matrix(at, unknown)), self.plane(unknown)])
-
-    def values(self, final: Array, at: ParameterFamily) -> "_Values":
-        """Give what is wanted of the solution."""
-        return self.read(final, self.matrix(at, final))
-
-    def read(self, final: Array, matrix: Array) -> "_Values":
-        """Give what is wanted of the solution, from the derivative of the map in scaled units."""
-        scale = self.split.scale
-        direction = critical_direction(self.kind, matrix, multipliers(matrix))
-        return final[self.whole :], final[: self.states] * scale, _unscaled(matrix, scale), direction
-
-
-_Values = tuple[
-    Float[Array, " parameter"], Float[Array, " state"], Float[Array, "state state"], Float[Array, " state"]
-]
-
-
-def _unscaled(matrix: Array, scale: Array) -> Array:
-    return scale[:, None] * matrix / scale[None]
-
-
 class Polished(NamedTuple):
     """A bifurcation point, without derivatives: see `moving`.
 
@@ -136,15 +51,15 @@ class Polished(NamedTuple):
         matrix: derivative of the state after the turns by the one before, SI units.
         direction: critical direction of the state, scaled to unit length; of a pair its real part.
         scale: size of each state.
-        bend: quadratic coefficient of the motion in the critical direction, `w D^2 P [W, W]` with `w W = 1`,
-            of a fold; zero at a cusp, NaN of other kinds.
+        bend: of a fold the quadratic coefficient in the critical direction, `w D^2 P [W, W]` with `w W = 1`;
+            of a doubling in two parameters the cubic one, see `cubic_coefficient`; NaN of others.
         cosine: see `pair_cosine`.
         found: whether the search converged.
         complete: whether every kink was split at.
     """
 
     final: Float[Array, " extended"]
-    system: _System
+    system: BifurcationSystem
     shares: Float[Array, " parameter"]
     state: Float[Array, " state"]
     matrix: Float[Array, "state state"]
@@ -169,7 +84,7 @@ class Polished(NamedTuple):
         return self._replace(shares=shares, state=state, matrix=matrix, direction=direction)
 
 
-def _extended(final: Array, family: ParameterFamily, system: _System) -> tuple[Array, _Values]:
+def _extended(final: Array, family: ParameterFamily, system: BifurcationSystem) -> tuple[Array, PointValues]:
     return system.residual(final, family), system.values(final, family)
 
 
@@ -192,7 +107,7 @@ class PointGuess(NamedTuple):
 
 def _start(
     family: ParameterFamily, method: ShootingMethod, kind: BifurcationKind, guess: PointGuess, places: int
-) -> tuple[_System, Array]:
+) -> tuple[BifurcationSystem, Array]:
     """Give the equations next to a guess, and the unknowns there."""
     setting = family.at(guess.shares)
     split, place = first_split(setting.model, method, setting.drive, guess.state, places)
@@ -205,7 +120,7 @@ def _start(
         across = jnp.concatenate([normal[:states] * split.scale / plane_scale, normal[states:]])
         across = across / jnp.linalg.norm(across)
         origin = jnp.concatenate([place[:states], guess.shares])
-    system = _System(method, kind, split, across, origin, guess.cosine)
+    system = BifurcationSystem(method, kind, split, across, origin, guess.cosine)
     return system, jnp.concatenate([place, guess.shares])
 
 
@@ -234,7 +149,7 @@ class _Expansion(NamedTuple):
         return jnp.einsum("sc,kcu->sku", self.left, self.curved)
 
 
-def _expand(system: _System, family: ParameterFamily, unknown: Array, right: Array) -> _Expansion:
+def _expand(system: BifurcationSystem, family: ParameterFamily, unknown: Array, right: Array) -> _Expansion:
     """Give the motion beside a point; `right` is that of a point nearby.
 
     Second derivatives are central differences of first ones: a nest of derivatives takes twice as long to
@@ -265,7 +180,7 @@ def _expand(system: _System, family: ParameterFamily, unknown: Array, right: Arr
     return _Expansion(moved, slope, right, left, matrix, curved)
 
 
-def _newton(system: _System, beside: _Expansion, unknown: Array) -> tuple[Array, Array]:
+def _newton(system: BifurcationSystem, beside: _Expansion, unknown: Array) -> tuple[Array, Array]:
     """Give the residual at a point, and the step of Newton's method from it."""
     states = system.states
     gap = beside.moved.at[:states].add(-unknown[:states])
@@ -370,7 +285,9 @@ def polish(
     # Newton may have gone to another bifurcation, or to two real multipliers one the inverse of the other.
     near = jnp.max(jnp.abs(shares - guess.shares)) < within
     good = jnp.isfinite(end.mismatch) & (end.mismatch < method.integrator.residual_tolerance) & near
-    split, cosine = system.split, pair_cosine(end.matrix)
+    split, cosine, bend = system.split, pair_cosine(end.matrix), end.bend
+    if kind == "period_doubling" and system.across.size:
+        bend = system.cubic(family, end.unknown, end.matrix)
     return Polished(
         end.unknown,
         system,
@@ -379,14 +296,14 @@ def polish(
         matrix,
         direction,
         split.scale,
-        end.bend,
+        bend,
         cosine,
         good,
         split.complete,
     )
 
 
-def _bend(system: _System, beside: _Expansion) -> Float[Array, ""]:
+def _bend(system: BifurcationSystem, beside: _Expansion) -> Float[Array, ""]:
     """Give the quadratic coefficient at a fold."""
     if system.kind != "fold":
         return jnp.array(jnp.nan)

@@ -33,7 +33,7 @@ _ZERO_TO = 1e-6
 
 TESTS: dict[BifurcationKind, dict[str, float | None]] = {
     "fold": {"cusp": None, "resonance_1_1": 1.0},
-    "period_doubling": {"resonance_1_2": -1.0},
+    "period_doubling": {"generalised_doubling": None, "resonance_1_2": -1.0},
     "neimark_sacker": {
         "resonance_1_1": 1.0,
         "resonance_1_2": -1.0,
@@ -42,7 +42,7 @@ TESTS: dict[BifurcationKind, dict[str, float | None]] = {
     },
 }
 """Special points of each kind of curve, with the cosine of the critical pair's angle there; None where the
-quadratic coefficient vanishes."""
+quadratic coefficient of a fold, or the cubic one of a doubling, vanishes."""
 
 
 class CurveStart(NamedTuple):
@@ -161,7 +161,8 @@ class OrbitCurve(eqx.Module):
         good = np.where(found.found & found.complete, 1.0, np.nan)
         known = np.where(np.isfinite(found.direction), found.direction, 0.0)
         chain = np.sum(known * np.concatenate([before[None], known[:-1]]), axis=1)
-        bend = np.cumprod(np.where(chain < 0.0, -1.0, 1.0)) * found.bend
+        turned = np.cumprod(np.where(chain < 0.0, -1.0, 1.0)) if self.kind == "fold" else 1.0
+        bend = turned * found.bend
         return {
             name: good * (bend if cosine is None else found.cosine - cosine)
             for name, cosine in TESTS[self.kind].items()
@@ -208,10 +209,8 @@ class OrbitCurve(eqx.Module):
         return self._codimension_two(name, found, good)
 
     def _codimension_two(self, name: str, found: Polished, good: bool) -> CodimensionTwoPoint:
-        cosine = TESTS[self.kind][name]
-        if cosine is not None:
-            # Moves with the model as the two conditions say, and not across the curve.
-            found = found._replace(system=found.system.at_cosine(cosine))
+        # Moves with the model as the two conditions say, and not across the curve.
+        found = found._replace(system=found.system.at_special_point(TESTS[self.kind][name]))
         found = found._replace(found=jnp.asarray(found.found) & good)
         points = self.numbers(jax.tree.map(lambda own: jnp.asarray(own)[None], found))
         amplitude, frequency, y0, roots, known = jax.tree.map(lambda own: own[0], points)

@@ -3,6 +3,8 @@
 import functools
 import itertools
 import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -12,20 +14,24 @@ import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Complex, Float, Int
 
+from ..._cores import usable_cores
 from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Sine, modulus, multipliers
+from ..orbit import Sine, modulus, multipliers, trajectory
 from ._map_method import Lane, MapMethod, advance, kinks_between
-from ._starts import Candidates, PlacedSurface, read_surface
+from ._nodes import half_peak_to_peak
+from ._starts import Candidates, PlacedSurface, joined, read_surface
 from ._surface import Surface
 
 _NEWTON_STEPS = 12
 """Steps of Newton's method after which a cell counts as failed."""
 
 SAMPLED = 1024
-"""Cells of which the integration error is found, and that share a further step where the first was not
-enough."""
+"""Cells of which the integration error is found."""
+
+TOGETHER = 512
+"""Orbits that share a compiled step: those of a sample, and those for which a first step was not enough."""
 
 FULLY_CLOSED = 1e-9
 """Relative step after which an orbit is closed far better than it is integrated."""
@@ -36,7 +42,7 @@ _WIDE = {"xla_cpu_prefer_vector_width": 512}
 WHOLE_STEPS = 4
 """Times the steps of orbits that are not split at kinks."""
 
-FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE, NO_FURTHER_ORBIT = range(5)
+FOUND, NOT_CONVERGED, NOT_FINITE, NOT_ACCURATE, STICKS, NO_FURTHER_ORBIT = range(6)
 """Codes of how the search in a cell ended."""
 
 
@@ -126,6 +132,13 @@ def _newton_steps(
     return moved, phases, size, roots, modulus(roots[..., 0])
 
 
+@quick_jit
+def _sizes(model: Isolator, method: MapMethod, states: Array, push: Array, frequency: Array) -> Lanes:
+    drive, turns = Sine(push[:, 0], push[:, 1], frequency), 0.5 if method.half else 1.0
+    path = trajectory(model, method.integrator, drive, tuple(states.T), turns=turns)[0]
+    return half_peak_to_peak(path, method.half)
+
+
 @functools.partial(quick_jit, options=_WIDE)
 def surface_lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
     """Give starts as the surface has them.
@@ -190,7 +203,33 @@ class CellSolver(eqx.Module):
         """
         where = jax.device_put([padded(values, size) for values in candidates[:3]], self.sharding)
         lanes = surface_lanes(self.model, self.surface, where)
-        return self.improve(self.method, lanes, candidates.force.size, limit)
+        found = self.improve(self.method, lanes, candidates.force.size, limit)
+        if self.method.sides is not None:
+            return found
+        # Where orbits share no order of kinks the surface is rough, and an orbit may lie far from its start.
+        push = np.asarray(self.surface.amplitudes)[candidates.force, None] * found.direction
+        frequency = np.asarray(self.surface.frequencies)[candidates.frequency]
+        response = np.empty(found.response.shape)
+        for begin in range(0, response.size, TOGETHER):
+            own = slice(begin, begin + TOGETHER)
+            rows = [padded(values[own], TOGETHER) for values in (found.states, push, frequency)]
+            sizes = _sizes(self.model, self.method, *jax.device_put(rows, self.sharding))
+            response[own] = np.asarray(sizes)[: response[own].size]
+        return found._replace(response=response)
+
+    def in_blocks(self, work: Callable[[slice], Found], count: int) -> Found:
+        """Find orbits block by block, as many blocks at once as there are cores.
+
+        Args:
+            work: gives the orbits of a block of at most `TOGETHER`.
+            count: of all orbits.
+
+        Returns:
+            All.
+        """
+        blocks = [slice(begin, min(begin + TOGETHER, count)) for begin in range(0, count, TOGETHER)]
+        with ThreadPoolExecutor(1 if self.sharding.num_devices > 1 else usable_cores()) as pool:
+            return joined(list(pool.map(work, blocks)))
 
     def improve(self, method: MapMethod, lanes: Lane, count: int, limit: float | None = None) -> Found:
         """Improve starts until each has converged or failed.
@@ -214,9 +253,9 @@ class CellSolver(eqx.Module):
                 break
             if not step.flags.writeable:
                 lanes, step, roots, radius = jax.tree_util.tree_map(np.array, (lanes, step, roots, radius))
-            for begin in range(0, late.size, SAMPLED):
-                block = late[begin : begin + SAMPLED]
-                some = jax.tree_util.tree_map(lambda it, block=block: padded(it[block], SAMPLED), lanes)
+            for begin in range(0, late.size, TOGETHER):
+                block = late[begin : begin + TOGETHER]
+                some = jax.tree_util.tree_map(lambda it, block=block: padded(it[block], TOGETHER), lanes)
                 again = _newton_steps(self.model, method, jax.device_put(some, self.sharding))
                 targets = [*lanes.state, *lanes.phases, step, roots, radius]
                 for target, value in zip(targets, [*again[0], *again[1], *again[2:]], strict=True):
@@ -275,7 +314,7 @@ def cell_solvers(
     mesh = Mesh(np.asarray(jax.local_devices() if devices is None else devices), ("cell",))
     everywhere = NamedSharding(mesh, PartitionSpec())
     tables = (surface.polynomials, surface.breaks, surface.rest, forces, surface.frequencies)
-    placed = PlacedSurface(*(jax.device_put(jnp.asarray(table), everywhere) for table in tables))
+    placed = PlacedSurface(*(jax.device_put(np.asarray(table), everywhere) for table in tables))
     cells = NamedSharding(mesh, PartitionSpec("cell"))
     steps = jnp.asarray(integrator.steps_a_period(model))
     split = MapMethod(integrator, half, jnp.asarray(surface.sides), steps)

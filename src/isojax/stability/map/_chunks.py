@@ -14,12 +14,13 @@ from jax.experimental import multihost_utils
 from ..._cores import usable_cores
 from ..._progress import Counted
 from ...models import write_whole
+from ._aligned import aligned
 from ._batched_newton import CellSolver, Found
 from ._reader import SurfaceReader
 from ._single_orbits import SingleOrbits
 from ._starts import Candidates
 
-FEWEST = 1024
+FEWEST = 512
 """Lanes of the smallest batch: a smaller one costs no less."""
 
 
@@ -104,13 +105,13 @@ def run_chunks(
 
 def _blank(count: int, states: int, kinks: int) -> Found:
     return Found(
-        np.empty((count, states)),
-        np.empty((count, 2)),
-        np.empty((count, kinks)),
-        np.empty((count, states), complex),
-        np.empty(count),
-        np.empty(count),
-        np.empty(count, np.int8),
+        aligned((count, states)),
+        aligned((count, 2)),
+        aligned((count, kinks)),
+        aligned((count, states), complex),
+        aligned((count,)),
+        aligned((count,)),
+        aligned((count,), np.int8),
     )
 
 

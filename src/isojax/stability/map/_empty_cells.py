@@ -120,21 +120,26 @@ def without_repeats(
     order = good[np.lexsort((found.response[good], place[good]))]
     size = found.response[order]
     close = (np.diff(place[order]) == 0) & (np.diff(size) <= _NEIGHBOURING * size[1:])
-    if not close.any():
+    # Runs of orbits of all but the same size in a cell; in each, every one is compared with every other.
+    run = np.r_[0, np.cumsum(~close)] if order.size else np.zeros(0, int)
+    lengths = np.bincount(run)[run] if order.size else run
+    order, run = order[lengths > 1], run[lengths > 1]
+    if not order.size:
         return cells
     method = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
-    pairs = np.stack([order[:-1][close], order[1:][close]])
-    first, second = (states_of(model, method, window, cells, own)[:, :2] for own in pairs)
-    scale = np.stack(
-        [found.response[pairs[0]], 2.0 * np.pi * window.frequencies[candidates.frequency[pairs[0]]]]
-    )
-    scale[1] *= scale[0]
-    same = np.all(np.abs(first - second) <= _SAME * scale.T, axis=1)
-    gone = np.maximum(*pairs)[same]
+    states = states_of(model, method, window, cells, order)[:, :2]
+    rate = 2.0 * np.pi * window.frequencies[candidates.frequency[order]]
+    scale = found.response[order, None] * np.stack([np.ones_like(rate), rate], axis=1)
+    gone = []
+    for apart in range(1, int(lengths.max())):
+        alike = run[:-apart] == run[apart:]
+        alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= _SAME * scale[apart:], axis=1)
+        gone.append(np.maximum(order[:-apart], order[apart:])[alike])
+    left_out = np.concatenate(gone)
     found = Found(*(np.array(values) for values in found))
-    found.code[gone] = NO_FURTHER_ORBIT
+    found.code[left_out] = NO_FURTHER_ORBIT
     for values in (found.states, found.multipliers, found.radius, found.response):
-        values[gone] = np.nan
+        values[left_out] = np.nan
     return Cells(candidates, found, split)
 
 

@@ -31,6 +31,7 @@ from ._batched_newton import (
     NOT_ACCURATE,
     NOT_CONVERGED,
     NOT_FINITE,
+    STICKS,
     CellSolver,
     Found,
     states_at_zero,
@@ -79,7 +80,7 @@ class StabilityMap(eqx.Module):
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
         result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
-        error: of a multiplier at most, from a sample of cells against steps four times finer.
+        error: of a multiplier at most, from a sample of cells against steps three times finer.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
         integrator: steps a period that were taken.
         probability_stable: chance that the cell holds no unstable orbit, coexisting ones included, where a
@@ -320,9 +321,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     split = np.repeat(
         [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
     )
-    # The common case, one list, takes no copying.
-    sought_and_found: list[Any] = [one[0] if len(one) == 1 else joined(one) for one in (lists, parts)]
-    known = Cells(*sought_and_found, split=split)
+    known = Cells(joined(lists), joined(parts), split)
     filled = fill_empty(model, integrator, half, window, known)
     candidates, found, split = without_repeats(model, integrator, half, window, filled)
     if np.sum(filled.found.code == FOUND) > np.sum(known.found.code == FOUND):
@@ -330,11 +329,9 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     error = max((value for value in errors if not math.isnan(value)), default=math.nan)
     arrays = _gridded(candidates, found, split, len(forces), len(band), run.coexisting)
     code = arrays.pop("code")
-    ending = _ending
-    for _ in range(code.ndim):
-        ending = jax.vmap(ending)
-    result = ending(jnp.asarray(code))
-    fields: dict[str, Any] = {name: jnp.asarray(values) for name, values in arrays.items()}
+    result = jax.tree.map(lambda *known: jax.device_put(np.stack(known)[code]), *_endings())
+    # What is put on the device is not copied where it can be taken as it is.
+    fields: dict[str, Any] = {name: jax.device_put(values) for name, values in arrays.items()}
     smap = StabilityMap(
         model=model,
         amplitudes=jnp.asarray(forces),
@@ -349,12 +346,17 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     return smap, sought
 
 
-def _ending(code: Array) -> RESULTS:
-    """Give the outcome that a code of the search stands for."""
-    failed = RESULTS.where(code == NOT_FINITE, RESULTS.not_finite, RESULTS.not_converged)
-    failed = RESULTS.where(code == NOT_ACCURATE, RESULTS.not_accurate, failed)
-    failed = RESULTS.where(code == NO_FURTHER_ORBIT, RESULTS.no_further_orbit, failed)
-    return RESULTS.where(code == FOUND, RESULTS.promote(diffrax.RESULTS.successful), failed)
+def _endings() -> list[RESULTS]:
+    """Give the outcomes, in the order of the codes of the search."""
+    outcomes = {
+        FOUND: RESULTS.promote(diffrax.RESULTS.successful),
+        NOT_CONVERGED: RESULTS.not_converged,
+        NOT_FINITE: RESULTS.not_finite,
+        NOT_ACCURATE: RESULTS.not_accurate,
+        STICKS: RESULTS.sticks,
+        NO_FURTHER_ORBIT: RESULTS.no_further_orbit,
+    }
+    return [outcomes[code] for code in sorted(outcomes)]
 
 
 def _gridded(

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..orbit import Sine
-from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
+from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, TOGETHER, CellSolver, Found, padded
 from ._map_method import Lane
 from ._starts import Candidates
 from ._surface import LEAST_SLOPE, MapWindow
@@ -19,12 +19,12 @@ _MARGIN = 1.25
 _DOUBLINGS = 3
 """Trials with twice the steps where some orbits were not found."""
 
-_FINER_STEPS = 4
+_FINER_STEPS = 3
 """Times the steps of a map with which its error is found."""
 
 
 def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, window: MapWindow) -> float:
-    """Give the integration error of multipliers, from a sample of cells solved with steps four times finer.
+    """Give the integration error of multipliers, from a sample of cells solved with steps three times finer.
 
     The distance of a multiplier from the finer ones is their characteristic polynomial there over its slope.
     The slope counts as 0.1 at least: where two multipliers all but coincide they separate like the square
@@ -43,15 +43,38 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
     if not good.size:
         return float("nan")
     picked = good[np.unique(np.linspace(0, good.size - 1, SAMPLED).astype(int))]
-    lanes = lanes_of(found, candidates, window, picked)
-    lanes = jax.tree_util.tree_map(lambda values: jnp.asarray(padded(np.asarray(values), SAMPLED)), lanes)
-    # So far that only the error of the integration remains.
-    finer = solver.improve(solver.method.finer(_FINER_STEPS), lanes, picked.size, limit=FULLY_CLOSED)
+    method = solver.method.finer(_FINER_STEPS)
+
+    def closed(block: slice) -> Found:
+        lanes = lanes_of(found, candidates, window, picked[block])
+        lanes = jax.tree.map(lambda values: jnp.asarray(padded(np.asarray(values), TOGETHER)), lanes)
+        # So far that only the error of the integration remains.
+        return solver.improve(method, lanes, picked[block].size, limit=FULLY_CLOSED)
+
+    finer = solver.in_blocks(closed, picked.size)
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]
     ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), LEAST_SLOPE)
     return _MARGIN * float(np.nanmax(nearest * ratio))
+
+
+def solved_sample(solver: CellSolver, some: Candidates, limit: float | None = None) -> Found:
+    """Give the orbits of a sample.
+
+    Args:
+        solver: that of the map.
+        some: the sample.
+        limit: see `CellSolver.improve`.
+
+    Returns:
+        Its orbits.
+    """
+
+    def solved(block: slice) -> Found:
+        return solver(Candidates(*(values[block] for values in some)), TOGETHER, limit)
+
+    return solver.in_blocks(solved, some.force.size)
 
 
 def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) -> int:
@@ -63,13 +86,13 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
     picked = np.unique(np.linspace(0, candidates.force.size - 1, SAMPLED).astype(int))
     some = Candidates(*(values[picked] for values in candidates))
     taken = integrator.steps_per_period
-    found = solver(some, SAMPLED, limit=FULLY_CLOSED)
+    found = solved_sample(solver, some, FULLY_CLOSED)
     for _ in range(_DOUBLINGS):
         if (found.code == FOUND).all():
             break
         # Where the motion is too fast for the steps there is no orbit, and no error to go by.
         solver, taken = eqx.tree_at(lambda it: it.method, solver, solver.method.finer(2)), 2 * taken
-        found = solver(some, SAMPLED, limit=FULLY_CLOSED)
+        found = solved_sample(solver, some, FULLY_CLOSED)
     error = sampled_error(solver, some, found, window)
     if not error > 0.0:
         return integrator.steps_per_period

@@ -14,6 +14,7 @@ from ..orbit import (
     Accuracy,
     ShootingMethod,
     event_places,
+    is_held,
     modulus,
     multipliers,
     recorded_sine,
@@ -26,6 +27,7 @@ from ._batched_newton import (
     NOT_ACCURATE,
     NOT_CONVERGED,
     NOT_FINITE,
+    STICKS,
     Found,
     padded,
     states_at_zero,
@@ -124,8 +126,9 @@ def _shoot(
         solution = shoot(model, method, solver, drive, begin, places, accuracy)
         path = trajectory(model, method.integrator, drive, tuple(solution.state), turns=method.turns)[0]
         finite = jnp.all(jnp.isfinite(path)) & jnp.all(jnp.isfinite(solution.matrix))
+        failed = jnp.where(is_held(model, drive), STICKS, jnp.where(finite, NOT_CONVERGED, NOT_FINITE))
         code = jnp.where(solution.accurate, FOUND, NOT_ACCURATE)
-        code = jnp.where(finite, jnp.where(solution.found, code, NOT_CONVERGED), NOT_FINITE)
+        code = jnp.where(finite & solution.found, code, failed)
         blank = jnp.where(code == FOUND, 1.0, jnp.nan)
         roots = multipliers(solution.matrix)
         roots = (roots * roots if method.half else roots) * blank

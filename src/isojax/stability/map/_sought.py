@@ -8,7 +8,7 @@ from jaxtyping import Bool
 
 from ...models import Integrator, Isolator
 from ._batched_newton import SAMPLED, CellSolver, cell_solvers
-from ._map_error import sampled_error
+from ._map_error import sampled_error, solved_sample
 from ._map_method import MapMethod
 from ._reader import SurfaceReader
 from ._single_orbits import SingleOrbits
@@ -113,9 +113,11 @@ def seek(
         by_reading = reader(some, SAMPLED)
         error = sampled_error(split, some, by_reading, window)
         if error > integrator.map_error:
-            own = sampled_error(split, some, split(some, SAMPLED), window)
+            own = sampled_error(split, some, solved_sample(split, some), window)
             if not error <= 2.0 * own:
                 read, error = np.zeros_like(read), math.nan
+    if read.all():
+        return Sought(surface, (Group("read", reader, candidates),), error)
     shared = surface.shared[candidates.frequency, candidates.part]
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
     if model.splits:
@@ -132,8 +134,10 @@ def seek(
 def _sample(surface: Surface, candidates: Candidates, known: np.ndarray) -> np.ndarray:
     """Give places of a sample: by the largest expected error, next to folds, and evenly."""
     # Of a long list, one in so many; but all where orbits coexist.
-    thinned = np.arange(0, known.size, max(1, known.size // _POOL))
-    known = np.union1d(known[thinned], known[candidates.order[known] > 0])
+    kept = np.zeros(candidates.order.size, bool)
+    kept[known[:: max(1, known.size // _POOL)]] = True
+    kept[known] |= candidates.order[known] > 0
+    known = np.flatnonzero(kept)
     column, part = candidates.frequency[known], candidates.part[known]
     count = min(SAMPLED // 3, known.size)
     ends = surface.force[column, part], surface.force[column, part + 1]

@@ -108,9 +108,11 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexi
     held = cells if coexisting else cells[:1]
     lists = []
     for order, parts in enumerate(held):
-        cell = np.flatnonzero(parts >= 0)
-        force, column = (places.astype(np.int32) for places in np.divmod(cell, shape[1]))
-        lists.append(Candidates(force, column, parts[cell], np.full(cell.size, order, np.int32)))
+        force, column = np.indices(shape, np.int32).reshape(2, -1)
+        has = parts >= 0
+        if not has.all():
+            force, column, parts = force[has], column[has], parts[has]
+        lists.append(Candidates(force, column, parts, np.full(force.size, order, np.int32)))
     return joined(lists)
 
 
@@ -123,6 +125,8 @@ def joined(lists: list[Any]) -> Any:
     Returns:
         One such tuple.
     """
+    if len(lists) == 1:
+        return lists[0]
     return type(lists[0])(*(np.concatenate(own) for own in zip(*lists, strict=True)))
 
 

@@ -21,6 +21,7 @@ from ._floquet import pair_angle as pair_angle
 from ._floquet import stable_words as stable_words
 from ._harmonic_balance import HarmonicBalance as HarmonicBalance
 from ._harmonic_balance import harmonic_balance as harmonic_balance
+from ._held import is_held as is_held
 from ._jacobian import value_and_jacobian as value_and_jacobian
 from ._kink_crossings import Crossings as Crossings
 from ._kink_crossings import advance_across_kinks as advance_across_kinks

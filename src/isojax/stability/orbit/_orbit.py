@@ -22,6 +22,7 @@ from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import response_start
 from ._floquet import Floquet, multipliers, stable_words
 from ._harmonic_balance import harmonic_balance
+from ._held import is_held
 from ._period_map import trajectory
 from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
@@ -224,11 +225,10 @@ def _orbit(
         floquet = Floquet(multipliers(matrix), jnp.full(matrix.shape[0], jnp.nan + 0j), matrix)
     finite = jnp.all(jnp.isfinite(path))
     good = RESULTS.promote(diffrax.RESULTS.successful)
-    result = RESULTS.where(
-        found,
-        RESULTS.where(solution.accurate, good, RESULTS.not_accurate),
-        RESULTS.where(finite, RESULTS.not_converged, RESULTS.not_finite),
-    )
+    failed = RESULTS.where(finite, RESULTS.not_converged, RESULTS.not_finite)
+    failed = RESULTS.where(is_held(model, drive), RESULTS.sticks, failed)
+    accurate = RESULTS.where(solution.accurate, good, RESULTS.not_accurate)
+    result = RESULTS.where(found, accurate, failed)
     middle = (path.shape[0] - 1) // 2
     size = jnp.max(jnp.abs(path), axis=0)
     apart = jnp.abs(path[middle] + path[0])
