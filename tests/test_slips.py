@@ -165,7 +165,7 @@ def test_each_cell_of_a_map_says_how_its_search_ended():
     )
     assert smap.result.shape == (3, 2, 2)
     assert repr(smap.result[0, 0, 0]) == "successful"
-    assert repr(smap.result[2, 0, 1]).startswith("The search stopped before it converged.")
+    assert repr(smap.result[2, 0, 1]).startswith("The cell holds no further orbit")
     assert ij.is_successful(smap.result[0, 0, 0])
     found = np.asarray(smap.result == ij.RESULTS.successful)
     np.testing.assert_array_equal(found.sum(axis=0), smap.count)

@@ -354,7 +354,7 @@ def test_backbone_of_a_linear_spring_stands_upright():
     assert "not found at 1 of 4" in figure.axes[0].get_title(loc="left")
 
 
-def test_transmissibility_goes_on_into_the_nearest_stable_orbit_and_closes_its_fold():
+def test_transmissibility_goes_on_into_the_nearest_stable_orbit_and_closes_its_fold(lens):
     # One orbit at 1 and 4 Hz; at 2 and 3 Hz two stable ones with a saddle between.
     nan = np.nan
     size = np.array([[1.0, 1.1, 1.2, 5.0], [nan, 3.0, 2.0, nan], [nan, 4.0, 4.5, nan]])
@@ -366,6 +366,7 @@ def test_transmissibility_goes_on_into_the_nearest_stable_orbit_and_closes_its_f
         jnp.asarray(size),
         jnp.asarray(radius),
         successful()[1],
+        lens,  # of which the picture takes nothing
     )
     figure = ij.plot.transmissibility(found)
     pieces = set()

@@ -13,7 +13,7 @@ from .._progress import Counted, silent
 _POINTS_AT_ONCE = 1024
 """Points at once: more run hardly faster, and a thousand orbits with their paths take some hundred MB."""
 
-_LINES = 20
+_PROGRESS_LINES = 20
 """Lines of progress where points are evaluated one by one."""
 
 
@@ -75,7 +75,7 @@ def _one_by_one(
         except Exception as problem:  # what a fold is asked for where there is none may raise anything
             given.append(None)
             problems.append(problem)
-        if done % max(len(points) // _LINES, 1) == 0:
+        if done % max(len(points) // _PROGRESS_LINES, 1) == 0:
             _say(done, len(points), progress)
     known = next((one for one in given if one is not None), None)
     if known is None and problems[0] is not None:

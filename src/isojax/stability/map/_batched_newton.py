@@ -30,7 +30,7 @@ _NEWTON_STEPS = 12
 SAMPLED = 1024
 """Cells of which the integration error is found."""
 
-TOGETHER = 512
+CELLS_TOGETHER = 512
 """Orbits that share a compiled step: those of a sample, and those for which a first step was not enough."""
 
 FULLY_CLOSED = 1e-9
@@ -210,9 +210,9 @@ class CellSolver(eqx.Module):
         push = np.asarray(self.surface.amplitudes)[candidates.force, None] * found.direction
         frequency = np.asarray(self.surface.frequencies)[candidates.frequency]
         response = np.empty(found.response.shape)
-        for begin in range(0, response.size, TOGETHER):
-            own = slice(begin, begin + TOGETHER)
-            rows = [padded(values[own], TOGETHER) for values in (found.states, push, frequency)]
+        for begin in range(0, response.size, CELLS_TOGETHER):
+            own = slice(begin, begin + CELLS_TOGETHER)
+            rows = [padded(values[own], CELLS_TOGETHER) for values in (found.states, push, frequency)]
             sizes = _sizes(self.model, self.method, *jax.device_put(rows, self.sharding))
             response[own] = np.asarray(sizes)[: response[own].size]
         return found._replace(response=response)
@@ -221,13 +221,15 @@ class CellSolver(eqx.Module):
         """Find orbits block by block, as many blocks at once as there are cores.
 
         Args:
-            work: gives the orbits of a block of at most `TOGETHER`.
+            work: gives the orbits of a block of at most `CELLS_TOGETHER`.
             count: of all orbits.
 
         Returns:
             All.
         """
-        blocks = [slice(begin, min(begin + TOGETHER, count)) for begin in range(0, count, TOGETHER)]
+        blocks = [
+            slice(begin, min(begin + CELLS_TOGETHER, count)) for begin in range(0, count, CELLS_TOGETHER)
+        ]
         with ThreadPoolExecutor(1 if self.sharding.num_devices > 1 else usable_cores()) as pool:
             return joined(list(pool.map(work, blocks)))
 
@@ -253,9 +255,11 @@ class CellSolver(eqx.Module):
                 break
             if not step.flags.writeable:
                 lanes, step, roots, radius = jax.tree_util.tree_map(np.array, (lanes, step, roots, radius))
-            for begin in range(0, late.size, TOGETHER):
-                block = late[begin : begin + TOGETHER]
-                some = jax.tree_util.tree_map(lambda it, block=block: padded(it[block], TOGETHER), lanes)
+            for begin in range(0, late.size, CELLS_TOGETHER):
+                block = late[begin : begin + CELLS_TOGETHER]
+                some = jax.tree_util.tree_map(
+                    lambda it, block=block: padded(it[block], CELLS_TOGETHER), lanes
+                )
                 again = _newton_steps(self.model, method, jax.device_put(some, self.sharding))
                 targets = [*lanes.state, *lanes.phases, step, roots, radius]
                 for target, value in zip(targets, [*again[0], *again[1], *again[2:]], strict=True):

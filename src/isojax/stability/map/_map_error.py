@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..orbit import Sine
-from ._batched_newton import FOUND, FULLY_CLOSED, SAMPLED, TOGETHER, CellSolver, Found, padded
+from ._batched_newton import CELLS_TOGETHER, FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
 from ._map_method import Lane
 from ._starts import Candidates
 from ._surface import LEAST_SLOPE, MapWindow
@@ -47,7 +47,7 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
 
     def closed(block: slice) -> Found:
         lanes = lanes_of(found, candidates, window, picked[block])
-        lanes = jax.tree.map(lambda values: jnp.asarray(padded(np.asarray(values), TOGETHER)), lanes)
+        lanes = jax.tree.map(lambda values: jnp.asarray(padded(np.asarray(values), CELLS_TOGETHER)), lanes)
         # So far that only the error of the integration remains.
         return solver.improve(method, lanes, picked[block].size, limit=FULLY_CLOSED)
 
@@ -72,7 +72,7 @@ def solved_sample(solver: CellSolver, some: Candidates, limit: float | None = No
     """
 
     def solved(block: slice) -> Found:
-        return solver(Candidates(*(values[block] for values in some)), TOGETHER, limit)
+        return solver(Candidates(*(values[block] for values in some)), CELLS_TOGETHER, limit)
 
     return solver.in_blocks(solved, some.force.size)
 

@@ -11,7 +11,7 @@ from ._describing_function import rest_displacement
 from ._event_path import first_sides
 from ._sine import Sine
 
-_PHASES = 256
+_PHASES_OF_REST = 256
 """Instants of a drive period at which friction is asked: its peak is met within a ten-thousandth."""
 
 
@@ -38,4 +38,4 @@ def is_held(model: Isolator, drive: Sine) -> Bool[Array, ""]:
         forward, backward = freeing_accelerations(model, state, at, sides)
         return (forward <= 0.0) & (backward >= 0.0)
 
-    return jnp.all(jax.vmap(stays)(jnp.linspace(0.0, 2.0 * math.pi, _PHASES, endpoint=False)))
+    return jnp.all(jax.vmap(stays)(jnp.linspace(0.0, 2.0 * math.pi, _PHASES_OF_REST, endpoint=False)))
