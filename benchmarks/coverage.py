@@ -85,9 +85,9 @@ def run_one(seed: int, count: int, truth: dict[str, float]) -> dict:
     fit = ij.fit(drawn.model, campaign)
     asked = answers(fit.model, drawn)
     found = ij.uncertainty(fit, lambda model: jnp.stack([one(model) for one in asked.values()]))
-    # None where no interval is stated: draws lose their fold, or the fit has none though the truth has one.
+    # None where draws lose their fold, so that no interval is stated. A fit without the fold is a miss.
     off: dict[str, float] = {}
-    held: dict[str, bool | None] = dict.fromkeys(truth)
+    held: dict[str, bool | None] = dict.fromkeys(truth, False)
     for place, name in enumerate(asked):
         if name in truth:
             low, high = found.interval[:, place].tolist()
@@ -124,7 +124,7 @@ def report(rows: list[dict]) -> bool:
             inside = MARK[0] <= held.mean() <= MARK[1]
             # Of so many campaigns a share is known no better than its interval says.
             outside = high < MARK[0] or low > MARK[1]
-            met &= not outside
+            met &= inside
             curved = sum(name in row["curved"] for row in some)
             print(
                 f"| {count} | {name} | {held.size} | {len(asked) - held.size} | {held.mean():.3f} | "

@@ -227,12 +227,20 @@ def report(rows: list[Row]) -> bool:
     )
 
 
+def seeds_of(words: str) -> range:
+    """Read first:stop, or one seed."""
+    first, _, stop = words.partition(":")
+    return range(int(first), int(stop) if stop else int(first) + 1)
+
+
 def main() -> None:
     """Run, or report."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seeds", default=TUNED_ON, help=f"first:stop; judge on {JUDGED_ON}")
+    parser.add_argument(
+        "--seeds", help=f"first:stop; {TUNED_ON} if omitted, judge on {JUDGED_ON}; with --report, those shown"
+    )
     parser.add_argument("--out", type=Path, default=Path("innocents.jsonl"), help="one line a campaign")
     parser.add_argument("--flaws", nargs="+", default=list(FLAWS), choices=FLAWS)
     parser.add_argument("--minutes", type=float, help="begin no campaign after so long")
@@ -240,12 +248,15 @@ def main() -> None:
     parser.add_argument("--report", type=Path, nargs="+", metavar="FILE", help="print the table")
     options = parser.parse_args()
     if options.report:
-        raise SystemExit(0 if report([row for path in options.report for row in read(path)]) else 1)
+        rows = [row for path in options.report for row in read(path)]
+        if options.seeds:
+            shown = seeds_of(options.seeds)
+            rows = [row for row in rows if row["seed"] in shown]
+        raise SystemExit(0 if report(rows) else 1)
     set_up_jax(options.cache)
     done = {(row["seed"], row["flaw"]) for row in read(options.out)}
     begin, version = time.perf_counter(), commit()
-    first, _, stop = options.seeds.partition(":")
-    for seed in range(int(first), int(stop) if stop else int(first) + 1):
+    for seed in seeds_of(options.seeds or TUNED_ON):
         for flaw in options.flaws:
             if (seed, flaw) in done:
                 continue

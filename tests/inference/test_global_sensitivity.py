@@ -89,6 +89,22 @@ def test_a_sample_that_fails_is_counted_with_place_and_reason():
         ij.global_sensitivity(lambda x: (x["a"], ij.RESULTS.not_converged), CIRCLE, samples=64)
 
 
+def test_samples_that_raise_fail_beside_those_whose_search_failed():
+    def rough(x):
+        if bool(x["a"] > 0.95 * np.pi):
+            raise IndexError("no fold")
+        lost = bool(x["b"] > 0.95 * np.pi)
+        # A count: what raised has none either.
+        return jnp.array(3 + int(x["a"] > 0.0)), ij.RESULTS.not_converged if lost else ij.RESULTS.successful
+
+    found = ij.global_sensitivity(rough, CIRCLE, samples=256)
+    raised, lost = (found.failed_at[:, place] > 0.95 * np.pi for place in (0, 1))
+    assert np.all(raised | lost)
+    assert np.any(raised & ~lost)
+    assert np.any(lost & ~raised)
+    assert found.reason == "IndexError: no fold"
+
+
 def test_a_function_that_cannot_be_mapped_is_evaluated_one_by_one():
     def plain(x):
         return x["a"] if bool(x["b"] > 0.0) else -x["a"]

@@ -1,5 +1,6 @@
 """A function at many points: compiled once and mapped over chunks, so that memory stays bounded."""
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,9 @@ from .._progress import Counted, silent
 _POINTS_AT_ONCE = 1024
 """Points at once: more run hardly faster, and a thousand orbits with their paths take some hundred MB."""
 
+NOT_FINITE = "the quantity is not finite"
+"""Why a point failed where nothing else says so."""
+
 _PROGRESS_LINES = 20
 """Lines of progress where points are evaluated one by one."""
 
@@ -21,7 +25,7 @@ def evaluate(
     function: Callable[[Float[Array, " number"]], Any],
     points: Float[np.ndarray, "point number"],
     progress: Callable[[str], None] = silent,
-) -> tuple[Any, tuple[str, ...]]:
+) -> tuple[Any, str]:
     """Evaluate a function at many points.
 
     Args:
@@ -31,14 +35,14 @@ def evaluate(
         progress: receives a line a chunk.
 
     Returns:
-        What the function gives, as NumPy arrays, point first; and why it raised at a point, "" where it did
-        not. Its numbers are NaN where it raised.
+        What the function gives, as NumPy arrays, point first, real numbers NaN where it raised; and what it
+        raised most often, "" where it never did.
 
     Raises:
         Exception: what the function raised, if it raised at every point.
     """
     try:
-        return _mapped(function, points, progress), ("",) * len(points)
+        return _mapped(function, points, progress), ""
     except (jax.errors.JAXTypeError, ValueError):
         # A curve or a map refuses numbers that are traced; what else is wrong shows here as well.
         return _one_by_one(function, points, progress)
@@ -65,27 +69,27 @@ def _one_by_one(
     function: Callable[[Array], Any],
     points: Float[np.ndarray, "point number"],
     progress: Callable[[str], None],
-) -> tuple[Any, tuple[str, ...]]:
+) -> tuple[Any, str]:
     given: list[Any] = []
-    problems: list[Exception | None] = []
+    problems: list[Exception] = []
     for done, point in enumerate(points, 1):
         try:
             given.append(jax.tree.map(np.asarray, function(jnp.asarray(point))))
-            problems.append(None)
         except Exception as problem:  # what a fold is asked for where there is none may raise anything
             given.append(None)
             problems.append(problem)
         if done % max(len(points) // _PROGRESS_LINES, 1) == 0:
             _say(done, len(points), progress)
     known = next((one for one in given if one is not None), None)
-    if known is None and problems[0] is not None:
+    if known is None:
         raise problems[0]
     lost = jax.tree.map(
         lambda value: np.full_like(value, np.nan) if value.dtype.kind == "f" else value, known
     )
     filled = [lost if one is None else one for one in given]
-    reasons = ("" if one is None else f"{type(one).__name__}: {one}" for one in problems)
-    return jax.tree.map(lambda *values: np.stack(values), *filled), tuple(reasons)
+    reasons = Counter(f"{type(one).__name__}: {one}" for one in problems)
+    reason = max(reasons, key=reasons.__getitem__, default="")
+    return jax.tree.map(lambda *values: np.stack(values), *filled), reason
 
 
 def _say(done: int, count: int, progress: Callable[[str], None]) -> None:

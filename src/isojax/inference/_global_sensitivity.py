@@ -1,6 +1,5 @@
 """Sobol's indices: which share of the variance of a quantity each input causes, over its whole range."""
 
-from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -15,7 +14,7 @@ from .._results import RESULTS, cell_results
 from .._show import Row, brief, number, shown
 from .._types import check_float64
 from ..models import Isolator
-from ._evaluate import evaluate
+from ._evaluate import NOT_FINITE, evaluate
 
 _RESAMPLES = 999
 """Resamples of the bootstrap."""
@@ -163,7 +162,7 @@ def global_sensitivity(
         own = {name: numbers[place] for place, name in enumerate(names)}
         answer = quantity(own if model is None else _moved(model, own))
         value, result = answer if isinstance(answer, tuple) else (answer, None)
-        return jnp.asarray(value), result
+        return 1.0 * jnp.asarray(value), result  # a count that fails is NaN as well
 
     (values, result), raised = evaluate(at, flat, progress)
     if np.iscomplexobj(values):
@@ -245,17 +244,15 @@ def _check_bounds(model: Isolator, names: tuple[str, ...], points: Float[np.ndar
             )
 
 
-def _failures(values: np.ndarray, result: Any, raised: tuple[str, ...]) -> tuple[np.ndarray, str]:
+def _failures(values: np.ndarray, result: Any, raised: str) -> tuple[np.ndarray, str]:
     """Say which samples failed, and why."""
     failed = np.asarray(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
-    messages = Counter(message for message in raised if message)
-    if messages:
-        return failed, messages.most_common(1)[0][0]
-    if result is None:
-        return failed, "the quantity is not finite" if failed.any() else ""
-    outcomes = cell_results(result)
-    failed = failed | ~np.asarray(outcomes == RESULTS.successful)
-    return failed, brief(outcomes[failed]) if failed.any() else ""
+    outcomes = None if result is None else cell_results(result)
+    if outcomes is not None:
+        failed = failed | ~np.asarray(outcomes == RESULTS.successful)
+    if not failed.any() or raised:
+        return failed, raised
+    return failed, NOT_FINITE if outcomes is None else brief(outcomes[failed])
 
 
 def _indices(rows: Float[np.ndarray, "row sample entry"]) -> Float[np.ndarray, "2 input entry"]:

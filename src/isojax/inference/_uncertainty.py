@@ -1,6 +1,5 @@
 """Value, standard error and interval of a quantity of a fitted model."""
 
-from collections import Counter
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -13,7 +12,7 @@ from .._progress import silent
 from .._show import Row, brief, shown
 from .._types import check_float64
 from ..models import CoefficientErrors, EndsEstimated, Estimated, Isolator, coefficient_errors
-from ._evaluate import evaluate
+from ._evaluate import NOT_FINITE, evaluate
 
 _BEND = 0.1
 """Share of an interval by which delta method and draws may differ."""
@@ -139,7 +138,6 @@ def uncertainty(
     value, error, _, _ = parts[0]
     drawn = np.concatenate([part[2] for part in parts])
     finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
-    raised = Counter(reason for part in parts for reason in part[3] if reason)
     if not finite.any():
         raise ValueError(
             "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
@@ -159,7 +157,7 @@ def uncertainty(
         curved,
         drawn,
         float(1.0 - finite.mean()),
-        "" if finite.all() else raised.most_common(1)[0][0] if raised else "the quantity is not finite",
+        "" if finite.all() else next((part[3] for part in parts if part[3]), NOT_FINITE),
         tuple(weights.tolist()),
     )
 
@@ -170,13 +168,11 @@ def _carried(
     draws: int,
     seed: int,
     progress: Callable[[str], None],
-) -> tuple[
-    Float[np.ndarray, "..."], Float[np.ndarray, "..."], Float[np.ndarray, "draw ..."], tuple[str, ...]
-]:
-    """Give value, standard error by the delta method, draws of the quantity, and why some raised."""
+) -> tuple[Float[np.ndarray, "..."], Float[np.ndarray, "..."], Float[np.ndarray, "draw ..."], str]:
+    """Give value, standard error by the delta method, draws of the quantity, and why it raised if it did."""
 
     def at(steps: Float[Array, " step"]) -> Array:
-        return jnp.asarray(quantity(errors.moved(steps)))
+        return 1.0 * jnp.asarray(quantity(errors.moved(steps)))  # a count that fails is NaN as well
 
     value, change = errors.carry(quantity)
     if jnp.iscomplexobj(value) or not np.all(np.isfinite(value)):

@@ -11,6 +11,10 @@ from ...models import Quantity
 
 Waveform = Literal["stepped sine", "swept sine", "multisine"]
 
+DWELLS = 6
+"""Segments of a simulated record, each with a state of its own, and dwells of a stepped sine unless it says
+otherwise."""
+
 AGAIN = "again"
 """Name of the yardstick: the campaign once more."""
 
@@ -43,7 +47,7 @@ class Experiment(NamedTuple):
     load: float = 0.0
     lacking: str = ""
     backward: bool = False
-    dwells: int = 6
+    dwells: int = DWELLS
 
     @property
     def seconds(self) -> float:

@@ -14,7 +14,7 @@ from ..._types import check_float64
 from ...elements import CATALOGUE, AbstractElement
 from ...models import Isolator, coefficient_errors
 from ...records import Campaign
-from ..diagnosis import Experiment
+from ..diagnosis import DWELLS, Experiment
 from ..fitting import Fit, Fitted, Point, Uncertainty, as_fit, expect_uncertainty, plain_unit
 from ..guess import scales as campaign_scales
 from ._candidate_experiments import repeated_campaign
@@ -183,9 +183,10 @@ def _check_plan(
         raise ValueError(f"Argument `levels` must hold positive numbers, but is {levels}.")
     if bands is not None and not (len(bands) and all(0.0 < low < high < np.inf for low, high in bands)):
         raise ValueError(f"Argument `bands` must hold pairs 0 < lowest < highest, but is {bands}.")
-    # A record is as long as six segments, each of an even number of samples.
-    if not (len(dwells) and all(count in (1, 2, 3, 4, 6, 12) for count in dwells)):
-        raise ValueError(f"Argument `dwells` must hold divisors of 12, but is {tuple(dwells)}.")
+    # Each segment of a simulated record has an even number of samples.
+    samples = 2 * DWELLS
+    if not (len(dwells) and all(count > 0 and samples % count == 0 for count in dwells)):
+        raise ValueError(f"Argument `dwells` must hold divisors of {samples}, but is {tuple(dwells)}.")
 
 
 def _ask(

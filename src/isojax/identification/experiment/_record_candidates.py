@@ -6,17 +6,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...records import Campaign
-from ..diagnosis import Experiment, Waveform
+from ..diagnosis import DWELLS, Experiment, Waveform
 from ._candidate_experiments import HIGHEST, WAVEFORM_WORDS
-from ._test_outline import DWELLS, MOST_STEPS, TestOutline
+from ._test_outline import MOST_STEPS, TestOutline
 from ._trial_drive import drive_of
 
-_OTHERS: tuple[tuple[Waveform, bool, int], ...] = (
-    ("swept sine", False, 0),
-    ("swept sine", True, 0),
-    ("multisine", False, 0),
-)
-"""Waveform, whether downwards, dwells."""
+_DIRECTIONS: dict[Waveform, tuple[bool, ...]] = {
+    "stepped sine": (False, True),
+    "swept sine": (False, True),
+    "multisine": (False,),
+}
+"""Whether the frequency falls, of the records of each waveform."""
 
 USUAL_DWELLS = 3, 6, 12
 """Dwells of a stepped sine: long ones tell more of each motion, many more of the curve."""
@@ -80,18 +80,20 @@ def record_candidates(
     """
     unit = "m/s²" if campaign.input.quantity == "base_acceleration" else "N"
     found = []
-    stepped: list[tuple[Waveform, bool, int]] = [
-        ("stepped sine", backward, count) for count in dwells for backward in (False, True)
+    hows: list[tuple[Waveform, int, bool]] = [
+        (waveform, count, backward)
+        for waveform, directions in _DIRECTIONS.items()
+        for count in (dwells if waveform == "stepped sine" else (DWELLS,))
+        for backward in directions
     ]
-    hows = (*stepped, *_OTHERS)
-    for (waveform, backward, count), level, (low, high) in itertools.product(hows, levels, bands):
-        steps = f" in {count} dwells" if count else ""
+    for (waveform, count, backward), level, (low, high) in itertools.product(hows, levels, bands):
+        steps = f" in {count} dwells" if waveform == "stepped sine" else ""
         way = "" if waveform == "multisine" else ", downwards" if backward else ", upwards"
         words = (
             f"{WAVEFORM_WORDS[waveform]} of {level:.3g} {unit} rms, {low:.3g} to {high:.3g} Hz{way}{steps}"
         )
         name = f"{waveform}_{level:.3g}_{low:.3g}_{high:.3g}{way}{steps}".replace(", ", "_").replace(" ", "_")
-        drive = drive_of(outline, (level,), low, high, waveform, backward, count or DWELLS)
+        drive = drive_of(outline, (level,), low, high, waveform, backward, count)
         found.append(
             Experiment(
                 name,
@@ -102,7 +104,7 @@ def record_candidates(
                 waveform,
                 lacking="" if high <= HIGHEST * outline.rate else "the sampling rate is too low for its band",
                 backward=backward,
-                dwells=count or DWELLS,
+                dwells=count,
             )
         )
     return tuple(found)

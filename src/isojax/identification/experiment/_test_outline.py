@@ -7,9 +7,6 @@ import numpy as np
 from ...records import Campaign, Record, power_spectrum
 from ..diagnosis import Waveform
 
-DWELLS = 6
-"""Segments of a record, each simulated from a state of its own."""
-
 MOST_LEVELS = 3
 
 MIDDLE_CYCLES = 10.0

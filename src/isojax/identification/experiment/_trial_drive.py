@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from ..diagnosis import Waveform
-from ._test_outline import DWELLS, TestOutline
+from ..diagnosis import DWELLS, Waveform
+from ._test_outline import TestOutline
 
 
 def drive_of(

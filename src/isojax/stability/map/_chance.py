@@ -114,37 +114,38 @@ def find_chances(
             away = np.zeros(errors.steps)
             away[place] = sign * _REACH
             found.append(find(errors.moved(jnp.asarray(away)), wide))
+    curves = _Curves(found)
     # One draw of the usual length, which no map of one step knows of, tells how good the chances are.
     check = int(np.argmin(np.abs(np.linalg.norm(steps, axis=1) - errors.steps**0.5)))
-    found.append(find(errors.moved(jnp.asarray(steps[check])), wide))
+    drawn = _Curves([find(errors.moved(jnp.asarray(steps[check])), wide)])
     maps = [smap for smap, _ in found]
     weights = _weights(steps)
     forces, still = np.log(amplitudes), np.log(np.asarray(maps[0].response))[:, inner]
     shape = (forces.size, maps[0].frequencies.size)
     stable, coexisting, wrong = np.ones(shape), np.zeros(shape), np.zeros((2, *shape))
-    read = np.all([sought.read_columns for _, sought in found], axis=0)
-    of_maps = [] if read.all() else [_MapOrbits(one) for one in maps]
     for column in range(shape[1]):
-        if read[column]:
-            known = [_read_off(sought.surface, column) for _, sought in found]
-        else:
-            known = [curve for one in of_maps if (curve := one.at(column)) is not None]
-        if len(known) < len(maps):
+        known = curves.at(column)
+        if known is None:
             stable[:, column] = coexisting[:, column] = np.nan
             continue
         low, high = max(one.low for one in known), min(one.high for one in known)
         grid = _in_doubt(known, np.linspace(low, high, _DISPLACEMENTS))
         if grid.size:
             table = _tables(known, grid)
-            stable[:, column], coexisting[:, column] = _counted(weights, table[:, :-1], forces)
-            told = _counted(weights[check][None], table[:, :-1], forces)
-            wrong[..., column] = np.abs(np.subtract(told, _counted(np.ones((1, 1)), table[:, -1:], forces)))
+            stable[:, column], coexisting[:, column] = _counted(weights, table, forces)
+            told = _counted(weights[check][None], table, forces)
+            true = drawn.at(column)
+            if true is not None and true[0].low <= grid[0] and grid[-1] <= true[0].high:
+                seen = _counted(np.ones((1, 1)), _tables(true, grid), forces)
+            else:  # what the draw does there is not known, and counts as told wrongly
+                seen = np.subtract(1.0, told)
+            wrong[..., column] = np.abs(np.subtract(told, seen))
         least, most = known[0].response(np.array([low, high]))
         beyond = np.any((still[..., column] < least) | (still[..., column] > most), axis=0)
         stable[beyond, column] = coexisting[beyond, column] = np.nan
     doubt = np.nansum(stable * (1.0 - stable) + coexisting * (1.0 - coexisting))
     error = _SHARE_OF_DOUBT * wrong[:, np.isfinite(stable)].sum() / doubt if doubt > 0.0 else np.nan
-    return Chances(stable, coexisting, _standard_errors(maps[:-1], inner), float(error))
+    return Chances(stable, coexisting, _standard_errors(maps, inner), float(error))
 
 
 def _weights(steps: Float[np.ndarray, "draw step"]) -> Float[np.ndarray, "draw map"]:
@@ -191,6 +192,23 @@ def _read_off(surface: Surface, column: int) -> _Column:
         return grid + np.log(surface.at(column, grid)[-1])
 
     return _Column(surface.breaks[0], surface.breaks[-1], force, margin, response)
+
+
+class _Curves:
+    """The orbits of several maps at each frequency: of their surfaces where all can be read off."""
+
+    def __init__(self, found: list[tuple["StabilityMap", Sought]]):
+        """Take maps with their surfaces."""
+        self.surfaces = [sought.surface for _, sought in found]
+        self.read = np.all([sought.read_columns for _, sought in found], axis=0)
+        self.orbits = [] if self.read.all() else [_MapOrbits(one) for one, _ in found]
+
+    def at(self, column: int) -> list[_Column] | None:
+        """Give those of one frequency, map by map; None where one map knows too few."""
+        if self.read[column]:
+            return [_read_off(surface, column) for surface in self.surfaces]
+        known = [curve for one in self.orbits if (curve := one.at(column)) is not None]
+        return known if len(known) == len(self.orbits) else None
 
 
 class _MapOrbits:
