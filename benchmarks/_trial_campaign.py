@@ -212,10 +212,10 @@ class Traces:
 def traces(seed: int, kind: str) -> Traces:
     """Measure the twin that hides nothing, and see what the effects would leave in it.
 
-    One detection limit is 3.5 standard errors of the strength beside the true declared model: 3.5 / |g| with
-    g the whitened trace of the effect less what the six coefficients, the initial states and the stiffness
-    scales imitate. It is read off the score test of the twin, the shape of the effect being known. The seed
-    alone says all of it, so that it serves every effect that is hidden under the same seed.
+    One detection limit is 3.5 standard errors of the strength beside the true declared model, over all
+    scatters of the stiffness that the records allow. It is read off the score test of the twin, the shape of
+    the effect being known. The seed alone says all of it, so that it serves every effect that is hidden under
+    the same seed.
 
     Args:
         seed: of the campaign.

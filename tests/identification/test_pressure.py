@@ -4,12 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from isojax import rig
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.health import DwellStability, dwell_stability
 from isojax.identification import diagnose, fit, scales
 from isojax.identification.fitting._estimate import stiffness_scatter
+from isojax.identification.jacobian import STIFFNESS_SCALE_UNIT
 from isojax.identification.jacobian._channels import channel_table, effects_without_signal
 from isojax.models import Isolator
 from isojax.records.noise._repeats import repeat_groups
@@ -29,12 +31,12 @@ RIVALS = ("pressure_stiffness", "pressure_damping", "stiffness_drift")
 OTHERS = tuple(name for name in CATALOGUE if name not in RIVALS)
 
 
-def campaign_of_pressures(simulated, *hidden: str, seed: int = 4):
+def campaign_of_pressures(simulated, *hidden: str, seed: int = 4, bench: rig.Bench = BENCH):
     """Two levels at each of three pressures, which rise and fall in the course of the test."""
     plan = rig.Multisine((150.0, 600.0), 2.0, 14.0, period=2.0, periods=2, lines="full")
     plans = tuple(rig.AtPressure(plan, pressure) for pressure in (2e5, 2.4e5, 1.7e5))
     plant = PLANT.plus(*(LAWS[name](TRUTH[name], REFERENCE) for name in hidden))
-    return simulated(plant, plans, seed, BENCH, **DECLARED)
+    return simulated(plant, plans, seed, bench, **DECLARED)
 
 
 def test_changes_that_are_declared_are_recovered_within_their_errors(simulated):
@@ -62,6 +64,21 @@ def test_pressure_that_changes_nothing_is_not_named(simulated):
     assert verdict.verdict == "none"
     upper, _ = verdict.bounds["pressure_stiffness"]
     assert upper < 0.05 * 1.08e6
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_error_of_an_absent_change_allows_for_a_scatter_known_from_six_records(simulated, seed):
+    campaign = campaign_of_pressures(simulated, seed=seed, bench=dataclasses.replace(BENCH, drift=3e-3))
+    fitted = fit(START, campaign)
+    verdict = diagnose(fitted, excluded=OTHERS)
+    entry = next(one for one in verdict.ranking if one.effect == "pressure_stiffness")
+    shares = [record.pressure / scales(campaign).pressure - 1.0 for record in campaign.records]
+    own = fitted.estimate.point.nuisances.stiffness * STIFFNESS_SCALE_UNIT
+    line = stats.linregress(shares, own)
+    stiffness = float(fitted.model["linear_stiffness.coefficient"])
+    student = stats.t.ppf(0.975, 4) * line.stderr * stiffness
+    # The half-Cauchy prior makes the interval shorter; a scatter that counts as known, by a third.
+    assert 0.8 < 1.96 * entry.strength_error / student < 1.0
 
 
 def test_records_at_different_pressures_are_no_repeats_and_show_no_scatter(simulated):

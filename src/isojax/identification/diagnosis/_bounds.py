@@ -1,10 +1,7 @@
 """How large an effect that was not found could still be."""
 
-import numpy as np
-
 from ..._parameters import own_parameters
 from ...elements import AbstractElement
-from ..fitting import Estimate
 from ._score import ScoreTest
 
 WIDTH_95 = 1.96
@@ -16,7 +13,7 @@ def strength_unit(element: AbstractElement) -> str:
     return dict(own_parameters(element))[element.strength].unit
 
 
-def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[str, tuple[float, str]]:
+def upper_bounds(test: ScoreTest, found: str | None) -> dict[str, tuple[float, str]]:
     """Say how large each effect that was not found could still be.
 
     A bound takes the rest of the residual for noise. Far from a good fit that rest is another effect, and the
@@ -24,18 +21,13 @@ def upper_bounds(test: ScoreTest, fitted: Estimate, found: str | None) -> dict[s
 
     Args:
         test: the score test.
-        fitted: the fit.
         found: catalogue name of the effect that was found, or None.
 
     Returns:
-        `|s| + 1.96 sqrt(chi2/dof) / |g|` and its unit, by catalogue name.
+        Strength and 1.96 standard errors added up, and their unit, by catalogue name.
     """
-    inflation = float(np.sqrt(fitted.inflation))
     return {
-        score.element.name: (
-            abs(score.strength) + WIDTH_95 * inflation * score.error,
-            strength_unit(score.element),
-        )
+        score.element.name: (abs(score.strength) + WIDTH_95 * score.error, strength_unit(score.element))
         for score in test.scores
         if score.element.name != found
     }

@@ -152,7 +152,7 @@ def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
         place = next(index for index, one in enumerate(refits) if one is best)
         refits[place] = best._replace(violation="it does not carry over to data left out of its refit")
     ranking = rank_candidates(test, refits, by_evidence(refits, rules), inflation)
-    bounds = upper_bounds(test, fitted, None) if good else {}
+    bounds = upper_bounds(test, None) if good else {}
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if not good and not is_locked(case.fit, rules):
@@ -257,7 +257,7 @@ def _verdict_of_finding(
     reason = (
         f"Adding {best.score.element.words} takes chi2/dof from {_ratio(before):.4g} to {_ratio(after):.4g}."
     )
-    bounds = upper_bounds(test, fitted, name) if case.is_good else {}
+    bounds = upper_bounds(test, name) if case.is_good else {}
     return Verdict(
         verdict, finding, ranking, together, float(max(left, 0.0)), test.hidden, bounds, after, reason
     )

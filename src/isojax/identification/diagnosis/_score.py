@@ -35,7 +35,7 @@ class Score(NamedTuple):
         element: the effect at zero strength, with the shape parameters of its largest score.
         z: score over its standard deviation; its sign is that of the strength.
         strength: strength by one linear step [its unit].
-        error: standard deviation of the strength for white noise [its unit].
+        error: standard error of the strength, over all scatters that the records allow [its unit].
         visibility: share of the column that the fitted coefficients and nuisances leave.
         p_value: family-wise, over all candidates.
         admissible: whether the sign of the strength is physical.
@@ -93,9 +93,9 @@ def score_test(
     """Test the absent effects, all at once.
 
     With r the whitened residual, J the columns of fitted coefficients and nuisances, P = I - Q Q' and g = P
-    g_j: `z = g.r / |g|`, strength `g.r / |g|^2 +- 1 / |g|`, visibility `|g| / |g_j|`, likeness `cos(g_i,
-    g_j)`. The p-value is the mean over all scatters of the stiffness that the records allow, which the error
-    bars are summed over as well.
+    g_j: `z = g.r / |g|`, strength `g.r / |g|^2`, visibility `|g| / |g_j|`, likeness `cos(g_i, g_j)`. Standard
+    error, `sqrt(chi2/dof) / |g|` at one scatter of the stiffness, and p-value are over all scatters that the
+    records allow.
 
     Args:
         fitted: the estimate to test.
@@ -137,7 +137,9 @@ def score_test(
     correlation = information / np.outer(safe, safe)
     either = np.array([probe.signed for probe in probes], dtype=bool)
     shift = np.where(chosen, mean, 0.0), np.where(chosen, deviation, 1.0)
-    family = _family_wise(_laws(fitted, traces, seen, shift), order, seen, either, seed)
+    all_scatters = _over_scatters(fitted, traces)
+    family = _family_wise(_laws(all_scatters, seen, shift), order, seen, either, seed)
+    errors = all_scatters.errors(score / safe**2)
     scores, steps, moved = [], [], []
     owner = fitted.simulator.prepared(traces.model, carried).record
     for column, p_value in zip(order, family, strict=True):
@@ -152,7 +154,7 @@ def score_test(
                 probe,
                 float(z[column]),
                 float(amount * unit),
-                float(unit / size[column]),
+                float(unit * errors[column]),
                 float(traces.visibility[column]),
                 float(p_value),
                 bool(probe.signed or amount > 0.0),
@@ -198,27 +200,29 @@ class _Law(NamedTuple):
     z: Float[np.ndarray, " score"]
 
 
+def _over_scatters(fitted: Estimate, traces: Projection) -> ScatteredScores:
+    """Give the scores at all scatters of the stiffness that the records allow."""
+    inflation, reduced = fitted.inflation, traces.point.reduced
+    if fitted.shows_scatter:
+        found = scores_over_scatters(reduced, fitted.point.nuisances, inflation, len(fitted.places))
+        if found is not None:
+            return found
+    own = traces.information[None] / inflation, traces.score[None] / inflation
+    return ScatteredScores(np.ones_like(own[1]), *own)
+
+
 def _laws(
-    fitted: Estimate,
-    traces: Projection,
+    all_scatters: ScatteredScores,
     seen: Bool[np.ndarray, " score"],
     shift: tuple[Float[np.ndarray, " score"], Float[np.ndarray, " score"]],
 ) -> list[_Law]:
-    """Give the laws at all scatters of the stiffness that the records allow, or at the one that is known.
+    """Give the law of the scores at each scatter.
 
     Args:
-        fitted: the estimate that is tested.
-        traces: of the probes beside it.
-        seen: which of them the data can show.
+        all_scatters: the scores there.
+        seen: which effects the data can show.
         shift: mean and standard deviation of each score where there is nothing but noise.
     """
-    inflation, reduced = fitted.inflation, traces.point.reduced
-    all_scatters = None
-    if fitted.shows_scatter:
-        all_scatters = scores_over_scatters(reduced, fitted.point.nuisances, inflation, len(fitted.places))
-    if all_scatters is None:
-        own = traces.information[None] / inflation, traces.score[None] / inflation
-        all_scatters = ScatteredScores(np.ones((1, seen.size)), *own)
     laws = []
     for weight, information, score in zip(*all_scatters, strict=True):
         size = np.where(seen, np.sqrt(np.maximum(np.diag(information), 1e-300)), np.inf)

@@ -119,7 +119,7 @@ def scatter_of_next(reduced: Reduced, nuisances: Nuisances, inflation: float) ->
     except np.linalg.LinAlgError:
         return float("nan")
     deviation = _SCATTERS[:, None]
-    return float(_half_width(weight, np.zeros_like(deviation), deviation)[0]) / _WIDTH
+    return float(_half_width(weight[:, None], np.zeros_like(deviation), deviation)[0]) / _WIDTH
 
 
 class ScatteredScores(NamedTuple):
@@ -134,6 +134,21 @@ class ScatteredScores(NamedTuple):
     weight: Float[np.ndarray, "scatter effect"]
     information: Float[np.ndarray, "scatter effect effect"]
     score: Float[np.ndarray, "scatter effect"]
+
+    def errors(self, strength: Float[np.ndarray, " effect"]) -> Float[np.ndarray, " effect"]:
+        """Give the standard errors of strengths, as `integrate_scatter` gives those of coefficients.
+
+        Args:
+            strength: of each effect by one linear step.
+
+        Returns:
+            The half-width about it that holds 95 %, over 1.96; infinite for effects without a trace.
+        """
+        own = np.diagonal(self.information, axis1=1, axis2=2)
+        shows = np.all(own > 0.0, axis=0)
+        safe = np.where(shows, own, 1.0)
+        width = _half_width(self.weight, self.score / safe - strength, 1.0 / np.sqrt(safe))
+        return np.where(shows, width / _WIDTH, np.inf)
 
 
 def scores_over_scatters(
@@ -261,7 +276,7 @@ def _uncertainty(known: Determined, records: _Records, scatter: float) -> Uncert
     moment = np.einsum("t,tij->ij", mixture.weight, covariance)
     moment += np.einsum("t,ti,tj->ij", mixture.weight, step, step)
     error = np.sqrt(np.einsum("tii->ti", covariance))
-    width = _half_width(mixture.weight, step, error) / _WIDTH
+    width = _half_width(mixture.weight[:, None], step, error) / _WIDTH
     scale = width / np.sqrt(np.where(np.diag(moment) > 0.0, np.diag(moment), 1.0))
     return known.uncertainty(moment * np.outer(scale, scale))
 
@@ -346,7 +361,7 @@ def log_likelihood(
 
 
 def _half_width(
-    weight: Float[np.ndarray, " scatter"],
+    weight: Float[np.ndarray, "scatter ..."],
     centre: Float[np.ndarray, "scatter column"],
     error: Float[np.ndarray, "scatter column"],
 ) -> Float[np.ndarray, " column"]:
@@ -356,6 +371,6 @@ def _half_width(
     for _ in range(_ROOT_BISECTIONS):
         middle = 0.5 * (low + high)
         held = ndtr((middle - centre) / safe) - ndtr((-middle - centre) / safe)
-        short = weight @ held < _LEVEL
+        short = np.sum(weight * held, axis=0) < _LEVEL
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return high
