@@ -125,8 +125,9 @@ def test_strength_by_one_linear_step_is_the_true_one_where_the_effect_is_small(s
     found = fit(START, _campaign(simulated, rig.QuadraticStiffness(6e6)), integrator=ONE_STEP)
     score = next(s for s in _scores(found).scores if s.element.name == "quadratic_stiffness")
     assert abs(score.strength - 6e6) < 3.5 * score.error
-    deviation = score.error / np.sqrt(found.estimate.inflation)
-    assert score.z == pytest.approx(score.strength / deviation, rel=1e-9)
+    # The score is at the fit's own scatter of the stiffness, the error over all that two records allow.
+    known = score.strength / score.z * np.sqrt(found.estimate.inflation)
+    assert known < score.error < 1.02 * known
 
 
 def test_an_inadmissible_sign_is_flagged_and_never_found(simulated):
