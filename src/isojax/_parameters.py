@@ -50,7 +50,13 @@ class Parameter(NamedTuple):
 
 
 def parameter(
-    *, symbol: str, unit: str, lower: float = -math.inf, upper: float = math.inf, fitted: bool = True
+    *,
+    symbol: str,
+    unit: str,
+    lower: float = -math.inf,
+    upper: float = math.inf,
+    fitted: bool = True,
+    default: Any = dataclasses.MISSING,
 ) -> Any:
     """Declare a physical number of an element.
 
@@ -60,6 +66,7 @@ def parameter(
         lower: smallest admissible value.
         upper: largest admissible value.
         fitted: False for a number that is declared by the user and reported, but fitted only on request.
+        default: its value where none is given; it must be given if omitted.
 
     Returns:
         A dataclass field, float64, that `list_parameters` finds.
@@ -70,7 +77,7 @@ def parameter(
     if not lower < upper:
         raise ValueError(f"Argument `lower` must be below `upper`, but {lower} is not below {upper}.")
     spec = ParameterSpec(symbol, unit, lower, upper, fitted)
-    return eqx.field(converter=as_float64, metadata={"parameter": spec})
+    return eqx.field(converter=as_float64, metadata={"parameter": spec}, default=default)
 
 
 def own_parameters(module: eqx.Module | type[eqx.Module]) -> tuple[tuple[str, ParameterSpec], ...]:
@@ -86,6 +93,15 @@ def own_parameters(module: eqx.Module | type[eqx.Module]) -> tuple[tuple[str, Pa
         (field.name, field.metadata["parameter"])
         for field in dataclasses.fields(module)
         if "parameter" in field.metadata
+    )
+
+
+def required_parameters(module: type[eqx.Module]) -> tuple[str, ...]:
+    """Name the parameters of a module's class that have no default."""
+    return tuple(
+        field.name
+        for field in dataclasses.fields(module)
+        if "parameter" in field.metadata and field.default is dataclasses.MISSING
     )
 
 

@@ -9,7 +9,7 @@ from scipy import stats
 from isojax import rig
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.health import DwellStability, dwell_stability
-from isojax.identification import diagnose, fit, scales
+from isojax.identification import diagnose, extend, fit, scales
 from isojax.identification.fitting._estimate import stiffness_scatter
 from isojax.identification.jacobian import STIFFNESS_SCALE_UNIT
 from isojax.identification.jacobian._channels import channel_table, effects_without_signal
@@ -28,15 +28,17 @@ START = Isolator(800.0, (LinearStiffness(1.05e6), CubicStiffness(1.2e11), Linear
 DECLARED = {"stiffness": ("linear", "cubic"), "damping": ("linear",)}
 BENCH = rig.Bench(rate=200.0, noise=5e-3, drift=5e-4, force_noise=0.0, anti_alias=False, tolerance=1e-8)
 RIVALS = ("pressure_stiffness", "pressure_damping", "stiffness_drift")
+PLANS = tuple(
+    rig.AtPressure(rig.Multisine((150.0, 600.0), 2.0, 14.0, period=2.0, periods=2, lines="full"), pressure)
+    for pressure in (2e5, 2.4e5, 1.7e5)
+)
 OTHERS = tuple(name for name in CATALOGUE if name not in RIVALS)
 
 
 def campaign_of_pressures(simulated, *hidden: str, seed: int = 4, bench: rig.Bench = BENCH):
     """Two levels at each of three pressures, which rise and fall in the course of the test."""
-    plan = rig.Multisine((150.0, 600.0), 2.0, 14.0, period=2.0, periods=2, lines="full")
-    plans = tuple(rig.AtPressure(plan, pressure) for pressure in (2e5, 2.4e5, 1.7e5))
     plant = PLANT.plus(*(LAWS[name](TRUTH[name], REFERENCE) for name in hidden))
-    return simulated(plant, plans, seed, bench, **DECLARED)
+    return simulated(plant, PLANS, seed, bench, **DECLARED)
 
 
 def test_changes_that_are_declared_are_recovered_within_their_errors(simulated):
@@ -57,6 +59,19 @@ def test_a_change_that_is_not_declared_is_named(simulated):
     assert verdict.verdict == "found"
     assert verdict.finding.effect == "pressure_stiffness"
     assert verdict.finding.indistinguishable in ((), ("pressure_stiffness",))
+
+
+def test_a_change_that_is_no_straight_line_is_named_with_its_curvature(simulated):
+    # (p/pr)^2 = (p0/pr)^2 (1 + 2 r + r^2) with r = p/p0 - 1: curvature a half, whatever the reference.
+    plant = PLANT.plus(rig.PressureStiffness(5e5, REFERENCE, power=2.0))
+    campaign = simulated(plant, PLANS, 4, BENCH, **DECLARED)
+    fitted = fit(START, campaign)
+    entries = extend(fitted, diagnose(fitted, excluded=OTHERS)).after.parameters
+    mean = scales(campaign).pressure
+    for name, truth in (("change", 2.0 * 5e5 * (mean / REFERENCE) ** 2), ("curvature", 0.5)):
+        entry = entries[f"pressure_stiffness.{name}"]
+        assert abs(entry.value - truth) < 3.0 * entry.standard_error
+        assert entry.standard_error < 0.1 * truth
 
 
 def test_pressure_that_changes_nothing_is_not_named(simulated):

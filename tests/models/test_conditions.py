@@ -68,6 +68,18 @@ def test_the_force_in_a_record_is_that_of_the_isolator_at_its_pressure():
     assert float(model.acceleration(state, followed)) == pytest.approx(float(expected), rel=1e-12)
 
 
+def test_a_curvature_bends_the_change_and_its_error_goes_along():
+    bent = ij.Isolator(MASS, (*LAWS, PressureStiffness(DK, REFERENCE, 0.5)))
+    at = bent.at(pressure=2.6e5)
+    # By the square of the pressure: (1 + r)^2 - 1 = 2 (r + r^2 / 2).
+    assert float(at["linear_stiffness.coefficient"]) == pytest.approx(K + 0.5 * DK * (1.3**2 - 1.0))
+    free = ("linear_stiffness.coefficient", "pressure_stiffness.change", "pressure_stiffness.curvature")
+    known = FitAt(bent, free, np.diag([9e6, 4e8, 1e-4]), ij.RESULTS.successful)
+    there = fit_at(known, pressure=2.6e5)
+    expected = 9e6 + (0.3 + 0.5 * 0.09) ** 2 * 4e8 + (0.09 * DK) ** 2 * 1e-4
+    np.testing.assert_allclose(there.covariance, [[expected]], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     "ask",
     [

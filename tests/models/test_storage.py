@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from isojax import paper
-from isojax.elements import BoucWen, CoulombFriction, LinearStiffness
+from isojax.elements import BoucWen, CoulombFriction, LinearStiffness, PressureStiffness
 from isojax.models import Isolator, load_model, model_to_dict, save_model, write_whole
 
 
@@ -34,6 +34,13 @@ def test_the_file_is_plain_json_with_names_and_si_numbers(tmp_path):
     assert content == model_to_dict(paper.y_direction())
     assert content["mass"] == 800.0
     assert {"name": "cubic_stiffness", "coefficient": 2.51667e11} in content["elements"]
+
+
+def test_a_file_of_before_a_law_could_bend_holds_the_straight_line(tmp_path):
+    content = model_to_dict(Isolator(2.0, (LinearStiffness(1.0), PressureStiffness(3.0, 2e5))))
+    assert content["elements"][1].pop("curvature") == 0.0
+    (tmp_path / "model.json").write_text(json.dumps(content))
+    assert float(load_model(tmp_path / "model.json")["pressure_stiffness.curvature"]) == 0.0
 
 
 def test_a_model_that_is_not_finite_is_not_written(tmp_path):

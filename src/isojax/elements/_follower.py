@@ -15,16 +15,20 @@ class Dependence(NamedTuple):
     Attributes:
         condition: name of the condition, which is that of its signal, too.
         reference: value at which the coefficient is that of the model [SI unit of the condition].
-        law: what acts in addition where the condition is twice the reference, proportional to its strength.
+        law: what a straight line adds where the condition is twice the reference, proportional to its
+            strength.
+        curvature: b, by which the change bends [1].
     """
 
     condition: str
     reference: Scalar
     law: AbstractForce
+    curvature: Scalar
 
     def share(self, value: Lanes) -> Lanes:
-        """Give how much of the law acts at a value of the condition [1]."""
-        return value / self.reference - 1.0
+        """Give how much of the law acts at a value: `r + b r^2`, `r = value/reference - 1` [1]."""
+        relative = value / self.reference - 1.0
+        return relative * (1.0 + self.curvature * relative)
 
 
 class AbstractFollower(AbstractEffect):

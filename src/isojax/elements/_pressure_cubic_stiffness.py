@@ -11,12 +11,13 @@ from ._element import AbstractElement, Dependence, Group, Scales
 class PressureCubicStiffness(AbstractElement):
     """The cubic stiffness follows the absolute pressure in the chamber, from record to record.
 
-    `f = dk3 (p/p0 - 1) x^3`; the cubic stiffness of the model is that at the reference p0.
+    `f = dk3 (r + b r^2) x^3`, `r = p/p0 - 1`; the cubic stiffness of the model is that at the reference p0.
     dk3 is k3 where the gas alone hardens, since each term of its force is proportional to p.
 
     Attributes:
-        change: dk3, what the cubic stiffness would gain where p is twice p0 [N/m^3].
+        change: dk3, what the cubic stiffness would gain by a straight line where p is twice p0 [N/m^3].
         reference: p0, the mean over the fitted records [Pa].
+        curvature: b, by which the change bends; 0 is a straight line [1].
 
     Source: Quaglia & Sorli 2001, Vehicle System Dynamics 35:443; recorded by `pressure` of [[record]].
     """
@@ -31,6 +32,7 @@ class PressureCubicStiffness(AbstractElement):
 
     change: Scalar = parameter(symbol="dk3", unit="N/m^3")
     reference: Scalar = parameter(symbol="p0", unit="Pa", lower=0.0, fitted=False)
+    curvature: Scalar = parameter(symbol="b", unit="1", lower=-10.0, upper=10.0, fitted=False, default=0.0)
 
     @classmethod
     def guess(cls, scales: Scales) -> "PressureCubicStiffness":
@@ -41,4 +43,6 @@ class PressureCubicStiffness(AbstractElement):
         return scales.force / scales.displacement**3
 
     def dependence(self) -> Dependence:
-        return Dependence("pressure", self.reference, _cubic_stiffness.CubicStiffness(self.change))
+        return Dependence(
+            "pressure", self.reference, _cubic_stiffness.CubicStiffness(self.change), self.curvature
+        )

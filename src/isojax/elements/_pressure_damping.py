@@ -11,12 +11,13 @@ from ._element import AbstractElement, Dependence, Group, LookAlike, Scales
 class PressureDamping(AbstractElement):
     """The linear damping follows the absolute pressure in the chamber, from record to record.
 
-    `f = dc (p/p0 - 1) v`; the damping of the model is that at the reference p0.
+    `f = dc (r + b r^2) v`, `r = p/p0 - 1`; the damping of the model is that at the reference p0.
     The flow through an orifice between chambers, and so its loss, changes with the density of the gas.
 
     Attributes:
-        change: dc, what the damping would gain where p is twice p0 [N s/m].
+        change: dc, what the damping would gain by a straight line where p is twice p0 [N s/m].
         reference: p0, the mean over the fitted records [Pa].
+        curvature: b, by which the change bends; 0 is a straight line [1].
 
     Source: Erin, Wilson & Zapfe 1998, J. Sound Vib. 218:81; recorded by `pressure` of [[record]].
     """
@@ -41,6 +42,7 @@ class PressureDamping(AbstractElement):
 
     change: Scalar = parameter(symbol="dc", unit="N s/m")
     reference: Scalar = parameter(symbol="p0", unit="Pa", lower=0.0, fitted=False)
+    curvature: Scalar = parameter(symbol="b", unit="1", lower=-10.0, upper=10.0, fitted=False, default=0.0)
 
     @classmethod
     def guess(cls, scales: Scales) -> "PressureDamping":
@@ -51,4 +53,6 @@ class PressureDamping(AbstractElement):
         return scales.force / scales.velocity
 
     def dependence(self) -> Dependence:
-        return Dependence("pressure", self.reference, _linear_damping.LinearDamping(self.change))
+        return Dependence(
+            "pressure", self.reference, _linear_damping.LinearDamping(self.change), self.curvature
+        )

@@ -11,12 +11,13 @@ from ._element import AbstractElement, Dependence, Group, LookAlike, Scales
 class PressureStiffness(AbstractElement):
     """The linear stiffness follows the absolute pressure in the chamber, from record to record.
 
-    `f = dk (p/p0 - 1) x`; the stiffness of the model is that at the reference p0.
+    `f = dk (r + b r^2) x`, `r = p/p0 - 1`; the stiffness of the model is that at the reference p0.
     dk is k where the whole stiffness is that of the gas, `k = n p A^2/V`, and less beside other springs.
 
     Attributes:
-        change: dk, what the stiffness would gain where p is twice p0 [N/m].
+        change: dk, what the stiffness would gain by a straight line where p is twice p0 [N/m].
         reference: p0, the mean over the fitted records [Pa].
+        curvature: b, by which the change bends; 0 is a straight line [1].
 
     Source: Quaglia & Sorli 2001, Vehicle System Dynamics 35:443; recorded by `pressure` of [[record]].
     """
@@ -41,6 +42,7 @@ class PressureStiffness(AbstractElement):
 
     change: Scalar = parameter(symbol="dk", unit="N/m")
     reference: Scalar = parameter(symbol="p0", unit="Pa", lower=0.0, fitted=False)
+    curvature: Scalar = parameter(symbol="b", unit="1", lower=-10.0, upper=10.0, fitted=False, default=0.0)
 
     @classmethod
     def guess(cls, scales: Scales) -> "PressureStiffness":
@@ -51,4 +53,6 @@ class PressureStiffness(AbstractElement):
         return scales.force / scales.displacement
 
     def dependence(self) -> Dependence:
-        return Dependence("pressure", self.reference, _linear_stiffness.LinearStiffness(self.change))
+        return Dependence(
+            "pressure", self.reference, _linear_stiffness.LinearStiffness(self.change), self.curvature
+        )

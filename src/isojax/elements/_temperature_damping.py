@@ -11,12 +11,13 @@ from ._element import AbstractElement, Dependence, Group, LookAlike, Scales
 class TemperatureDamping(AbstractElement):
     """The linear damping follows the absolute temperature, from record to record.
 
-    `f = dc (T/T0 - 1) v`; the damping of the model is that at the reference T0.
+    `f = dc (r + b r^2) v`, `r = T/T0 - 1`; the damping of the model is that at the reference T0.
     dc is negative for oil and for rubber near its glass transition, positive for gas.
 
     Attributes:
-        change: dc, what the damping would gain where T is twice T0 [N s/m].
+        change: dc, what the damping would gain by a straight line where T is twice T0 [N s/m].
         reference: T0, the mean over the fitted records [K].
+        curvature: b, by which the change bends; 0 is a straight line [1].
 
     Source: Jones 2001, Handbook of Viscoelastic Vibration Damping; recorded by `temperature` of [[record]].
     """
@@ -37,6 +38,7 @@ class TemperatureDamping(AbstractElement):
 
     change: Scalar = parameter(symbol="dc", unit="N s/m")
     reference: Scalar = parameter(symbol="T0", unit="K", lower=0.0, fitted=False)
+    curvature: Scalar = parameter(symbol="b", unit="1", lower=-10.0, upper=10.0, fitted=False, default=0.0)
 
     @classmethod
     def guess(cls, scales: Scales) -> "TemperatureDamping":
@@ -47,4 +49,6 @@ class TemperatureDamping(AbstractElement):
         return scales.force / scales.velocity
 
     def dependence(self) -> Dependence:
-        return Dependence("temperature", self.reference, _linear_damping.LinearDamping(self.change))
+        return Dependence(
+            "temperature", self.reference, _linear_damping.LinearDamping(self.change), self.curvature
+        )

@@ -11,12 +11,13 @@ from ._element import AbstractElement, Dependence, Group, LookAlike, Scales
 class TemperatureStiffness(AbstractElement):
     """The linear stiffness follows the absolute temperature, from record to record.
 
-    `f = dk (T/T0 - 1) x`; the stiffness of the model is that at the reference T0.
+    `f = dk (r + b r^2) x`, `r = T/T0 - 1`; the stiffness of the model is that at the reference T0.
     Rubber far above its glass transition stiffens in proportion to T, near it it softens much faster.
 
     Attributes:
-        change: dk, what the stiffness would gain where T is twice T0 [N/m].
+        change: dk, what the stiffness would gain by a straight line where T is twice T0 [N/m].
         reference: T0, the mean over the fitted records [K].
+        curvature: b, by which the change bends; 0 is a straight line [1].
 
     Source: Ferry 1980, Viscoelastic Properties of Polymers, ch. 11; recorded by `temperature` of [[record]].
     """
@@ -37,6 +38,7 @@ class TemperatureStiffness(AbstractElement):
 
     change: Scalar = parameter(symbol="dk", unit="N/m")
     reference: Scalar = parameter(symbol="T0", unit="K", lower=0.0, fitted=False)
+    curvature: Scalar = parameter(symbol="b", unit="1", lower=-10.0, upper=10.0, fitted=False, default=0.0)
 
     @classmethod
     def guess(cls, scales: Scales) -> "TemperatureStiffness":
@@ -47,4 +49,6 @@ class TemperatureStiffness(AbstractElement):
         return scales.force / scales.displacement
 
     def dependence(self) -> Dependence:
-        return Dependence("temperature", self.reference, _linear_stiffness.LinearStiffness(self.change))
+        return Dependence(
+            "temperature", self.reference, _linear_stiffness.LinearStiffness(self.change), self.curvature
+        )

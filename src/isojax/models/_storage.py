@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from .._parameters import own_parameters
+from .._parameters import own_parameters, required_parameters
 from .._types import check_float64
 from ..elements import CATALOGUE
 from ._isolator import Isolator
@@ -151,12 +151,14 @@ def model_from_dict(content: Any, path: Path) -> Isolator:
         if name not in CATALOGUE:
             known = ", ".join(sorted(CATALOGUE))
             raise ValueError(f"{path}: element name must be one of {known}, but is {name!r}.")
-        expected = [field for field, _ in own_parameters(CATALOGUE[name])]
+        kind = CATALOGUE[name]
+        expected = [field for field, _ in own_parameters(kind)]
         values = {key: value for key, value in entry.items() if key != "name"}
-        if sorted(values) != sorted(expected):
+        # A file of before an element had one of its numbers holds the law that is its default.
+        if not set(required_parameters(kind)) <= set(values) <= set(expected):
             raise ValueError(f"{path}: element {name} must hold {expected}, but holds {sorted(values)}.")
         numbers = {key: _finite_number(path, name, key, value) for key, value in values.items()}
-        elements.append(CATALOGUE[name](**numbers))
+        elements.append(kind(**numbers))
     mass = _finite_number(path, "the model", "mass", content.get("mass"))
     if not mass > 0:
         raise ValueError(f"{path}: mass of the model must be positive, but is {mass}.")

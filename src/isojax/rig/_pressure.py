@@ -30,15 +30,17 @@ class AtPressure(Plan):
 
 @dataclass(frozen=True)
 class _FollowsPressure(Law):
-    """What is common to coefficients that change in proportion to the pressure.
+    """What is common to coefficients that change with a power of the pressure.
 
     Args:
-        change: of the coefficient from the reference to twice it, SI.
+        change: of the coefficient from the reference to twice it where the power is one, SI.
         reference: pressure at which the coefficient is that of the plain law, Pa.
+        power: of the pressure.
     """
 
     change: float
     reference: float
+    power: float = 1.0
     _share: float | None = field(default=None, repr=False)
 
     @no_type_check
@@ -46,7 +48,7 @@ class _FollowsPressure(Law):
         """The law at the pressure of one record."""
         if stretch.pressure is None:
             raise ValueError(f"A plan must be `AtPressure` for a {type(self).__name__} to act.")
-        return replace(self, _share=(stretch.pressure - self.reference) / self.reference)
+        return replace(self, _share=(stretch.pressure / self.reference) ** self.power - 1.0)
 
     @property
     def coefficient(self) -> float:
@@ -64,7 +66,7 @@ class _FollowsPressure(Law):
 
 @dataclass(frozen=True)
 class PressureStiffness(_FollowsPressure):
-    """f = change (p/reference - 1) x, with change in N/m."""
+    """f = change ((p/reference)^power - 1) x, with change in N/m."""
 
     name: ClassVar[str] = "pressure_stiffness"
 
@@ -76,7 +78,7 @@ class PressureStiffness(_FollowsPressure):
 
 @dataclass(frozen=True)
 class PressureDamping(_FollowsPressure):
-    """f = change (p/reference - 1) v, with change in N s/m."""
+    """f = change ((p/reference)^power - 1) v, with change in N s/m."""
 
     name: ClassVar[str] = "pressure_damping"
 
@@ -88,7 +90,7 @@ class PressureDamping(_FollowsPressure):
 
 @dataclass(frozen=True)
 class PressureCubicStiffness(_FollowsPressure):
-    """f = change (p/reference - 1) x^3, with change in N/m^3."""
+    """f = change ((p/reference)^power - 1) x^3, with change in N/m^3."""
 
     name: ClassVar[str] = "pressure_cubic_stiffness"
 
