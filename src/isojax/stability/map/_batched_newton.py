@@ -246,7 +246,8 @@ class CellSolver(eqx.Module):
             The orbits.
         """
         limit = method.integrator.map_tolerance if limit is None else limit
-        moved, phases, *rest = _newton_steps(self.model, method, lanes)
+        compiled = method.for_any_steps()
+        moved, phases, *rest = _newton_steps(self.model, compiled, lanes)
         lanes = lanes._replace(state=moved, phases=phases)
         lanes, step, roots, radius = jax.tree_util.tree_map(lambda it: np.asarray(it)[:count], (lanes, *rest))
         for _ in range(_NEWTON_STEPS - 1):
@@ -260,7 +261,7 @@ class CellSolver(eqx.Module):
                 some = jax.tree_util.tree_map(
                     lambda it, block=block: padded(it[block], CELLS_TOGETHER), lanes
                 )
-                again = _newton_steps(self.model, method, jax.device_put(some, self.sharding))
+                again = _newton_steps(self.model, compiled, jax.device_put(some, self.sharding))
                 targets = [*lanes.state, *lanes.phases, step, roots, radius]
                 for target, value in zip(targets, [*again[0], *again[1], *again[2:]], strict=True):
                     target[block] = np.asarray(value)[: block.size]
@@ -286,6 +287,16 @@ def _in_order(phases: tuple[Any, ...], end: float) -> np.ndarray:
     bounds = [0.0, *phases, end]
     later = [np.asarray(after) >= np.asarray(before) - 1e-9 for before, after in itertools.pairwise(bounds)]
     return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*later)))
+
+
+def lanes_of(total: int, chunk: int) -> int:
+    """Give the lanes of a batch: no wider than need be, so that small maps compile and run a small one.
+
+    Args:
+        total: of all orbits.
+        chunk: most orbits in a batch.
+    """
+    return min(chunk, max(1 << max(total - 1, 0).bit_length(), CELLS_TOGETHER))
 
 
 def padded(values: np.ndarray, size: int) -> np.ndarray:

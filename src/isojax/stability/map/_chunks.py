@@ -15,13 +15,10 @@ from ..._cores import usable_cores
 from ..._progress import Counted
 from ...models import write_whole
 from ._aligned import aligned
-from ._batched_newton import CellSolver, Found
+from ._batched_newton import CellSolver, Found, lanes_of
 from ._reader import SurfaceReader
 from ._single_orbits import SingleOrbits
 from ._starts import Candidates
-
-FEWEST = 512
-"""Lanes of the smallest batch: a smaller one costs no less."""
 
 
 def fingerprint(*parts: object) -> str:
@@ -59,8 +56,7 @@ def run_chunks(
         The orbits, in the order of the candidates.
     """
     total = candidates.force.size
-    # No wider than need be: small maps compile and run a small batch. At least one lane for each device.
-    lanes = min(chunk, max(1 << max(total - 1, 0).bit_length(), FEWEST))
+    lanes = lanes_of(total, chunk)
     begins = list(range(0, total, lanes))
     states = solver.states
     kinks = solver.surface.polynomials.shape[2] - states - 3

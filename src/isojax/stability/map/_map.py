@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import diffrax
 import equinox as eqx
@@ -42,7 +42,7 @@ from ._empty_cells import Cells, fill_empty, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
 from ._map_method import Lane, MapMethod
 from ._single_orbits import SingleOrbits
-from ._sought import Sought, seek
+from ._sought import MapRun, Sought, seek
 from ._starts import Candidates, joined
 from ._surface import MapWindow
 
@@ -271,17 +271,6 @@ def stability_map(
     )
 
 
-class MapRun(NamedTuple):
-    """How a map is made; see the arguments of `stability_map`."""
-
-    coexisting: bool
-    integrator: Integrator | None
-    chunk: int
-    folder: Path | None
-    progress: Callable[[str], None] | None
-    devices: Any
-
-
 def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[StabilityMap, Sought]:
     """Make a map without chances.
 
@@ -295,11 +284,11 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     """
     half, (forces, band, _) = is_odd(model), window
     integrator = Integrator() if run.integrator is None else run.integrator
-    sought = seek(model, integrator, half, window, integrator.map_error, run.coexisting, run.devices)
+    sought = seek(model, integrator, half, window, integrator.map_error, run)
     goal = _READING_SHARE * integrator.map_error
     if run.integrator is None and sought.reading_error > goal:
         integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
-        sought = seek(model, integrator, half, window, goal, run.coexisting, run.devices)
+        sought = seek(model, integrator, half, window, goal, run)
     first = sought.groups[0]
     if run.integrator is None and isinstance(first.solver, CellSolver):
         # Nothing is read off: each orbit is integrated for itself, and steps cost.

@@ -47,7 +47,8 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
 
     def closed(block: slice) -> Found:
         lanes = lanes_of(found, candidates, window, picked[block])
-        lanes = jax.tree.map(lambda values: jnp.asarray(padded(np.asarray(values), CELLS_TOGETHER)), lanes)
+        lanes = jax.tree.map(lambda values: padded(np.asarray(values), CELLS_TOGETHER), lanes)
+        lanes = jax.device_put(lanes, solver.sharding)
         # So far that only the error of the integration remains.
         return solver.improve(method, lanes, picked[block].size, limit=FULLY_CLOSED)
 

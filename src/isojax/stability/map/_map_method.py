@@ -86,6 +86,11 @@ class MapMethod(eqx.Module):
         """
         return MapMethod(self.integrator, self.half, self.sides, self.steps * times)
 
+    def for_any_steps(self) -> "MapMethod":
+        """Give the same way with steps that only `steps` knows, so that it compiles alike for all of them."""
+        integrator = self.integrator.with_steps(Integrator().steps_per_period)
+        return MapMethod(integrator, self.half, self.sides, self.steps)
+
     def moved(self, model: Isolator, lane: Lane) -> State:
         """Give the state one period later, or minus the state half a period later.
 

@@ -1,13 +1,15 @@
 """Which orbits a map is to hold, and by what each is found: read off the surface, or by Newton's method."""
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool
 
 from ...models import Integrator, Isolator
-from ._batched_newton import SAMPLED, CellSolver, cell_solvers
+from ._batched_newton import SAMPLED, CellSolver, cell_solvers, lanes_of
 from ._map_error import sampled_error, solved_sample
 from ._map_method import MapMethod
 from ._reader import SurfaceReader
@@ -17,6 +19,17 @@ from ._surface import MapWindow, Surface, find_surface
 
 _POOL = 1 << 15
 """Orbits among which those of a sample are chosen."""
+
+
+class MapRun(NamedTuple):
+    """How a map is made; see the arguments of `stability_map`."""
+
+    coexisting: bool
+    integrator: Integrator | None
+    chunk: int
+    folder: Path | None
+    progress: Callable[[str], None] | None
+    devices: Any
 
 
 class Group(NamedTuple):
@@ -77,8 +90,7 @@ def seek(
     half: bool,
     window: MapWindow,
     goal: float,
-    coexisting: bool,
-    devices: Any,
+    run: MapRun,
 ) -> Sought:
     """Find which orbits a window of force and frequency holds, and by what each is to be found.
 
@@ -91,8 +103,7 @@ def seek(
         half: whether to use the half-period map.
         window: of the map.
         goal: error of multipliers read off down to which nodes are added.
-        coexisting: whether to give every orbit of a cell, or that of the smallest motion.
-        devices: to spread chunks over; all local ones if None.
+        run: how the map is made.
 
     Returns:
         What is to be found.
@@ -101,16 +112,17 @@ def seek(
         ValueError: if there is no orbit anywhere.
     """
     surface = find_surface(model, integrator, half, window, goal)
-    candidates = find_candidates(surface, window.amplitudes, coexisting)
+    candidates = find_candidates(surface, window.amplitudes, run.coexisting)
     if not candidates.force.size:
         raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
-    split, whole = cell_solvers(model, integrator, half, surface, window.amplitudes, devices)
+    split, whole = cell_solvers(model, integrator, half, surface, window.amplitudes, run.devices)
     reader = SurfaceReader(half, split.surface, split.sharding)
     expected = surface.error[candidates.frequency, candidates.part]
     read, error = (expected <= integrator.map_error) & (model.internal_states == 0), math.nan
     if read.any():
         some = _chosen(candidates, _sample(surface, candidates, np.flatnonzero(read)))
-        by_reading = reader(some, SAMPLED)
+        # In the lanes of the map, which then compiles nothing more.
+        by_reading = reader(some, max(lanes_of(int(np.count_nonzero(read)), run.chunk), SAMPLED))
         error = sampled_error(split, some, by_reading, window)
         if error > integrator.map_error:
             own = sampled_error(split, some, solved_sample(split, some), window)
