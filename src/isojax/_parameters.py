@@ -166,23 +166,31 @@ def replace_parameters(model: _Model, values: Sequence[Any] | Float[Array, " par
     return eqx.tree_at(_leaves, model, [as_float64(values[index]) for index in range(count)])
 
 
-def find_parameter(model: eqx.Module, name: str) -> int:
-    """Find a parameter by its name in reports.
+def find_parameter(model: eqx.Module, name: str, argument: str = "name", *others: str) -> int:
+    """Find a parameter by its name in reports, or by its symbol where only one has it.
 
     Args:
         model: the model.
-        name: such as `coulomb_friction.force`.
+        name: such as `coulomb_friction.force`, or `k1`.
+        argument: of the caller, which messages name.
+        *others: names that the argument could hold as well.
 
     Returns:
         Its place in `list_parameters(model)`.
 
     Raises:
-        ValueError: if the model has no such parameter.
+        ValueError: if the model has no such parameter, or several with the symbol.
     """
-    names = [entry.name for entry in list_parameters(model)]
-    if name not in names:
-        raise ValueError(f"Argument `name` must be one of {', '.join(names)}, but is {name!r}.")
-    return names.index(name)
+    listed = list_parameters(model)
+    found = [place for place, entry in enumerate(listed) if entry.name == name]
+    found = found or [place for place, entry in enumerate(listed) if entry.spec.symbol == name]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        several = " and ".join(listed[place].name for place in found)
+        raise ValueError(f"Argument `{argument}` names {name!r}, the symbol of {several}: name one of them.")
+    known = ", ".join((*(f"{entry.name} ({entry.spec.symbol})" for entry in listed), *others))
+    raise ValueError(f"Argument `{argument}` must be one of {known}, but is {name!r}.")
 
 
 def to_physical(free: Float[Array, ""], spec: ParameterSpec, scale: Scalar | float) -> Float[Array, ""]:

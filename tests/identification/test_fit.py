@@ -209,16 +209,14 @@ def test_fixed_and_free_names_decide_what_is_fitted(linear):
     held = fit(START, linear, fixed=("linear_damping.coefficient",), integrator=ONE_STEP)
     assert held.free == ("linear_stiffness.coefficient",)
     assert float(held.model["linear_damping.coefficient"]) == 1.3e4
-    only = fit(START, linear, free=("linear_damping.coefficient",), integrator=ONE_STEP)
+    only = fit(START, linear, free=("c1",), integrator=ONE_STEP)
     assert only.free == ("linear_damping.coefficient",)
     assert float(only.model["linear_stiffness.coefficient"]) == 1.0e6
 
 
 @pytest.mark.parametrize("argument", ["free", "fixed"])
 def test_unknown_names_are_refused(linear, argument):
-    with pytest.raises(
-        ValueError, match=rf"`{argument}` must name parameters .*linear_stiffness.*'stiffness'"
-    ):
+    with pytest.raises(ValueError, match=rf"`{argument}` must be one of .*linear_stiffness.*'stiffness'"):
         fit(START, linear, **{argument: ("stiffness",)})
 
 

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.stats import norm
 
 import isojax as ij
@@ -45,6 +46,35 @@ def test_the_stiffest_spring_that_keeps_the_motion_small_is_that_of_the_closed_f
     assert ij.is_successful(found.result)
     assert found.outcomes[0].active
     assert found.scan.better == 0
+
+
+def test_a_pressure_is_chosen_as_in_its_closed_form_with_and_without_a_chance():
+    """The lowest pressure at which k + dk (p/p0 - 1) is large enough, also less 2.33 standard errors."""
+    model = MODEL.with_elements(ij.elements.PressureStiffness(1.5e6, 2e5))
+    free, wanted = {"pressure": (1e5, 4e5)}, 2.2e6
+    found = ij.design(model, None, at_least(stiffness, wanted), free=free, scan=4)
+    assert found.values[0] == pytest.approx(2e5 * (1.0 + 0.2e6 / 1.5e6), rel=1e-5)
+    assert "pressure" in str(found)
+    assert "Pa" in str(found)
+    assert found.model.conditions == ()
+    errors = 2e4, 3e5
+    fit = Uncertain(model, (K, "pressure_stiffness.change"), np.diag(np.square(errors)))
+    sure = ij.design(model, None, at_least(stiffness, wanted, chance=0.99), free=free, fit=fit, scan=4)
+
+    def short(share):
+        return 2e6 + 1.5e6 * share - norm.ppf(0.99) * np.hypot(errors[0], share * errors[1]) - wanted
+
+    assert sure.values[0] == pytest.approx(2e5 * (1.0 + brentq(short, 0.0, 1.0)), rel=1e-5)
+    with pytest.raises(ValueError, match=r"at one pressure, .* such as model\.at\(pressure=\.\.\.\)"):
+        ij.design(model, None, at_least(stiffness, wanted), free={K: (1e6, 4e6)})
+    with pytest.raises(ValueError, match=r"`free` must be one of mass \(m\), .*, but is 'pressure'"):
+        ij.design(MODEL, None, at_least(stiffness, wanted), free=free)
+
+
+def test_a_symbol_names_its_coefficient():
+    found = ij.design(MODEL, None, at_least(stiffness, 3e6), free={"k1": (1e6, 4e6)}, scan=4)
+    assert found.names == (K,)
+    assert found.values[0] == pytest.approx(3e6, rel=1e-5)
 
 
 def test_coefficients_of_one_and_of_1e11_weigh_alike():
@@ -159,7 +189,7 @@ def test_a_chance_is_kept_by_the_error_of_the_fit_which_grows_with_the_coefficie
 def test_mistakes_are_refused():
     for free, words in (
         ({}, "at least one coefficient"),
-        ({"k": (1.0, 2.0)}, "name some of mass"),
+        ({"k": (1.0, 2.0)}, "one of mass"),
         ({K: (3e6, 1e6)}, "two finite numbers"),
         ({K: (3e6, 4e6)}, "start within the bounds"),
         ({"mass": (-1.0, 900.0)}, "must bound mass within"),

@@ -122,7 +122,9 @@ def test_what_makes_no_sense_is_refused():
     ):
         with pytest.raises(ValueError, match=words):
             ij.global_sensitivity(lambda x: x["a"], ranges)
-    with pytest.raises(ValueError, match="must be one of mass"):
+    with pytest.raises(ValueError, match="`ranges` must be a dictionary"):
+        ij.global_sensitivity(lambda m: m.mass, model)
+    with pytest.raises(ValueError, match="`ranges` must be one of mass"):
         ij.global_sensitivity(lambda m: m.mass, {"mess": (1.0, 2.0)}, model)
     with pytest.raises(ValueError, match=r"keep mass between 0 .* kg, but \d+ of 192 samples"):
         ij.global_sensitivity(lambda m: m.mass, {"mass": stats.norm(0.0, 1.0)}, model, samples=64)

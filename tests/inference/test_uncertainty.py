@@ -172,6 +172,10 @@ def test_what_cannot_be_carried_is_refused(wide):
     negative[0, 0] = -1.0
     with pytest.raises(ValueError, match=f"variances of 0 or above, but not for {wide.free[0]}"):
         ij.uncertainty(wide._replace(covariance=negative), lambda model: model[STIFFNESS])
+    with pytest.raises(ValueError, match=r"`quantity` must be a function of an isolator, .* but is 'k1'"):
+        ij.uncertainty(wide, "k1")
+    with pytest.raises(ValueError, match=r"must give a number or an array, .* one of type dict"):
+        ij.uncertainty(wide, lambda model: {"mass": model.mass})
     with pytest.raises(ValueError, match="finite real numbers"):
         ij.uncertainty(wide, lambda model: 1j * model[STIFFNESS])
     with pytest.raises(ValueError, match="`confidence` must lie between 0 and 1"):

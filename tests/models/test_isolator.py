@@ -17,6 +17,7 @@ from isojax.elements import (
     LinearDamping,
     LinearStiffness,
     SensorGain,
+    StribeckFriction,
 )
 from isojax.models import ContinuedLaw, Instant, Isolator, Regime, freeing_accelerations, law_beside
 
@@ -60,9 +61,20 @@ def test_a_replaced_model_compiles_nothing_anew():
     assert len(traced) == 1
 
 
+def test_a_symbol_stands_for_the_one_parameter_that_has_it():
+    friction = CoulombFriction(1.0, 1e-3), StribeckFriction(1.0, 2.0, 0.1, 1e-3)
+    model = Isolator(2.0, (LinearStiffness(3.0), *friction))
+    assert float(model["k1"]) == 3.0
+    assert float(model.replace(k1=4.0)["linear_stiffness.coefficient"]) == 4.0
+    with pytest.raises(ValueError, match=r"'vs', the symbol of coulomb_friction\.width and stribeck"):
+        model["vs"]
+
+
 def test_an_unknown_parameter_is_refused_with_the_names_there_are():
     model = Isolator(800.0, (LinearStiffness(1e6),))
-    with pytest.raises(ValueError, match=r"one of mass, linear_stiffness.coefficient, but is 'damping'"):
+    with pytest.raises(
+        ValueError, match=r"one of mass \(m\), linear_stiffness.coefficient \(k1\), but is 'damping'"
+    ):
         model["damping"]
     with pytest.raises(ValueError, match=r"'cubic_stiffness.coefficient'"):
         model.replace(cubic_stiffness__coefficient=1.0)

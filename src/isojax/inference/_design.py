@@ -4,11 +4,8 @@ import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 
-from .._parameters import list_parameters
 from .._results import result_named
 from .._types import check_float64
 from ..models import EndsEstimated, Estimated, Isolator, Modelled, as_isolator, coefficient_errors
@@ -16,7 +13,7 @@ from ._constraint import Constraint
 from ._design_result import Design, Outcome
 from ._design_scan import Scan, scan_design
 from ._design_search import FoundDesign, Task, search, stand
-from ._design_space import NotFinite, Quantity, Space, space_of
+from ._design_space import NotFinite, Quantity, space_of
 
 _RESTARTS = 3
 """Times that the search starts again from a better point of the scan."""
@@ -54,7 +51,8 @@ def design(
             `jax.jacfwd`; the sum of the squared relative changes of the free coefficients if omitted, so that
             the design is the nearest one.
         subject_to: what the design must keep to: `inference.at_most` and `inference.at_least`.
-        free: lower and upper bound of each coefficient that may change, by name.
+        free: lower and upper bound of each coefficient that may change, by name or symbol, and of "pressure"
+            and "temperature" where the model follows them: then quantities see the isolator at these.
         fit: with whose errors chances are worked out; `model` is its model.
         scan: points with which the design is compared; at least 2.
         seed: of these.
@@ -86,7 +84,8 @@ def design(
         1e+06 N/m, 0 better
     """
     check_float64()
-    model = as_isolator(model)
+    model = as_isolator(model, recorded=True)
+    as_isolator(model, recorded=set(model.conditions) <= set(free))
     constraints = (subject_to,) if isinstance(subject_to, Constraint) else tuple(subject_to)
     if scan < 2:
         raise ValueError(f"Argument `scan` must be at least 2, but is {scan}.")
@@ -100,9 +99,9 @@ def design(
         raise ValueError("Argument `fit` must be given where a constraint asks for a chance, but is missing.")
     space = space_of(model, free)
     errors = None if fit is None else coefficient_errors(fit, model)
-    wanted = Quantity(space, _nearest(space) if objective is None else objective, "the objective")
+    wanted = Quantity(space, objective, "the objective")
     limits = tuple(Quantity(space, one.quantity, one.name, one, errors) for one in constraints)
-    start = space.coordinates(np.array([float(model[name]) for name in space.names]))
+    start = space.coordinates(space.before)
     try:
         task = _task(wanted, limits, start)
         before = stand(task, start)[0]
@@ -111,13 +110,14 @@ def design(
         raise ValueError(
             f"Argument `model` must start where all quantities are finite and stay so, but {lost}."
         ) from None
-    listed = list_parameters(model)
     ended = "successful" if found.converged else "not_converged"
     return Design(
         space.moved(found.at),
         model,
         space.names,
-        tuple(listed[place].spec.unit for place in space.places),
+        space.units,
+        np.asarray(space.values(found.at)),
+        space.before,
         space.lower,
         space.upper,
         found.objective,
@@ -128,17 +128,6 @@ def design(
         sum(one.evaluations for one in (wanted, *limits)),
         found.retreats,
     )
-
-
-def _nearest(space: Space) -> Callable[[Isolator], Array]:
-    """Give the sum of the squared relative changes of the free coefficients."""
-    before = np.array([float(space.model[name]) for name in space.names])
-    size = np.where(before == 0.0, space.upper - space.lower, np.abs(before))
-
-    def change(isolator: Isolator) -> Array:
-        return jnp.sum(((jnp.stack([isolator[name] for name in space.names]) - before) / size) ** 2)
-
-    return change
 
 
 def _task(wanted: Quantity, limits: tuple[Quantity, ...], start: np.ndarray) -> Task:

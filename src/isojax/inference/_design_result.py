@@ -71,8 +71,10 @@ class Design(NamedTuple):
     Attributes:
         model: the isolator with them; where the limits cannot be kept, the one that misses them least.
         start: the isolator that the search started from.
-        names: of the free coefficients.
+        names: of the free coefficients, and of the operating conditions at which `model` is.
         units: of each.
+        values: of each at the design.
+        before: of each at the start.
         lower: smallest value of each.
         upper: largest value of each.
         objective: at the design.
@@ -88,6 +90,8 @@ class Design(NamedTuple):
     start: Isolator
     names: tuple[str, ...]
     units: tuple[str, ...]
+    values: Float[np.ndarray, " coefficient"]
+    before: Float[np.ndarray, " coefficient"]
     lower: Float[np.ndarray, " coefficient"]
     upper: Float[np.ndarray, " coefficient"]
     objective: float
@@ -99,15 +103,9 @@ class Design(NamedTuple):
     retreats: int
 
     @property
-    def values(self) -> Float[np.ndarray, " coefficient"]:
-        """Of each free coefficient at the design."""
-        return np.array([float(self.model[name]) for name in self.names])
-
-    @property
     def changes(self) -> Float[np.ndarray, " coefficient"]:
         """Change of each over its value at the start."""
-        before = np.array([float(self.start[name]) for name in self.names])
-        return (self.values - before) / np.where(before == 0.0, 1.0, np.abs(before))
+        return (self.values - self.before) / np.where(self.before == 0.0, 1.0, np.abs(self.before))
 
     @property
     def missed(self) -> tuple[str, ...]:

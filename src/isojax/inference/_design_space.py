@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.special import ndtri
 
-from .._parameters import list_parameters, replace_parameters
+from .._parameters import find_parameter, list_parameters, own_parameters, replace_parameters
 from .._show import number
 from ..models import CoefficientErrors, Isolator
 from ._constraint import Constraint
@@ -31,12 +31,14 @@ class Space(NamedTuple):
     """Coefficients that a design may choose.
 
     A coefficient whose bounds have one sign moves along its logarithm, any other evenly, so that one of 1 and
-    one of 1e11 weigh alike.
+    one of 1e11 weigh alike. Operating conditions that the model follows, such as the pressure, go last.
 
     Attributes:
         model: the isolator.
-        names: of the free coefficients.
-        places: of these in `list_parameters`.
+        names: of the free coefficients and conditions.
+        units: of each.
+        places: of the coefficients in `list_parameters`.
+        before: value of each at the start.
         lower: smallest values.
         upper: largest values.
         logarithmic: whether each moves along its logarithm.
@@ -44,7 +46,9 @@ class Space(NamedTuple):
 
     model: Isolator
     names: tuple[str, ...]
+    units: tuple[str, ...]
     places: tuple[int, ...]
+    before: Float[np.ndarray, " coordinate"]
     lower: Float[np.ndarray, " coordinate"]
     upper: Float[np.ndarray, " coordinate"]
     logarithmic: Bool[np.ndarray, " coordinate"]
@@ -56,6 +60,11 @@ class Space(NamedTuple):
         evenly = self.lower + (self.upper - self.lower) * at
         return jnp.where(logarithmic, safe * ratio**at, evenly)
 
+    def distance(self, at: Any) -> Array:
+        """Give the sum of the squared relative changes of a point against the start."""
+        size = np.where(self.before == 0.0, self.upper - self.lower, np.abs(self.before))
+        return jnp.sum(((self.values(at) - self.before) / size) ** 2)
+
     def coordinates(self, values: Float[np.ndarray, " coordinate"]) -> Float[np.ndarray, " coordinate"]:
         """Give the point of given coefficients."""
         safe = np.where(self.logarithmic, values / self.lower, 1.0)
@@ -63,60 +72,111 @@ class Space(NamedTuple):
         evenly = (values - self.lower) / (self.upper - self.lower)
         return np.where(self.logarithmic, np.log(safe) / np.log(ratio), evenly)
 
-    def moved(self, at: Any) -> Isolator:
-        """Give the isolator at a point."""
-        numbers = [entry.value for entry in list_parameters(self.model)]
-        for place, value in zip(self.places, self.values(at), strict=True):
+    def moved(self, at: Any, shaken: Callable[[list[Any]], list[Any]] = list) -> Isolator:
+        """Give the isolator at a point.
+
+        Args:
+            at: the point.
+            shaken: changes the numbers of `list_parameters`.
+
+        Returns:
+            The isolator, at the conditions that are free.
+        """
+        numbers, values = [entry.value for entry in list_parameters(self.model)], self.values(at)
+        for place, value in zip(self.places, values, strict=False):
             numbers[place] = value
-        return replace_parameters(self.model, numbers)
+        model = replace_parameters(self.model, shaken(numbers))
+        conditions = self.names[len(self.places) :]
+        if not conditions:
+            return model
+        return model.at(**dict(zip(conditions, values[len(self.places) :], strict=True)))
 
     def words(self, at: Float[np.ndarray, " coordinate"]) -> str:
         """Give the coefficients at a point in words."""
-        listed = list_parameters(self.model)
         return ", ".join(
-            f"{name} = {number(float(value))} {listed[place].spec.unit}"
-            for name, place, value in zip(self.names, self.places, self.values(at), strict=True)
+            f"{name} = {number(float(value))} {unit}"
+            for name, unit, value in zip(self.names, self.units, self.values(at), strict=True)
         )
 
 
+class _Free(NamedTuple):
+    """What a design may choose one of: value at the start, unit, and what it admits."""
+
+    value: float
+    unit: str
+    lower: float
+    upper: float
+
+
+def _known_conditions(model: Isolator) -> dict[str, _Free]:
+    """Give the operating conditions that a model follows, from their references."""
+    found = {}
+    for element in model.elements:
+        follows = element.dependence()
+        if follows is not None:
+            unit = dict(own_parameters(element))["reference"].unit
+            found[follows.condition] = _Free(float(follows.reference), unit, 0.0, np.inf)
+    return found
+
+
 def space_of(model: Isolator, free: Mapping[str, tuple[float, float]]) -> Space:
-    """Give the coefficients that a design may choose.
+    """Give the coefficients and conditions that a design may choose.
 
     Args:
         model: the isolator.
         free: lower and upper bound by name.
 
     Returns:
-        The space.
+        The space. A condition starts at its reference, or at the bound next to it.
 
     Raises:
-        ValueError: if a name is no parameter of the model, a bound is not finite, outside of what the
-            coefficient admits or not below the other, or the model starts outside of its bounds.
+        ValueError: if a name is no parameter of the model and no condition that it follows, a bound is not
+            finite, outside of what the coefficient admits or not below the other, or a coefficient starts
+            outside of its bounds.
     """
-    listed = list_parameters(model)
-    names = [entry.name for entry in listed]
+    listed, conditions = list_parameters(model), _known_conditions(model)
     if not free:
         raise ValueError("Argument `free` must name at least one coefficient with its bounds, but is empty.")
-    for name, bounds in free.items():
-        if name not in names:
-            raise ValueError(f"Argument `free` must name some of {', '.join(names)}, but names {name!r}.")
-        entry = listed[names.index(name)]
-        low, high = (float(one) for one in bounds)
-        if not (np.isfinite(low) and np.isfinite(high) and low < high):
-            raise ValueError(f"Argument `free` must bound {name} by two finite numbers, but by {bounds}.")
-        if low < entry.spec.lower or high > entry.spec.upper:
+    bounds: dict[str, tuple[_Free, float, float]] = {}
+    places: list[int] = []
+    for given, ends in sorted(free.items(), key=lambda item: item[0] in conditions):
+        low, high = _ends(given, ends)
+        if given in conditions:
+            name, one = given, conditions[given]
+            one = one._replace(value=min(max(one.value, low), high))
+        else:
+            place = find_parameter(model, given, "free", *conditions)
+            name, spec = listed[place].name, listed[place].spec
+            places.append(place)
+            one = _Free(float(listed[place].value), spec.unit, spec.lower, spec.upper)
+        if low < one.lower or high > one.upper:
             raise ValueError(
-                f"Argument `free` must bound {name} within {entry.spec.lower:g} and {entry.spec.upper:g}, "
-                f"but by {bounds}."
+                f"Argument `free` must bound {name} within {one.lower:g} and {one.upper:g}, but by {ends}."
             )
-        if not low <= float(entry.value) <= high:
+        if not low <= one.value <= high:
             raise ValueError(
                 f"Argument `model` must start within the bounds of {name}, {low:g} and {high:g}, but starts "
-                f"at {float(entry.value):g}."
+                f"at {one.value:g}."
             )
-    lower, upper = np.array([list(map(float, bounds)) for bounds in free.values()]).T
-    places = tuple(names.index(name) for name in free)
-    return Space(model, tuple(free), places, lower, upper, lower * upper > 0.0)
+        bounds[name] = one, low, high
+    lower, upper = np.array([own[1:] for own in bounds.values()]).T
+    return Space(
+        model,
+        tuple(bounds),
+        tuple(one.unit for one, _, _ in bounds.values()),
+        tuple(places),
+        np.array([one.value for one, _, _ in bounds.values()]),
+        lower,
+        upper,
+        lower * upper > 0.0,
+    )
+
+
+def _ends(name: str, ends: tuple[float, float]) -> tuple[float, float]:
+    low, high = (float(one) for one in ends)
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise ValueError(f"Argument `free` must bound {name} by two finite numbers, but by {ends}.")
+    return low, high
 
 
 class Answer(NamedTuple):
@@ -139,12 +199,12 @@ class Quantity:
     def __init__(
         self,
         space: Space,
-        quantity: Callable[[Isolator], Any],
+        quantity: Callable[[Isolator], Any] | None,
         name: str,
         constraint: Constraint | None = None,
         errors: CoefficientErrors | None = None,
     ):
-        """Keep what is asked; nothing is evaluated yet."""
+        """Keep what is asked; nothing is evaluated yet. No quantity is the distance from the start."""
         self.space, self.name, self.constraint = space, name, constraint
         self.evaluations = 0
         self._function = quantity
@@ -203,6 +263,8 @@ class Quantity:
         return Answer(value, bound, slope)
 
     def _flat(self, at: Array) -> Array:
+        if self._function is None:
+            return jnp.ravel(self.space.distance(at))
         return jnp.ravel(jnp.asarray(self._function(self.space.moved(at)), dtype=float))
 
     def _twice(self, at: Array) -> tuple[Array, Array]:
@@ -211,16 +273,18 @@ class Quantity:
 
     def _error(self, at: Float[np.ndarray, " coordinate"]) -> Float[np.ndarray, " number"]:
         """Give the standard error of each number; the coefficients have the relative errors of the fit."""
-        errors = self._errors
+        errors, function = self._errors, self._function
         assert errors is not None
+        assert function is not None
         absent = errors.values == 0.0
         relative = errors.root / np.where(absent, 1.0, errors.values)[:, None]
 
         def shaken(steps: Array) -> Array:
-            model = self.space.moved(at)
-            numbers = [entry.value for entry in list_parameters(model)]
-            for place, share, gone in zip(errors.places, relative @ steps, absent, strict=True):
-                numbers[place] = numbers[place] + share if gone else numbers[place] * (1.0 + share)
-            return jnp.ravel(jnp.asarray(self._function(replace_parameters(model, numbers)), dtype=float))
+            def shake(numbers: list[Any]) -> list[Any]:
+                for place, share, gone in zip(errors.places, relative @ steps, absent, strict=True):
+                    numbers[place] = numbers[place] + share if gone else numbers[place] * (1.0 + share)
+                return numbers
+
+            return jnp.ravel(jnp.asarray(function(self.space.moved(at, shake)), dtype=float))
 
         return np.linalg.norm(np.asarray(jax.jacfwd(shaken)(jnp.zeros(errors.steps))), axis=1)

@@ -115,7 +115,7 @@ def global_sensitivity(
             sample has failed.
         ranges: for each input its least and greatest value, between which all are equally likely, or a law
             of `scipy.stats`, such as `stats.norm(value, standard_error)`. With a `model` the names are those
-            of its parameters.
+            of its parameters, or their symbols.
         model: the isolator, if the quantity is a function of one.
         samples: rows of the design, a power of 2; the quantity is evaluated `inputs + 2` times in each.
         confidence: chance that an interval is to hold the index.
@@ -150,6 +150,14 @@ def global_sensitivity(
         raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
     if samples < 64 or samples & (samples - 1):
         raise ValueError(f"Argument `samples` must be a power of 2, at least 64, but is {samples}.")
+    if not isinstance(ranges, Mapping):
+        raise ValueError(
+            "Argument `ranges` must be a dictionary of the ends of each input by its name, but is of type "
+            f"{type(ranges).__name__}."
+        )
+    if model is not None:
+        listed = list_parameters(model)
+        ranges = {listed[find_parameter(model, name, "ranges")].name: ends for name, ends in ranges.items()}
     names = tuple(ranges)
     if not names:
         raise ValueError("Argument `ranges` must name at least one input, but is empty.")

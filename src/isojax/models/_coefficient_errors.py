@@ -1,6 +1,6 @@
 """The coefficients of a fitted model with their errors: what carries a covariance into any answer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import jax
@@ -104,11 +104,22 @@ class CoefficientErrors(NamedTuple):
             Both.
 
         Raises:
-            ValueError: if JAX cannot differentiate the quantity.
+            ValueError: if the quantity is no function, gives no array, or JAX cannot differentiate it.
         """
+        if not callable(quantity):
+            raise ValueError(
+                "Argument `quantity` must be a function of an isolator, such as lambda model: model['k1'], "
+                f"but is {quantity!r}."
+            )
 
         def twice(steps: Array) -> tuple[Array, Array]:
-            value = jnp.asarray(quantity(self.moved(steps)))
+            given = quantity(self.moved(steps))
+            if isinstance(given, Mapping | str) or given is None:
+                raise ValueError(
+                    "Argument `quantity` must give a number or an array, as of jnp.stack([...]), but gave "
+                    f"one of type {type(given).__name__}."
+                )
+            value = jnp.asarray(given)
             return value, value
 
         try:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from ..._parameters import Parameter, list_parameters, replace_parameters
+from ..._parameters import Parameter, find_parameter, list_parameters, replace_parameters
 from ..._results import RESULTS, is_successful
 from ..._show import shown
 from ...elements import Scales
@@ -105,8 +105,8 @@ def free_places(
 
     Args:
         model: the isolator.
-        fixed: names to hold.
-        free: names to fit, and no others; by default every fitted kind.
+        fixed: names or symbols to hold.
+        free: names or symbols to fit, and no others; by default every fitted kind.
         mass_free: whether the mass is among them by default.
 
     Returns:
@@ -115,23 +115,16 @@ def free_places(
     Raises:
         ValueError: if a name is no parameter of the model, or nothing is left to fit.
     """
-    listed = list_parameters(model)
-    known = [entry.name for entry in listed]
-    for argument, names in (("fixed", fixed), ("free", free or ())):
-        for name in names:
-            if name not in known:
-                raise ValueError(
-                    f"Argument `{argument}` must name parameters of the model ({', '.join(known)}), "
-                    f"but holds {name!r}."
-                )
+    held = {find_parameter(model, name, "fixed") for name in fixed}
+    chosen = {find_parameter(model, name, "free") for name in free or ()}
 
-    def chosen(entry: Parameter) -> bool:
+    def is_free(place: int, entry: Parameter) -> bool:
         if free is not None:
-            return entry.name in free
+            return place in chosen
         wanted = entry.spec.fitted or (entry.name == "mass" and mass_free)
-        return wanted and entry.name not in fixed
+        return wanted and place not in held
 
-    places = tuple(place for place, entry in enumerate(listed) if chosen(entry))
+    places = tuple(place for place, entry in enumerate(list_parameters(model)) if is_free(place, entry))
     if not places:
         raise ValueError(
             "Arguments `free` and `fixed` must leave at least one coefficient to fit, but leave none."

@@ -50,9 +50,9 @@ def fit(
         model: start, such as `classical_guess(campaign)` or its `.model`; a campaign by itself, or its path,
             is fitted from its classical guess.
         campaign: the measurements, or the path of their campaign.toml or its folder.
-        free: names of the coefficients to fit, and no others; all fitted kinds (and the mass, where the
-            campaign frees it) if omitted.
-        fixed: names of coefficients to hold.
+        free: names or symbols of the coefficients to fit, and no others; all fitted kinds (and the mass,
+            where the campaign frees it) if omitted.
+        fixed: names or symbols of coefficients to hold.
         solver: an optimistix least-squares solver.
         integrator: solver and steps; the coarsest steps of RK4 whose error is a twentieth of the noise, if
             omitted. Any other diffrax solver, such as `Integrator(diffrax.Dopri8(), rtol=1e-8)`, simulates

@@ -5,11 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...stability import FoldCurve, StabilityMap
+from ...stability.map import IN_DOUBT
 from ..plots import drive_unit, quantity
 from ._map_files import result_codes
-
-_IN_DOUBT = 0.05
-"""Chance below which, or below which of the contrary, a cell counts as sure."""
 
 _REASONS = {1: "not converged", 2: "left every bound", 3: "multipliers not accurate", 4: "held by friction"}
 
@@ -107,8 +105,8 @@ def _chance_words(smap: StabilityMap) -> str:
         ("several orbits", smap.probability_coexisting),
     ):
         values = np.asarray(chance)
-        sure = int(np.sum(values >= 1.0 - _IN_DOUBT))
-        doubtful = int(np.sum((values > _IN_DOUBT) & (values < 1.0 - _IN_DOUBT)))
+        sure = int(np.sum(values >= 1.0 - IN_DOUBT))
+        doubtful = int(np.sum((values > IN_DOUBT) & (values < 1.0 - IN_DOUBT)))
         words.append(f"{name}: at least 95 % in {sure} cells, uncertain in {doubtful}")
     if smap.chance_error is not None and np.isfinite(smap.chance_error):
         words.append(f"a chance near a half is off by at most about {smap.chance_error:.2g}")

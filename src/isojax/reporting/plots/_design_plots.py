@@ -56,7 +56,7 @@ def plot_design(design: Design, *, ax: Axes | None = None) -> Figure:
     """
     figure, ax = axes_for(ax, 7.0, 1.2 + 0.35 * len(design.names))
     rows = np.arange(len(design.names))
-    before = np.array([float(design.start[name]) for name in design.names])
+    before = design.before
     size = np.where(before == 0.0, 1.0, np.abs(before))
     low, high = 100.0 * (design.lower - before) / size, 100.0 * (design.upper - before) / size
     ax.barh(rows, high - low, left=low, height=0.62, color="#e6e9ed", label="between the bounds")

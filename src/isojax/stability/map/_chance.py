@@ -57,7 +57,8 @@ class Chances(NamedTuple):
         coexisting: chance that it holds several orbits.
         standard_errors: of `response` and `spectral_radius` of each orbit; NaN where not every map has it.
         error: of a chance near a half, at most, on average over the map: what one map more shows, of a draw
-            that moves all coefficients at once; NaN where no chance is in doubt.
+            that moves all coefficients at once, and no less than one cell would make; NaN where no chance is
+            in doubt.
     """
 
     stable: Float[np.ndarray, "amplitude frequency"]
@@ -144,7 +145,9 @@ def find_chances(
         beyond = np.any((still[..., column] < least) | (still[..., column] > most), axis=0)
         stable[beyond, column] = coexisting[beyond, column] = np.nan
     doubt = np.nansum(stable * (1.0 - stable) + coexisting * (1.0 - coexisting))
-    error = _SHARE_OF_DOUBT * wrong[:, np.isfinite(stable)].sum() / doubt if doubt > 0.0 else np.nan
+    # That one draw shows no wrong cell says that fewer than one a draw are wrong.
+    cells = max(wrong[:, np.isfinite(stable)].sum(), 1.0)
+    error = _SHARE_OF_DOUBT * cells / doubt if doubt > 0.0 else np.nan
     return Chances(stable, coexisting, _standard_errors(maps, inner), float(error))
 
 

@@ -58,6 +58,9 @@ _INSTEAD = (
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
 
+IN_DOUBT = 0.05
+"""A chance is in doubt if it is further than this from zero and one."""
+
 
 @shown
 class StabilityMap(eqx.Module):
@@ -160,14 +163,34 @@ class StabilityMap(eqx.Module):
         rows = np.unique(np.linspace(0, forces.size - 1, min(_ROWS, forces.size)).round().astype(int))
         columns = np.unique(np.linspace(0, band.size - 1, min(_COLUMNS, band.size)).round().astype(int))
         drawn = [f"  {forces[row]:>10.4g} |{''.join(marks[row, columns])}" for row in rows[::-1]]
-        chances = "" if self.chance_error is None else f"  chances off by at most {self.chance_error:.2g}"
+        sought = np.ndim(self.spectral_radius) > count.ndim
+        legend = (
+            "  . one stable orbit, x one unstable orbit, 2 to 9 coexisting orbits, ? none found"
+            if sought
+            else "  the orbit of smallest motion in each cell: . stable, x unstable, ? none found"
+        )
         return [
             *drawn,
             f"  {'F0':>10} +{'-' * columns.size}",
             f"  {'f [Hz]':>10}  {band[0]:.4g} to {band[-1]:.4g}",
-            "  . one stable orbit, x one unstable orbit, 2 to 9 coexisting orbits, ? none found",
-            *([chances] if chances else []),
+            legend,
+            *self._chance_lines(),
         ]
+
+    def _chance_lines(self) -> list[str]:
+        if self.probability_stable is None or self.probability_coexisting is None:
+            return []
+        words = []
+        for name, chance in (
+            ("no unstable orbit", self.probability_stable),
+            ("several orbits", self.probability_coexisting),
+        ):
+            known = np.asarray(chance)[np.isfinite(chance)]
+            likely, doubtful = np.sum(known > 0.5), np.sum((known > IN_DOUBT) & (known < 1.0 - IN_DOUBT))
+            words.append(f"{name} likely in {likely} cells, in doubt in {doubtful}")
+        off = np.nan if self.chance_error is None else self.chance_error
+        off = f"; a chance near a half is off by at most {off:.2g}" if np.isfinite(off) else ""
+        return [f"  chances, of all orbits in a cell: {', '.join(words)}{off}"]
 
 
 def stability_map(
