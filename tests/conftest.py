@@ -9,6 +9,7 @@ from pathlib import Path
 
 import jax
 import jaxlib.version
+import jaxtyping
 import pytest
 from jaxtyping import install_import_hook
 
@@ -60,6 +61,14 @@ def _note_compiled(event: str, _: float, **__: object) -> None:
 
 
 jax.monitoring.register_event_duration_secs_listener(_note_compiled)
+
+
+@pytest.fixture
+def unchecked():
+    """The package as a user has it, without the runtime shape checks of the tests."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture(autouse=True)

@@ -1,7 +1,6 @@
 """Each excitation against its formula, and its derivative against the derivative of that formula."""
 
 import jax.numpy as jnp
-import jaxtyping
 import numpy as np
 import pytest
 from scipy.signal import chirp
@@ -9,14 +8,6 @@ from scipy.signal import chirp
 from isojax.excitations import Harmonic, Multisine, SteppedSine, SweptSine, random_phase_multisine
 
 T = np.linspace(0.0, 6.0, 1201)
-
-
-@pytest.fixture
-def unchecked():
-    """The package as a user has it, without the runtime shape checks of the tests."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def test_harmonic_is_a_sine_of_phase_zero():

@@ -1,6 +1,5 @@
 """What a sampled drive does between its samples, against the signal that was sampled."""
 
-import jaxtyping
 import numpy as np
 import pytest
 
@@ -32,14 +31,6 @@ def samples():
 @pytest.fixture(scope="module")
 def size():
     return sum(a for a, _, _ in LINES)
-
-
-@pytest.fixture
-def unchecked():
-    """The package as a user has it, without the runtime shape checks of the tests."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def test_band_limited_recovers_a_sum_of_sines_away_from_the_ends(samples, size):

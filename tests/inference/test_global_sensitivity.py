@@ -113,7 +113,7 @@ def test_a_function_that_cannot_be_mapped_is_evaluated_one_by_one():
     np.testing.assert_allclose(ij.global_sensitivity(plain, CIRCLE, samples=64).total, mapped.total)
 
 
-def test_what_makes_no_sense_is_refused():
+def test_what_makes_no_sense_is_refused(unchecked):
     model = ij.paper.y_direction()
     for ranges, words in (
         ({}, "at least one input"),

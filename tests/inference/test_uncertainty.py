@@ -163,7 +163,7 @@ def test_a_function_that_cannot_be_mapped_is_drawn_one_by_one(wide):
     assert found.draws.shape == (100,)
 
 
-def test_what_cannot_be_carried_is_refused(wide):
+def test_what_cannot_be_carried_is_refused(wide, unchecked):
     lost = np.array(wide.covariance)
     lost[0] = lost[:, 0] = np.nan
     with pytest.raises(ValueError, match=f"do not determine {wide.free[0]}"):

@@ -3,7 +3,6 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import jaxtyping
 import numpy as np
 import pytest
 
@@ -20,14 +19,6 @@ from isojax.elements import (
     StribeckFriction,
 )
 from isojax.models import ContinuedLaw, Instant, Isolator, Regime, freeing_accelerations, law_beside
-
-
-@pytest.fixture
-def unchecked():
-    """The package as a user has it, without the runtime shape checks of the tests."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def test_numbers_become_float64_arrays():

@@ -6,7 +6,6 @@ import sys
 
 import diffrax
 import jax.numpy as jnp
-import jaxtyping
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -44,14 +43,6 @@ def linear_response(t, x0, v0):
 def reference(field, times, start):
     """DOP853 at the tightest tolerance that SciPy allows."""
     return solve_ivp(field, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-15).y
-
-
-@pytest.fixture
-def unchecked():
-    """The package as a user has it, without the runtime shape checks of the tests."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.mark.parametrize(("x0", "v0"), [(0.0, 0.0), (2e-3, -0.05)])
