@@ -122,6 +122,16 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         "fit.json that close-loop and fit write beside the model; takes some 13 times as long; default: "
         "where there is one",
     )
+    plane.add_argument(
+        "--next-record",
+        nargs="?",
+        const=0.0,
+        type=float,
+        metavar="CALIBRATION",
+        help="chances of what a further record shows: its own linear stiffness, which deviates as those of "
+        "the fitted records do, and a force known to a share of CALIBRATION (0.005 is 0.5 %%); default: of the "
+        "mean over all records",
+    )
     plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
     plane.add_argument(
         "--checkpoint",

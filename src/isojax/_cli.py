@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from .identification import Fit, SavedFit
+    from .inference import NextRecord
     from .models import Isolator
     from .records import Campaign
 
@@ -259,7 +260,7 @@ def _map(asked: argparse.Namespace) -> int:
     from .records import CONDITIONS
 
     model = load_model(asked.model)
-    fit = _fit_beside(Path(asked.model), model) if asked.chances else None
+    fit = _fit_beside(Path(asked.model), model, asked.next_record) if asked.chances else None
     stated = {name: getattr(asked, name) for name in CONDITIONS if getattr(asked, name) is not None}
     model, fit = model.at(**stated), None if fit is None else fit_at(fit, **stated)
 
@@ -302,18 +303,23 @@ def _map(asked: argparse.Namespace) -> int:
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
 
 
-def _fit_beside(path: Path, model: "Isolator") -> "SavedFit | None":
-    """Give the fit that was saved beside a model, where it is of this model and its errors can be carried."""
+def _fit_beside(path: Path, model: "Isolator", calibration: float | None) -> "SavedFit | NextRecord | None":
+    """Give the fit that was saved beside a model, where it is of this model and its errors can be carried;
+    with a calibration, that of a further record.
+    """
     beside = path.with_name("fit.json")
     if not beside.exists():
         return None
 
     from .identification import load_fit
+    from .inference import next_record
     from .models import coefficient_errors
 
     try:
         fit = load_fit(beside)
         coefficient_errors(fit, model)
+        if calibration is not None:
+            return next_record(fit, calibration=calibration)
     except ValueError as problem:
         print(f"The map has no chances: {beside} cannot serve. {problem}", file=sys.stderr)
         return None

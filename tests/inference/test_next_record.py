@@ -1,12 +1,14 @@
 """Answers about a further record: its own stiffness, and the calibration of its force."""
 
 import dataclasses
+import json
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import isojax as ij
+from isojax._cli import main
 from isojax.demo import campaign_folder
 
 FORCE, FREQUENCY = 60.0, 5.0
@@ -45,6 +47,42 @@ def test_a_force_known_to_a_per_cent_is_a_linear_amplitude_known_to_a_per_cent(f
     )
     added = np.sqrt(float(calibrated.standard_error) ** 2 - float(plain.standard_error) ** 2)
     assert added == pytest.approx(0.01 * float(plain.value), rel=1e-9)
+
+
+def test_a_saved_fit_knows_the_scatter_too(fit, tmp_path):
+    fit.save(tmp_path / "fit.json")
+    again, found = ij.next_record(ij.load_fit(tmp_path / "fit.json")), ij.next_record(fit)
+    np.testing.assert_array_equal(again.covariance, found.covariance)
+    content = json.loads((tmp_path / "fit.json").read_text())
+    del content["statistics"]["next_stiffness_scatter"]
+    (tmp_path / "old.json").write_text(json.dumps(content))
+    with pytest.raises(ValueError, match="older version does not hold the scatter"):
+        ij.next_record(ij.load_fit(tmp_path / "old.json"))
+
+
+def test_the_map_of_the_command_line_takes_its_chances_from_a_further_record(
+    fit, tmp_path, monkeypatch, capsys
+):
+    fit.save(tmp_path / "fit.json")
+    ij.save_model(fit.model, tmp_path / "model.json")
+    taken = []
+
+    def keep(model, *axes, fit, **named):
+        taken.append(fit)
+        raise ValueError("enough")
+
+    monkeypatch.setattr("isojax.stability.stability_map", keep)
+    command = [
+        "map",
+        str(tmp_path / "model.json"),
+        *"--amplitudes 1 9 --frequencies 4 6 --quiet --out".split(),
+    ]
+    for words in ([], ["--next-record"], ["--next-record", "0.01"]):
+        assert main([*command, str(tmp_path / "map"), *words]) == 2
+    assert "enough" in capsys.readouterr().err
+    plain, stiff, calibrated = (variance_of(one, STIFFNESS) for one in taken)
+    assert stiff == variance_of(ij.next_record(fit), STIFFNESS)
+    assert plain < stiff < calibrated
 
 
 def test_it_says_what_it_holds(fit):

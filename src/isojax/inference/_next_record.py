@@ -8,7 +8,7 @@ from jaxtyping import Float
 from .._parameters import list_parameters
 from .._results import RESULTS, is_successful
 from .._show import Row, shown
-from ..identification.fitting import Fit, Fitted, as_fit, scatter_of_next
+from ..identification.fitting import Fit, Fitted, SavedFit, as_fit
 from ..identification.jacobian import stiffness_place
 from ..models import Isolator
 
@@ -47,7 +47,7 @@ class NextRecord(NamedTuple):
         ]
 
 
-def next_record(fit: Fit | Fitted, *, calibration: float = 0.0) -> NextRecord:
+def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> NextRecord:
     """Give a fit the errors of answers about a further record.
 
     The errors of a fit are those of its coefficients, which belong to the mean of all records. A further
@@ -56,7 +56,7 @@ def next_record(fit: Fit | Fitted, *, calibration: float = 0.0) -> NextRecord:
     calibration: a force that is wrong by a share acts as if the mass and every coefficient of a force were.
 
     Args:
-        fit: a fit to two records or more, or what ends with one: an extension, a closed loop.
+        fit: a fit to two records or more, a saved one, or what ends with one: an extension, a closed loop.
         calibration: standard uncertainty of the force of the next test, against that of the fitted ones
             [relative].
 
@@ -79,7 +79,7 @@ def next_record(fit: Fit | Fitted, *, calibration: float = 0.0) -> NextRecord:
         >>> bool(expected.standard_error > known.standard_error)
         True
     """
-    held = as_fit(fit)
+    held = fit if isinstance(fit, SavedFit) else as_fit(fit)
     if not is_successful(held.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[held.result]}")
     if not (np.isfinite(calibration) and calibration >= 0.0):
@@ -94,7 +94,12 @@ def next_record(fit: Fit | Fitted, *, calibration: float = 0.0) -> NextRecord:
     own = np.zeros(len(listed))
     spring, scatter = stiffness_place(model), 0.0
     if spring is not None:
-        scatter = _scatter(held)
+        scatter = held.stats.next_stiffness_scatter
+        if not np.isfinite(scatter):
+            raise ValueError(
+                "Argument `fit` must rest on two records or more: one shows no scatter of the stiffness "
+                "between records. A file of an older version does not hold the scatter: fit again."
+            )
         own[spring] = scatter * values[spring]
     # A force in a unit that is off by a share: what is measured in newtons or kilograms follows it.
     scaled = np.array([entry.spec.unit.startswith(("N", "kg")) for entry in listed])
@@ -108,14 +113,3 @@ def next_record(fit: Fit | Fitted, *, calibration: float = 0.0) -> NextRecord:
     return NextRecord(
         model, free, covariance[np.ix_(uncertain, uncertain)], held.result, scatter, calibration
     )
-
-
-def _scatter(fit: Fit) -> float:
-    """Give by how much the linear stiffness of a further record deviates [relative]."""
-    estimate = fit.estimate
-    if not estimate.shows_scatter:
-        raise ValueError(
-            "Argument `fit` must rest on two records or more: one shows no scatter of the stiffness between "
-            "records."
-        )
-    return scatter_of_next(estimate.point.reduced, estimate.point.nuisances, estimate.inflation)

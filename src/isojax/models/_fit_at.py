@@ -35,7 +35,8 @@ class FitAt(NamedTuple):
 def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitAt:
     """Give a fit at an operating condition, for the bands and chances of curves and maps there.
 
-    The plain coefficients there are linear in the fitted ones, so that their covariance is exact.
+    The plain coefficients there are linear in the fitted ones, so that their covariance is exact; where a
+    curvature was fitted it is that of the delta method.
 
     Args:
         fit: a fit, a saved one, or what ends with one, such as a closed loop.

@@ -54,7 +54,6 @@ from ._saved_fit import Statistics as Statistics
 from ._saved_fit import load_fit as load_fit
 from ._scatter_mixture import ScatteredScores as ScatteredScores
 from ._scatter_mixture import expect_uncertainty as expect_uncertainty
-from ._scatter_mixture import scatter_of_next as scatter_of_next
 from ._scatter_mixture import scores_over_scatters as scores_over_scatters
 from ._search import DEFAULT_SOLVER as DEFAULT_SOLVER
 from ._search import MOST_EVALUATIONS as MOST_EVALUATIONS

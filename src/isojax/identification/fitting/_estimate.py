@@ -22,7 +22,7 @@ from ._descent import descend
 from ._elimination import Nuisances, Spread
 from ._initial_states import HELD, best_nuisances
 from ._problem import Point, Problem, one_hot
-from ._scatter_mixture import integrate_scatter
+from ._scatter_mixture import integrate_scatter, scatter_of_next
 from ._search import ROUGH, Search
 from ._segment_scatter import segment_scatter
 from ._simulator import Simulator
@@ -91,6 +91,13 @@ class Estimate(NamedTuple):
     def shows_scatter(self) -> bool:
         """Whether error bars allow for a scatter of the stiffness; a single record shows none."""
         return has_stiffness_scale(self.model) and self.point.samples.size > 1
+
+    @property
+    def next_stiffness_scatter(self) -> float:
+        """By how much the linear stiffness of a further record deviates [relative]; NaN where none shows."""
+        if not self.shows_scatter:
+            return float("nan")
+        return scatter_of_next(self.point.reduced, self.point.nuisances, self.inflation)
 
     @property
     def excess(self) -> float:

@@ -267,6 +267,7 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         found.steps,
         *found.point.nuisances.spread,
         found.problem.step_error,
+        found.next_stiffness_scatter,
     )
     return Fit(
         found.model,

@@ -37,6 +37,9 @@ class Statistics(NamedTuple):
         segment_scatter: the same between the segments of a record; 0 where no repeat shows one.
         integration_error: rms change of the readings when the integration steps are halved, over the noise;
             NaN where the steps were given.
+        next_stiffness_scatter: standard deviation of the linear stiffness of a further record, over all
+            scatters that the records allow [relative]; NaN where a single record shows none, where there is
+            no linear spring, and in a file of before it was saved.
     """
 
     samples: int
@@ -49,6 +52,7 @@ class Statistics(NamedTuple):
     stiffness_scatter: float
     segment_scatter: float
     integration_error: float
+    next_stiffness_scatter: float = math.nan
 
 
 @shown
