@@ -129,8 +129,8 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         type=float,
         metavar="CALIBRATION",
         help="chances of what a further record shows: its own linear stiffness, which deviates as those of "
-        "the fitted records do, and a force known to a share of CALIBRATION (0.005 is 0.5 %%); default: of the "
-        "mean over all records",
+        "the fitted records do, and a force known to a share of CALIBRATION (0.005 is 0.5 %%); default: of "
+        "the mean over all records",
     )
     plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
     plane.add_argument(
