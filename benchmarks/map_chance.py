@@ -24,8 +24,8 @@ from coverage import records_of
 from isojax import compile_quickly, rig
 from isojax.models import coefficient_errors
 from isojax.stability.map._chance import find_chances, quasi_draws
-from isojax.stability.map._map import MapRun, solve_map
-from isojax.stability.map._sought import Sought
+from isojax.stability.map._map import solve_map
+from isojax.stability.map._sought import MapRun, Sought
 from isojax.stability.map._surface import MapWindow
 
 CELLS = 200, 100
