@@ -11,6 +11,7 @@ from ._follower import AbstractFollower
 from ._follower import Dependence as Dependence
 from ._force import AbstractForce
 from ._instrument import AbstractInstrument
+from ._instrument import AddedHarmonic as AddedHarmonic
 
 
 @shown

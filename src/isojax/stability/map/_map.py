@@ -24,7 +24,7 @@ from ...models import (
     as_isolator,
     coefficient_errors,
 )
-from ..orbit import Sine, ascending, is_odd, refuse_transformed
+from ..orbit import Sine, ascending, integrator_for, is_odd, refuse_transformed
 from ._batched_newton import (
     FOUND,
     NO_FURTHER_ORBIT,
@@ -294,7 +294,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         The map, and the surface from which its orbits came.
     """
     half, (forces, band, _) = is_odd(model), window
-    integrator = Integrator() if run.integrator is None else run.integrator
+    integrator = integrator_for(model, run.integrator)
     sought = seek(model, integrator, half, window, integrator.map_error, run.coexisting, run.devices)
     goal = _READING_SHARE * integrator.map_error
     if run.integrator is None and sought.reading_error > goal:

@@ -1,6 +1,7 @@
-"""One harmonic in closed form: the sine that holds a given amplitude at a given frequency."""
+"""One harmonic in closed form: the drive that holds a given amplitude at a given frequency."""
 
 import math
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +14,9 @@ from ._sine import Sine
 
 _SAMPLES = 64
 """Samples a cycle; the first harmonic of |x|x is then good to 1e-5, so good that only the others matter."""
+
+_PHASES, _POLISHING = 256, 2
+"""Phases at which the largest displacement under several harmonics is sought; steps of Newton's method then."""
 
 _IMPOSED_CYCLES = 3
 """Cycles of imposed motion after which internal states count as settled."""
@@ -95,6 +99,96 @@ def imposed_internal(
     return tuple(values[-count:] for values in along)
 
 
+class BalancedMotion(NamedTuple):
+    """A motion about rest with a given largest displacement, tau counted from there.
+
+    Attributes:
+        drive: fundamental of the drive that holds it.
+        internal: internal states along a cycle, time first.
+        parts: order, cosine and sine part of each multiple of tau in the displacement [m], where the drive
+            holds harmonics; the motion is `amplitude cos(tau)` where there is none.
+    """
+
+    drive: Sine
+    internal: tuple[Lanes, ...]
+    parts: tuple[tuple[Lanes | float, Lanes, Lanes], ...]
+
+    def at(self, amplitude: Lanes, phase: Lanes) -> tuple[Lanes, Lanes]:
+        """Give displacement from rest and velocity.
+
+        Args:
+            amplitude: largest displacement [m].
+            phase: tau [rad].
+
+        Returns:
+            Both [m, m/s].
+        """
+        omega = self.drive.angular_frequency
+        if not self.parts:
+            return amplitude * jnp.cos(phase), -amplitude * omega * jnp.sin(phase)
+        x, v = 0.0 * amplitude, 0.0 * amplitude
+        for order, cosine, sine in self.parts:
+            turned = order * phase
+            x = x + cosine * jnp.cos(turned) + sine * jnp.sin(turned)
+            v = v + order * omega * (sine * jnp.cos(turned) - cosine * jnp.sin(turned))
+        return x, v
+
+
+def balanced_motion(
+    model: Isolator, amplitude: Lanes, frequency: Lanes, rest: Lanes | float = 0.0
+) -> BalancedMotion:
+    """Give a motion in the balance of one harmonic, and the drive that holds it.
+
+    Where the drive holds harmonics, each moves the mass as the equivalent linear isolator of this amplitude
+    lets it, and the drive is the one under which all of them together reach the amplitude.
+
+    Args:
+        model: the isolator.
+        amplitude: largest displacement over rest [m], positive.
+        frequency: [Hz], same shape.
+        rest: centre of the motion [m].
+
+    Returns:
+        The motion.
+    """
+    drive, internal = imposed_balance(model, amplitude, frequency, rest)
+    if not model.harmonics:
+        return BalancedMotion(drive, internal, ())
+    waves: list[tuple[Lanes | float, Lanes]] = [(1.0, amplitude / _phasor(drive))]
+    for one in model.harmonics:
+        upper, _ = imposed_balance(model, amplitude, one.order * frequency, rest)
+        waves.append((one.order, one.share * jnp.exp(1j * one.phase) * amplitude / _phasor(upper)))
+
+    def height(phase: Array, power: int) -> Array:
+        """Give the displacement at the start under a unit drive of some phase, or its derivative by it."""
+        own = [jnp.real((1j * n) ** power * one * jnp.exp(1j * n * phase)) for n, one in waves]
+        return sum(own[1:], start=own[0])
+
+    def turn(count: int) -> Array:
+        """Give equidistant phases, in front of the axes of the lanes."""
+        phases = 2.0 * np.pi / count * np.arange(count)
+        return jnp.asarray(phases.reshape(-1, *(1,) * jnp.ndim(amplitude * frequency)))
+
+    best = 2.0 * math.pi / _PHASES * jnp.argmax(height(turn(_PHASES), 0), axis=0)
+    for _ in range(_POLISHING):
+        bend = height(best, 2)
+        best = best - jnp.where(bend < 0.0, height(best, 1) / jnp.where(bend < 0.0, bend, 1.0), 0.0)
+    push = amplitude / height(best, 0)
+    moved = [(n, push * one * jnp.exp(1j * n * best)) for n, one in waves]
+    parts = tuple((n, jnp.real(one), -jnp.imag(one)) for n, one in moved)
+    held = Sine(-push * jnp.sin(best), push * jnp.cos(best), frequency)
+    motion = BalancedMotion(held, internal, parts)
+    if model.internal_states:
+        x, v = motion.at(amplitude + 0.0 * frequency, turn(_SAMPLES))
+        motion = motion._replace(internal=imposed_internal(model, rest + x, v, frequency))
+    return motion
+
+
+def _phasor(drive: Sine) -> Lanes:
+    """Give D of `D exp(i tau)`."""
+    return jnp.asarray(drive.cosine) - 1j * drive.sine
+
+
 def imposed_balance(
     model: Isolator, amplitude: Lanes, frequency: Lanes, rest: Lanes | float = 0.0
 ) -> tuple[Sine, tuple[Lanes, ...]]:
@@ -149,7 +243,7 @@ def response_amplitudes(
     """
 
     def needed(amplitude: Array) -> Array:
-        drive, _ = imposed_balance(model, amplitude + 0.0 * frequency, frequency, rest)
+        drive = balanced_motion(model, amplitude + 0.0 * frequency, frequency, rest).drive
         return jnp.hypot(drive.sine, jnp.asarray(drive.cosine))
 
     return jax.vmap(needed)(amplitudes)
@@ -179,10 +273,11 @@ def response_start(model: Isolator, amplitude: Scalar, frequency: Scalar) -> Flo
     span = needed[place + 1] - needed[place]
     share = jnp.where(jnp.any(rises), (jnp.abs(amplitude) - needed[place]) / span, 0.0)
     motion = grid[place] + share * (grid[place + 1] - grid[place])
-    drive, internal = imposed_balance(model, motion, frequency, rest)
-    # The motion is `rest + a cos(tau)`; the recorded drive passes zero upwards at this tau.
+    balanced = balanced_motion(model, motion, frequency, rest)
+    drive, internal, _ = balanced
+    # The motion is largest at tau = 0; the recorded drive passes zero upwards at this tau.
     lead = jnp.where(amplitude < 0, math.pi, 0.0) + 2.0 * math.pi * frequency * model.shift()
     phase = -jnp.arctan2(drive.cosine, drive.sine) - lead
-    x, v = rest + motion * jnp.cos(phase), -motion * drive.angular_frequency * jnp.sin(phase)
+    x, v = balanced.at(motion, phase)
     sample = jnp.round(phase / (2.0 * math.pi) * _SAMPLES).astype(int) % _SAMPLES
-    return jnp.stack([x, v, *(values[sample] for values in internal)])
+    return jnp.stack([rest + x, v, *(values[sample] for values in internal)])

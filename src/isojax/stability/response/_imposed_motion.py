@@ -14,7 +14,15 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..._quick_jit import quick_jit
 from ...models import CoefficientErrors, Integrator, Isolator
-from ..orbit import Sine, imposed_balance, is_odd, rest_displacement, trajectory, value_and_jacobian
+from ..orbit import (
+    Sine,
+    balanced_motion,
+    is_odd,
+    rest_displacement,
+    trajectory,
+    value_and_jacobian,
+    with_overtones,
+)
 from ._frequency_response import fundamental
 
 _TRIED = np.logspace(-9.0, 1.0, 241)
@@ -45,6 +53,9 @@ _LARGEST = 2.0
 FUNDAMENTALS = ("drive", "acted", "displacement", "passed")
 """Whose fundamentals a node has: the recorded drive, the one that acted, the displacement, and what passes
 through the isolator: the force on the ground, or the absolute acceleration under base excitation."""
+
+
+_DISPLACEMENT = FUNDAMENTALS.index("displacement")
 
 
 class ImposedMotions(NamedTuple):
@@ -147,7 +158,7 @@ def _grid(
         half,
     )
     values, changes, matrices, closed = (np.asarray(one) for one in found)
-    closed = closed & (np.abs(values[:, FUNDAMENTALS.index("displacement")]) < _LARGEST)
+    closed = closed & (np.abs(values[:, _DISPLACEMENT]) < _LARGEST)
     roots = np.linalg.eigvals(np.where(closed[:, None, None], matrices, 0.0)).astype(complex)
     roots = roots**2 if half else roots
 
@@ -170,7 +181,8 @@ def _balances(model: Isolator, frequencies: Float[Array, " frequency"]) -> _Star
     rest = rest_displacement(model)
 
     def at(amplitude: Array) -> tuple[Sine, tuple[Array, ...]]:
-        return imposed_balance(model, amplitude + 0.0 * frequencies, frequencies, rest)
+        drive, internal, _ = balanced_motion(model, amplitude + 0.0 * frequencies, frequencies, rest)
+        return drive, internal
 
     drive, internal = jax.vmap(at)(jnp.asarray(_TRIED))
     sizes = tuple(jnp.max(jnp.abs(one), axis=1) for one in internal)
@@ -223,18 +235,22 @@ def _closed(
         isolator, unknown = errors.moved(steps), unknown * size
         own = jnp.concatenate([jnp.stack([a, a * 2.0 * np.pi * f]), size[2:]])
         state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), unknown[2:]]) + shift * own
-        drive = Sine(unknown[0], unknown[1], f)
+        drive = with_overtones(isolator, Sine(unknown[0], unknown[1], f))
         path = trajectory(isolator, integrator, drive, tuple(state), turns=turns, rounded=True)
         left = (sign * jnp.stack([along[-1] for along in path]) - state) / own
         phase = 2.0 * np.pi * turns / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
-        at = drive.at(jnp.asarray(np.sin(phase)), jnp.asarray(np.cos(phase)))
+        at = drive.at(drive.waves(phase))
         acted, _ = isolator.drive(at)
         if isolator.excitation == "base_acceleration":
             passed = isolator.motion(path, at, "acceleration")
         else:
             passed = isolator.restoring_force(path)
         signals = (at.drive, acted, path[0], passed)
-        return left, jnp.stack([fundamental(jnp.asarray(signal), turns) for signal in signals]) / a
+        found = jnp.stack([fundamental(jnp.asarray(signal), turns) for signal in signals]) / a
+        if isolator.harmonics:
+            # Of several maxima another may become the largest: phases from the fundamental on go on there.
+            found = found * jnp.conj(found[_DISPLACEMENT]) / jnp.abs(found[_DISPLACEMENT])
+        return left, found
 
     def evaluated(a: Array, f: Array, size: Array, unknown: Array) -> tuple[Array, ...]:
         still = jnp.zeros(states + errors.steps)
