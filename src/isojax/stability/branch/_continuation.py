@@ -185,13 +185,9 @@ def swept_family(
                 f"Argument `parameter` must be amplitude, frequency or one of {', '.join(names)}, but is "
                 f"{parameter!r}."
             )
-        moved = (
-            frozen(model).replace(**{parameter: float(frozen(as_float64(end)))}) for end in (start, stop)
-        )
-        if len({tuple(float(one.order) for one in there.harmonics) for there in moved}) > 1:
-            raise ValueError(
-                f"Argument `parameter` must be continuous, but {parameter} is the order of a harmonic, a count."
-            )
+        varied = (frozen(model).replace(**{parameter: frozen(as_float64(end))}) for end in (start, stop))
+        if len({tuple(float(one.order) for one in there.harmonics) for there in varied}) > 1:
+            raise ValueError(f"Argument `parameter` must be continuous, but {parameter} is a count.")
     held = {"amplitude": amplitude, "frequency": frequency}
     for name, value in held.items():
         if (value is None) != (name == parameter):

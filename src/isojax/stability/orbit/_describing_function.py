@@ -16,7 +16,7 @@ _SAMPLES = 64
 """Samples a cycle; the first harmonic of |x|x is then good to 1e-5, so good that only the others matter."""
 
 _PHASES, _POLISHING = 256, 2
-"""Phases at which the largest displacement under several harmonics is sought; steps of Newton's method then."""
+"""Phases at which the largest displacement is sought under harmonics; steps of Newton's method from there."""
 
 _IMPOSED_CYCLES = 3
 """Cycles of imposed motion after which internal states count as settled."""

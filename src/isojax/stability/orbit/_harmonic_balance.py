@@ -148,7 +148,7 @@ def harmonic_balance(
     order = highest_order(frozen(model))
     if harmonics < order:
         raise ValueError(
-            f"Argument `harmonics` must be at least {order}, the highest order of the drive, but is {harmonics}."
+            f"Argument `harmonics` must be at least {order}, as of the drive, but is {harmonics}."
         )
     if samples <= 2 * harmonics:
         raise ValueError(
