@@ -10,6 +10,7 @@ attractor and derivatives build on this one.
 from ._axis import ascending as ascending
 from ._describing_function import balanced_motion as balanced_motion
 from ._describing_function import imposed_balance as imposed_balance
+from ._describing_function import overtone_response as overtone_response
 from ._describing_function import response_amplitudes as response_amplitudes
 from ._describing_function import response_start as response_start
 from ._describing_function import rest_displacement as rest_displacement

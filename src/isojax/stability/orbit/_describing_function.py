@@ -6,11 +6,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from ..._types import Lanes, Scalar, as_float64
 from ...models import ContinuedLaw, Instant, Isolator
-from ._sine import Sine
+from ._sine import PeriodicDrive, Sine
 
 _SAMPLES = 64
 """Samples a cycle; the first harmonic of |x|x is then good to 1e-5, so good that only the others matter."""
@@ -154,22 +154,17 @@ def balanced_motion(
     drive, internal = imposed_balance(model, amplitude, frequency, rest)
     if not model.harmonics:
         return BalancedMotion(drive, internal, ())
-    waves: list[tuple[Lanes | float, Lanes]] = [(1.0, amplitude / _phasor(drive))]
-    for one in model.harmonics:
-        upper, _ = imposed_balance(model, amplitude, one.order * frequency, rest)
-        waves.append((one.order, one.share * jnp.exp(1j * one.phase) * amplitude / _phasor(upper)))
+    pairs = zip(model.harmonics, _receptances(model, amplitude, frequency, rest), strict=True)
+    waves: list[tuple[Lanes | float, Array]] = [(1.0, amplitude / _phasor(drive))]
+    waves.extend((jnp.asarray(one.order), one.share * jnp.exp(1j * one.phase) * own) for one, own in pairs)
 
     def height(phase: Array, power: int) -> Array:
         """Give the displacement at the start under a unit drive of some phase, or its derivative by it."""
         own = [jnp.real((1j * n) ** power * one * jnp.exp(1j * n * phase)) for n, one in waves]
         return sum(own[1:], start=own[0])
 
-    def turn(count: int) -> Array:
-        """Give equidistant phases, in front of the axes of the lanes."""
-        phases = 2.0 * np.pi / count * np.arange(count)
-        return jnp.asarray(phases.reshape(-1, *(1,) * jnp.ndim(amplitude * frequency)))
-
-    best = 2.0 * math.pi / _PHASES * jnp.argmax(height(turn(_PHASES), 0), axis=0)
+    phases = jnp.asarray(2.0 * np.pi / _PHASES * np.arange(_PHASES))
+    best = phases[jnp.argmax(jax.vmap(lambda phase: height(phase, 0))(phases), axis=0)]
     for _ in range(_POLISHING):
         bend = height(best, 2)
         best = best - jnp.where(bend < 0.0, height(best, 1) / jnp.where(bend < 0.0, bend, 1.0), 0.0)
@@ -179,12 +174,47 @@ def balanced_motion(
     held = Sine(-push * jnp.sin(best), push * jnp.cos(best), frequency)
     motion = BalancedMotion(held, internal, parts)
     if model.internal_states:
-        x, v = motion.at(amplitude + 0.0 * frequency, turn(_SAMPLES))
+        tau = jnp.asarray(2.0 * np.pi / _SAMPLES * np.arange(_SAMPLES))
+        x, v = jax.vmap(lambda phase: motion.at(amplitude + 0.0 * frequency, phase))(tau)
         motion = motion._replace(internal=imposed_internal(model, rest + x, v, frequency))
     return motion
 
 
-def _phasor(drive: Sine) -> Lanes:
+def _receptances(
+    model: Isolator, amplitude: Lanes, frequency: Lanes, rest: Lanes | float
+) -> list[Complex[Array, "..."]]:
+    """Give displacement over force of the equivalent linear isolator at each harmonic of a drive."""
+    found = []
+    for one in model.harmonics:
+        upper, _ = imposed_balance(model, amplitude, one.order * frequency, rest)
+        found.append(amplitude / _phasor(upper))
+    return found
+
+
+def overtone_response(
+    model: Isolator, drive: PeriodicDrive, amplitude: Lanes, rest: Lanes | float = 0.0
+) -> tuple[Lanes, Lanes]:
+    """Give what the harmonics of a drive add to displacement and velocity at tau = 0.
+
+    Args:
+        model: the isolator.
+        drive: the drive.
+        amplitude: of the whole motion [m], for which the equivalent linear isolator is taken.
+        rest: centre of the motion [m].
+
+    Returns:
+        Both [m, m/s]; zero where the drive is a sine.
+    """
+    x, v = 0.0 * amplitude, 0.0 * amplitude
+    pairs = zip(drive.overtones, _receptances(model, amplitude, drive.frequency, rest), strict=True)
+    for one, receptance in pairs:
+        moved = receptance * (one.cosine - 1j * one.sine)
+        x = x + jnp.real(moved)
+        v = v - one.order * drive.angular_frequency * jnp.imag(moved)
+    return x, v
+
+
+def _phasor(drive: Sine) -> Complex[Array, "..."]:
     """Give D of `D exp(i tau)`."""
     return jnp.asarray(drive.cosine) - 1j * drive.sine
 

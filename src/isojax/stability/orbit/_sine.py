@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Float
+from jaxtyping import Array, Float, Int
 
 from ..._types import Lanes, as_float64
 from ...models import Instant, Integrator, Isolator
@@ -111,7 +111,7 @@ class PeriodicDrive(NamedTuple):
         return Instant(drive, rate)
 
     @property
-    def highest_order(self) -> Lanes | int:
+    def highest_order(self) -> Int[Array, "..."] | int:
         """The largest multiple of its frequency that the drive has."""
         orders = [jnp.asarray(one.order, dtype=float) for one in self.overtones]
         return jnp.max(jnp.stack(orders)).astype(int) if orders else 1
