@@ -246,20 +246,22 @@ def several_harmonics() -> None:
     law = polynomial(**Y_DIRECTION, delay=delay, harmonics=added)
     random, count = np.random.default_rng(8), 24
     force, frequency = random.uniform(1.0, 300.0, count), random.uniform(1.5, 8.0, count)
-    some = stacked([model] * count), jnp.asarray(force), jnp.asarray(frequency)
-    y0, multipliers, monodromy, _ = (np.asarray(value) for value in batch(*some, balanced(*some)))
-    state, coefficient, apart = 0.0, 0.0, 0.0
-    for place in range(count):
-        reference = shoot(law, force[place], frequency[place], y0[place])
-        omega = 2 * np.pi * frequency[place]
-        size = np.hypot(reference.y0[0], reference.y0[1] / omega) * np.array([1.0, omega])
-        state = max(state, float(np.max(np.abs(y0[place] - reference.y0) / size)))
-        sums = np.trace(monodromy[place] - reference.monodromy)
-        sums = sums, np.linalg.det(monodromy[place]) - np.linalg.det(reference.monodromy)
+    state, coefficient, apart, lost = 0.0, 0.0, 0.0, 0
+    for push, rate in zip(force, frequency, strict=True):
+        ours = ij.find_periodic_orbit(model, ij.Harmonic(push, rate))
+        if not ij.is_successful(ours.result):
+            lost += 1
+            continue
+        theirs = shoot(law, push, rate, np.asarray(ours.y0))
+        size = np.hypot(theirs.y0[0], theirs.y0[1] / (2 * np.pi * rate)) * np.array([1.0, 2 * np.pi * rate])
+        state = max(state, float(np.max(np.abs(ours.y0 - theirs.y0) / size)))
+        matrix = np.asarray(ours.floquet.monodromy)
+        sums = np.trace(matrix - theirs.monodromy), np.linalg.det(matrix) - np.linalg.det(theirs.monodromy)
         coefficient = max(coefficient, float(np.max(np.abs(sums))))
-        if abs(reference.multipliers[0] - reference.multipliers[1]) > 1e-3:
-            apart = max(apart, matched(multipliers[place], reference.multipliers))
-    mark(f"state at t = 0 of {count} orbits, over the size of the motion", state, 1e-7)
+        if abs(theirs.multipliers[0] - theirs.multipliers[1]) > 1e-3:
+            apart = max(apart, matched(np.asarray(ours.floquet.multipliers), theirs.multipliers))
+    mark(f"of {count} orbits those not found", float(lost), 0.0)
+    mark("state at t = 0, over the size of the motion", state, 1e-7)
     mark("multipliers where they differ by more than 1e-3", apart, 1e-7)
     mark("trace and determinant of the monodromy", coefficient, 1e-7)
     folds = ij.frequency_response(model, 175.0, (4.0, 6.5), periods=()).special_points

@@ -340,6 +340,12 @@ def test_a_sharp_law_is_the_limit_of_the_rounded_one(kind):
 
 
 @every_element
+def test_an_absent_effect_adds_no_harmonic_to_a_drive(kind):
+    absent = with_strength(kind.guess(SCALES), 0.0)
+    assert not any(float(one.share) for one in absent.harmonics())
+
+
+@every_element
 def test_a_law_beside_a_kink_goes_on_smoothly_past_it(kind):
     # With the sides held, the slope across the kinks, which all lie at rest, is that of central differences;
     # for |s|s itself the two differ by |s|s times the step.

@@ -26,7 +26,7 @@ class DriveHarmonics(AbstractElement):
     Attributes:
         share: h, harmonic over fundamental [1].
         phase: phi [rad].
-        order: n, an integer of at least 2; of a record 2 or 3, NaN comes of any other [1].
+        order: n, an integer of at least 2; in a record 2 or 3 [1].
 
     Raises:
         ValueError: if the order is no integer of at least 2.
@@ -70,8 +70,14 @@ class DriveHarmonics(AbstractElement):
             - jnp.sin(self.phase) * channels[f"drive_sine_{order}"]
             for order in (2, 3)
         )
-        third = jnp.where(self.order == 3.0, third, jnp.nan)
         return self.share * jnp.where(self.order == 2.0, second, third)
+
+    def check_record(self) -> None:
+        if float(self.order) not in (2.0, 3.0):
+            raise ValueError(
+                f"Harmonics of the drive in a record must have the order 2 or 3, but one has {self.order}. "
+                "Orbits, maps and simulations take any order."
+            )
 
     def harmonics(self) -> tuple[AddedHarmonic, ...]:
         # A count: no derivative means anything.

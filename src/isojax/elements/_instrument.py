@@ -1,25 +1,9 @@
 """The contract of what acts on the instruments: the drive channel and the response channel."""
 
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
-from .._show import shown
-from .._types import Internal, Lanes, Scalar
+from .._types import Internal, Lanes
 from ._effect import AbstractEffect
-
-
-@shown
-class AddedHarmonic(NamedTuple):
-    """A harmonic that acts beside a recorded sine: `h A cos(n theta + phi)` beside `A cos(theta)`.
-
-    Attributes:
-        order: n, an integer of at least 2 [1].
-        share: h, harmonic over fundamental [1].
-        phase: phi [rad].
-    """
-
-    order: Scalar
-    share: Scalar
-    phase: Scalar
 
 
 class AbstractInstrument(AbstractEffect):
@@ -46,16 +30,6 @@ class AbstractInstrument(AbstractEffect):
     def shift(self) -> Lanes | float:
         """Give the time by which the recorded drive leads the one that acted [s]."""
         return 0.0
-
-    def harmonics(self) -> tuple[AddedHarmonic, ...]:
-        """Give the harmonics that act beside a recorded sine, before `drive` and `shift` change them all.
-
-        A record shows them by signals of its own, see `channel_drive`; orbits and maps ask here.
-
-        Returns:
-            The harmonics; none at zero strength, or such with share zero.
-        """
-        return ()
 
     def reading(self, y: Lanes, s: Internal) -> Lanes:
         """Turn the motion at the sensor into the recorded reading.

@@ -38,6 +38,7 @@ from ._shooting import shoot as shoot
 from ._shooting_method import ShootingMethod as ShootingMethod
 from ._sine import PeriodicDrive as PeriodicDrive
 from ._sine import Sine as Sine
+from ._sine import fewest_steps as fewest_steps
 from ._sine import highest_order as highest_order
 from ._sine import integrator_for as integrator_for
 from ._sine import recorded_sine as recorded_sine

@@ -123,7 +123,7 @@ def find_periodic_orbit(
 
     Args:
         model: the isolator.
-        excitation: the drive.
+        excitation: the drive; harmonics that elements of the model add to it act, too.
         start: state at t = 0 to start from; the one-harmonic balance with the smallest motion if omitted, and
             where this leads nowhere (and is not inside `jax.jit` or `jax.vmap`) the balance of several.
         periods: drive periods after which the motion repeats (2 for an orbit of doubled period).

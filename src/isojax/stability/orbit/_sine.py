@@ -185,6 +185,12 @@ def highest_order(model: Isolator) -> int:
     return max((int(order) for order in orders if not isinstance(order, Tracer)), default=1)
 
 
+def fewest_steps(model: Isolator) -> int:
+    """Give the steps a drive period that the highest harmonic of a drive takes at least; zero of a sine."""
+    order = highest_order(model)
+    return _FEWEST_STEPS_A_HARMONIC * order if order > 1 else 0
+
+
 def integrator_for(model: Isolator, integrator: Integrator | None, steps: int = 128) -> Integrator:
     """Give the integrator of an orbit or a map: that of the caller, or one that resolves each harmonic.
 
@@ -199,11 +205,10 @@ def integrator_for(model: Isolator, integrator: Integrator | None, steps: int = 
     Raises:
         ValueError: if the caller's takes too few steps for the highest harmonic.
     """
-    order = highest_order(model)
+    order, least = highest_order(model), fewest_steps(model)
     if integrator is None:
         return Integrator(steps_per_period=max(steps, _STEPS_A_HARMONIC * order))
-    least = _FEWEST_STEPS_A_HARMONIC * order
-    if order > 1 and integrator.steps_a_period(model) < least:
+    if integrator.steps_a_period(model) < least:
         raise ValueError(
             f"Argument `integrator` must take at least {least} steps a drive period, because the drive has a "
             f"harmonic of order {order}, but takes {integrator.steps_a_period(model)}. Give "

@@ -16,8 +16,8 @@ from ._sine import PeriodicDrive
 FEWEST_STEPS = 16
 """Steps a piece of the coarsest trial."""
 
-_EVENTS_A_PERIOD = 4
-"""Events of each kind in a period to make room for first."""
+_EVENTS_A_PERIOD, _MORE_EVENTS = 4, 2
+"""Events of each kind in a period to make room for first; times as many where the drive holds harmonics."""
 
 MOST_STEPS_A_PERIOD = 1 << 12
 """Steps a piece of a drive period at most, for a bifurcation."""
@@ -157,7 +157,7 @@ def event_places(model: Isolator, turns: float) -> int:
     """
     rest = tuple(jnp.zeros(()) for _ in range(2 + model.internal_states))
     kinds = len(model.switches(rest)) + (2 if model.slides else 0)
-    return math.ceil(_EVENTS_A_PERIOD * kinds * turns)
+    return math.ceil(_EVENTS_A_PERIOD * kinds * turns) * (_MORE_EVENTS if model.harmonics else 1)
 
 
 def steps_wanted(
