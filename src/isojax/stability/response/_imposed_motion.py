@@ -264,7 +264,9 @@ def _closed(
         isolator, unknown = errors.moved(steps), unknown * size
         own = jnp.concatenate([jnp.stack([a, a * 2.0 * np.pi * f]), size[2:states]])
         begin = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), unknown[2:states]])
-        state = begin.at[: count - states].add(unknown[states:]) + shift * own
+        if count > states:
+            begin = begin.at[:2].add(unknown[states:])
+        state = begin + shift * own
         drive = with_overtones(isolator, Sine(unknown[0], unknown[1], f))
         path = trajectory(isolator, integrator, drive, tuple(state), turns=turns, rounded=True)
         left = (sign * jnp.stack([along[-1] for along in path]) - state) / own
