@@ -21,8 +21,8 @@ _TRIED = 128
 _RETRIES = 8
 """Times at most that empty cells are tried from those next to them."""
 
-_SAME, _SAME_READ = 1e-5, 1e-4
-"""Distance of two orbits, over their size, up to which they are one; the same of two that are read off."""
+_SAME = 1e-5
+"""Distance of two orbits, over their size, up to which they are one."""
 
 _STARTS_TOGETHER = 1024
 """Lanes of the compiled step from a start to t = 0."""
@@ -111,13 +111,10 @@ def without_repeats(
     """
     candidates, found, split = cells
     good = found.code == FOUND
-    # Orbits that are read off, or split alike, differ by how they are found: each has its own largest
-    # displacement. Under a drive with harmonics one orbit may be found from several of its maxima.
-    single, same = np.flatnonzero(good & ~split), _SAME
-    if model.harmonics:
-        single, same = np.flatnonzero(good), _SAME_READ
+    single = np.flatnonzero(good & ~split)
     if not single.size:
         return cells
+    # Orbits that are read off, or split alike, differ by how they are found.
     place = candidates.force.astype(int) * len(window.frequencies) + candidates.frequency
     good = np.flatnonzero(good & np.isin(place, place[single]))
     order = good[np.lexsort((found.response[good], place[good]))]
@@ -136,7 +133,7 @@ def without_repeats(
     gone = []
     for apart in range(1, int(lengths.max())):
         alike = run[:-apart] == run[apart:]
-        alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= same * scale[apart:], axis=1)
+        alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= _SAME * scale[apart:], axis=1)
         gone.append(np.maximum(order[:-apart], order[apart:])[alike])
     left_out = np.concatenate(gone)
     found = Found(*(np.array(values) for values in found))

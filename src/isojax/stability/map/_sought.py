@@ -108,6 +108,11 @@ def seek(
     reader = SurfaceReader(half, split.surface, split.sharding)
     expected = surface.error[candidates.frequency, candidates.part]
     read, error = (expected <= integrator.map_error) & (model.internal_states == 0), math.nan
+    shared = surface.shared[candidates.frequency, candidates.part]
+    if model.harmonics:
+        # Where another of several maxima becomes the largest the surface has a step: it gives starts, which need
+        # not be maxima, so that neither its numbers nor its order of kinks are those of the orbit.
+        read, shared = np.zeros_like(read), np.zeros_like(shared)
     if read.any():
         some = _chosen(candidates, _sample(surface, candidates, np.flatnonzero(read)))
         by_reading = reader(some, SAMPLED)
@@ -118,7 +123,6 @@ def seek(
                 read, error = np.zeros_like(read), math.nan
     if read.all():
         return Sought(surface, (Group("read", reader, candidates),), error)
-    shared = surface.shared[candidates.frequency, candidates.part]
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
     if model.splits:
         # Where sharp laws give each orbit events of its own, no compiled step serves all.
