@@ -110,8 +110,8 @@ def seek(
     read, error = (expected <= integrator.map_error) & (model.internal_states == 0), math.nan
     shared = surface.shared[candidates.frequency, candidates.part]
     if model.harmonics:
-        # Where another of several maxima becomes the largest the surface has a step. It gives starts that need
-        # not be maxima: neither its numbers nor its order of kinks are those of the orbit.
+        # Where another of several maxima becomes the largest the surface has a step. It gives starts that may
+        # be no maxima: neither its numbers nor its order of kinks are those of the orbit.
         read, shared = np.zeros_like(read), np.zeros_like(shared)
     if read.any():
         some = _chosen(candidates, _sample(surface, candidates, np.flatnonzero(read)))
