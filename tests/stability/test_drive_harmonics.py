@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 import isojax as ij
 from isojax.elements import CubicStiffness, DriveHarmonics, InputDelay, LinearDamping, LinearStiffness
+from isojax.models import FitAt
 from isojax.stability.orbit import is_odd
 
 MASS, STIFFNESS, DAMPING = 800.0, 1e6, 4e3
@@ -93,6 +94,34 @@ def test_cells_of_a_map_hold_the_orbits_of_the_whole_drive():
         np.testing.assert_allclose(starts[orbit, row, column], closed.y0, atol=1e-4)
         found, wanted = smap.multipliers[orbit, row, column], closed.floquet.multipliers
         np.testing.assert_allclose(np.sort(np.abs(found)), np.sort(np.abs(wanted)), atol=5e-5)
+
+
+def test_a_base_that_moves_with_harmonics_passes_on_what_superposes():
+    share, phase, order = 0.25, 0.6, 3
+    elements = (*LINEAR.elements, DriveHarmonics(share, phase, order))
+    found = ij.transmissibility(ij.Isolator(MASS, elements, "base_acceleration"), 0.1, [4.0])
+    rate, theta = 2.0 * np.pi * 4.0, 2.0 * np.pi / 4096 * np.arange(4096)
+    base, absolute = np.zeros(4096), np.zeros(4096)
+    for size, lead, multiple in ((1.0, 0.0, 1), (share, phase, order)):
+        passing = STIFFNESS + 1j * DAMPING * multiple * rate
+        passed = passing / (passing - MASS * (multiple * rate) ** 2)
+        wave = size / multiple**2 * np.exp(1j * (multiple * theta + lead))
+        base, absolute = base + wave.real, absolute + (passed * wave).real
+        if multiple == 1:
+            np.testing.assert_allclose(found.ratio, [passed], rtol=1e-6)
+    np.testing.assert_allclose(found.peak, [np.ptp(absolute) / np.ptp(base)], rtol=1e-5)
+
+
+def test_the_response_of_the_fundamental_ignores_harmonics_of_a_linear_isolator():
+    # From below the frequency at which the third harmonic makes the resonance, as large as the fundamental.
+    model = LINEAR.with_elements(DriveHarmonics(1.0, 0.6, 3.0))
+    names = ("linear_stiffness.coefficient",)
+    fit = FitAt(model, names, np.array([[1e8]]), ij.RESULTS.successful)
+    (curve,) = ij.response_bands(fit, [2.0], (1.5, 9.0)).curves
+    rate = 2.0 * np.pi * curve.frequency
+    size = 2.0 / np.abs(STIFFNESS + 1j * DAMPING * rate - MASS * rate**2)
+    np.testing.assert_allclose(curve.displacement, size, rtol=2e-4)
+    assert curve.stable.all()
 
 
 def test_an_even_harmonic_breaks_the_symmetry_and_an_odd_one_does_not():
