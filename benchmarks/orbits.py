@@ -25,7 +25,7 @@ import isojax as ij  # noqa: E402
 from isojax._parameters import parameter  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "stability"))
-from scipy_orbits import EQ_36, Y_DIRECTION, Z_DIRECTION, polynomial, shoot  # noqa: E402  (path first)
+from scipy_orbits import EQ_36, Y_DIRECTION, Z_DIRECTION, flow, polynomial, shoot  # noqa: E402  (path first)
 
 POINTS = 100
 """Random points of the paper's models that are compared with SciPy."""
@@ -238,6 +238,61 @@ def papers_models() -> None:
     mark("isojax's own estimate of its error", float(error.max()), 1e-9)
 
 
+def several_harmonics() -> None:
+    print("The y model under a sine with a second and a third harmonic, delayed, against SciPy")
+    added, delay = ((0.1, 0.7, 2), (0.3, -0.5, 3)), 2e-3
+    parts = [ij.elements.DriveHarmonics(*one) for one in added]
+    model = ij.paper.y_direction().with_elements(*parts, ij.elements.InputDelay(delay))
+    law = polynomial(**Y_DIRECTION, delay=delay, harmonics=added)
+    random, count = np.random.default_rng(8), 24
+    force, frequency = random.uniform(1.0, 300.0, count), random.uniform(1.5, 8.0, count)
+    state, coefficient, apart, lost = 0.0, 0.0, 0.0, 0
+    for push, rate in zip(force, frequency, strict=True):
+        ours = ij.find_periodic_orbit(model, ij.Harmonic(push, rate))
+        if not ij.is_successful(ours.result):
+            lost += 1
+            continue
+        theirs = shoot(law, push, rate, np.asarray(ours.y0))
+        size = np.hypot(theirs.y0[0], theirs.y0[1] / (2 * np.pi * rate)) * np.array([1.0, 2 * np.pi * rate])
+        state = max(state, float(np.max(np.abs(ours.y0 - theirs.y0) / size)))
+        matrix = np.asarray(ours.floquet.monodromy)
+        sums = np.trace(matrix - theirs.monodromy), np.linalg.det(matrix) - np.linalg.det(theirs.monodromy)
+        coefficient = max(coefficient, float(np.max(np.abs(sums))))
+        if abs(theirs.multipliers[0] - theirs.multipliers[1]) > 1e-3:
+            apart = max(apart, matched(np.asarray(ours.floquet.multipliers), theirs.multipliers))
+    mark(f"of {count} orbits those not found", float(lost), 0.0)
+    mark("state at t = 0, over the size of the motion", state, 1e-7)
+    mark("multipliers where they differ by more than 1e-3", apart, 1e-7)
+    mark("trace and determinant of the monodromy", coefficient, 1e-7)
+    folds = ij.frequency_response(model, 175.0, (4.0, 6.5), periods=()).special_points
+    off = []
+    for point in folds:
+        rate = float(point.frequency)
+        end, matrix, _ = flow(law, 175.0, rate, np.asarray(point.y0), 1.0 / rate)
+        off.append(np.max(np.abs((end - point.y0) / np.max(np.abs(point.y0)))))
+        off.append(np.min(np.abs(np.linalg.eigvals(matrix) - 1.0)))
+    print(f"  folds of the response at 175 N: {', '.join(f'{float(one.frequency):.4f} Hz' for one in folds)}")
+    verdicts.append([one.kind for one in folds] == ["fold", "fold"])
+    mark("there SciPy's motion closes, with a multiplier of one", float(max(off, default=np.nan)), 1e-6)
+    smap = ij.stability_map(model, np.linspace(20.0, 300.0, 15), np.linspace(1.5, 7.0, 23), coexisting=True)
+    found = np.argwhere(np.isfinite(np.asarray(smap.spectral_radius)))
+    starts, worst = np.asarray(smap.y0), 0.0
+    chosen = found[random.permutation(len(found))[:count]]
+    for orbit, row, column in chosen:
+        start, drive = starts[orbit, row, column], (smap.amplitudes[row], smap.frequencies[column])
+        reference = shoot(law, float(drive[0]), float(drive[1]), start)
+        wide = abs(reference.multipliers[0] - reference.multipliers[1]) / 0.1
+        off = matched(np.asarray(smap.multipliers)[orbit, row, column], reference.multipliers)
+        worst = max(worst, off * min(1.0, max(wide, off / 0.1)))
+    empty = float(np.sum(np.asarray(smap.count) == 0))
+    mark(
+        f"multipliers of {count} cells of a map, from 1.5 Hz, where the third harmonic is at resonance",
+        worst,
+        5e-5,
+    )
+    mark("its cells without an orbit", empty, 0.0)
+
+
 def van_der_pol() -> None:
     print("Forced van der Pol, x'' - e (1 - x^2) x' + x = F sin(w t), e = 0.3, w = 1.25: Neimark-Sacker")
     strength, frequency = 0.3, 1.25 / (2 * np.pi)
@@ -311,6 +366,7 @@ def main() -> None:
     mathieu()
     van_der_pol()
     papers_models()
+    several_harmonics()
     papers_map()
     failed = verdicts.count(False)
     print(f"{len(verdicts) - failed} of {len(verdicts)} marks met in {time.perf_counter() - begun:.0f} s")

@@ -126,7 +126,7 @@ def test_an_element_overrides_methods_of_one_contract_alone(kind):
         {name for name, what in vars(contract).items() if callable(what) and not name.startswith("_")}
         for contract in CONTRACTS
     ]
-    assert [len(names) for names in methods] == [10, 4, 6]
+    assert [len(names) for names in methods] == [10, 4, 8]
     assert sum(bool(names & set(vars(kind))) for names in methods) == 1
 
 
@@ -337,6 +337,12 @@ def test_a_sharp_law_is_the_limit_of_the_rounded_one(kind):
     np.testing.assert_allclose(sharp, element.force(x, v, s), rtol=1e-6, atol=1e-9 * SCALES.force)
     absent = with_strength(element, 0.0)
     assert float(jnp.max(jnp.abs(absent.sharp_force(x, v, s, jnp.sign(v), sides)))) == 0.0
+
+
+@every_element
+def test_an_absent_effect_adds_no_harmonic_to_a_drive(kind):
+    absent = with_strength(kind.guess(SCALES), 0.0)
+    assert not any(float(one.share) for one in absent.harmonics())
 
 
 @every_element

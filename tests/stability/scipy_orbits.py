@@ -25,6 +25,7 @@ class Law:
         mass: [kg].
         delay: of the drive [s].
         offset: added to the drive [N].
+        harmonics: of the drive: share, phase [rad] and order of each.
         states: count of states.
     """
 
@@ -34,11 +35,15 @@ class Law:
     mass: float = 800.0
     delay: float = 0.0
     offset: float = 0.0
+    harmonics: tuple = ()
     states: int = 2
 
     def rates(self, t, z, sides, amplitude, frequency):
         """Time derivative of the states; columns of `z` are taken together."""
-        drive = amplitude * np.sin(2.0 * np.pi * frequency * (t - self.delay)) + self.offset
+        turn = 2.0 * np.pi * frequency * (t - self.delay)
+        drive = amplitude * np.sin(turn) + self.offset
+        for share, phase, order in self.harmonics:
+            drive = drive + share * amplitude * np.cos(order * (turn - 0.5 * np.pi) + phase)
         return np.stack([z[1], (drive - self.force(z, sides)) / self.mass, *self.internal(z, sides)])
 
 

@@ -23,6 +23,7 @@ from ._damping_drift import DampingDrift as DampingDrift
 from ._drive_harmonics import DriveHarmonics as DriveHarmonics
 from ._dual_chamber import DualChamber as DualChamber
 from ._element import AbstractElement as AbstractElement
+from ._element import AddedHarmonic as AddedHarmonic
 from ._element import Channels as Channels
 from ._element import Dependence as Dependence
 from ._element import Group as Group

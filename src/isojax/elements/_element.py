@@ -8,6 +8,7 @@ from ._effect import Group as Group
 from ._effect import LookAlike as LookAlike
 from ._effect import Scales as Scales
 from ._follower import AbstractFollower
+from ._follower import AddedHarmonic as AddedHarmonic
 from ._follower import Dependence as Dependence
 from ._force import AbstractForce
 from ._instrument import AbstractInstrument

@@ -31,6 +31,21 @@ class Dependence(NamedTuple):
         return relative * (1.0 + self.curvature * relative)
 
 
+@shown
+class AddedHarmonic(NamedTuple):
+    """A harmonic that acts beside a recorded sine: `h A cos(n theta + phi)` beside `A cos(theta)`.
+
+    Attributes:
+        order: n, an integer of at least 2 [1].
+        share: h, harmonic over fundamental [1].
+        phase: phi [rad].
+    """
+
+    order: Scalar
+    share: Scalar
+    phase: Scalar
+
+
 class AbstractFollower(AbstractEffect):
     """What follows signals made from the record; without a record it is absent.
 
@@ -59,6 +74,23 @@ class AbstractFollower(AbstractEffect):
             Drive [N, or m/s^2 for base excitation].
         """
         return 0.0
+
+    def harmonics(self) -> tuple[AddedHarmonic, ...]:
+        """Give the harmonics that act beside a recorded sine, where there is no record.
+
+        Like the recorded sine they are changed by the `drive` and `shift` of all elements after.
+
+        Returns:
+            The harmonics; none at zero strength, or such with share zero.
+        """
+        return ()
+
+    def check_record(self) -> None:
+        """Refuse a shape of the effect whose signals no record has.
+
+        Raises:
+            ValueError: if there is none.
+        """
 
     def channel_force(self, x: Lanes, v: Lanes, channels: Channels) -> Lanes | float:
         """Give a force on the left-hand side of the balance that follows signals of the record [N].

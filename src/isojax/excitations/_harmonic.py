@@ -4,10 +4,10 @@ import jax.numpy as jnp
 
 from .._parameters import parameter
 from .._types import Lanes, Scalar
-from ._excitation import AbstractExcitation
+from ._excitation import AbstractSine
 
 
-class Harmonic(AbstractExcitation):
+class Harmonic(AbstractSine):
     """`amplitude sin(2 pi frequency t)`, phase 0 at t = 0.
 
     Attributes:
@@ -22,5 +22,5 @@ class Harmonic(AbstractExcitation):
     amplitude: Scalar = parameter(symbol="F0", unit="N")
     frequency: Scalar = parameter(symbol="f", unit="Hz", lower=0.0)
 
-    def __call__(self, t: Lanes) -> Lanes:
-        return self.amplitude * jnp.sin(2.0 * jnp.pi * self.frequency * t)
+    def angle(self, t: Lanes) -> Lanes:
+        return 2.0 * jnp.pi * self.frequency * t

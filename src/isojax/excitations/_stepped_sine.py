@@ -5,10 +5,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .._types import Lanes, Scalar, as_float64
-from ._excitation import AbstractExcitation
+from ._excitation import AbstractSine
 
 
-class SteppedSine(AbstractExcitation):
+class SteppedSine(AbstractSine):
     """Dwells of whole cycles, one frequency after another; the phase runs on through each step.
 
     Attributes:
@@ -34,7 +34,6 @@ class SteppedSine(AbstractExcitation):
         """Time at which the last dwell ends [s]."""
         return jnp.sum(self.cycles / self.frequencies)
 
-    def __call__(self, t: Lanes) -> Lanes:
+    def angle(self, t: Lanes) -> Lanes:
         dwell = jnp.clip(jnp.searchsorted(self.starts, t, side="right") - 1, 0, self.frequencies.size - 1)
-        phase = 2.0 * jnp.pi * (self.cycles * dwell + self.frequencies[dwell] * (t - self.starts[dwell]))
-        return self.amplitude * jnp.sin(phase)
+        return 2.0 * jnp.pi * (self.cycles * dwell + self.frequencies[dwell] * (t - self.starts[dwell]))

@@ -6,10 +6,10 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from .._types import Lanes, Scalar, as_float64
-from ._excitation import AbstractExcitation
+from ._excitation import AbstractSine
 
 
-class SweptSine(AbstractExcitation):
+class SweptSine(AbstractSine):
     """A sine whose frequency runs from `start` to `stop` in `duration`.
 
     Attributes:
@@ -36,10 +36,10 @@ class SweptSine(AbstractExcitation):
         if self.law not in ("linear", "logarithmic"):
             raise ValueError(f'Argument `law` must be "linear" or "logarithmic", but is {self.law!r}.')
 
-    def __call__(self, t: Lanes) -> Lanes:
+    def angle(self, t: Lanes) -> Lanes:
         if self.law == "linear":
             cycles = self.start * t + 0.5 * (self.stop - self.start) / self.duration * t**2
         else:
             growth = jnp.log(self.stop / self.start) / self.duration
             cycles = self.start * jnp.expm1(growth * t) / growth
-        return self.amplitude * jnp.sin(2.0 * jnp.pi * cycles)
+        return 2.0 * jnp.pi * cycles

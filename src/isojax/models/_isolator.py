@@ -19,7 +19,7 @@ from .._parameters import (
 )
 from .._show import Row, amount, listed, shown
 from .._types import Lanes, Scalar
-from ..elements import AbstractElement, Channels
+from ..elements import AbstractElement, AddedHarmonic, Channels
 from ._conditions import followed_conditions, plain_elements
 from ._instant import Instant
 from ._laws import (
@@ -204,6 +204,11 @@ class Isolator(eqx.Module):
         """
         shift = sum((element.shift() for element in self.elements), start=cast("Lanes | float", 0.0))
         return shift if elapsed is None else shift + self.skew() * elapsed
+
+    @property
+    def harmonics(self) -> tuple[AddedHarmonic, ...]:
+        """The harmonics that act beside a recorded sine, of all elements."""
+        return tuple(one for element in self.elements for one in element.harmonics())
 
     def with_delay_slope(self, at: Instant) -> Instant:
         """Give what acted at an instant its derivative with respect to the delay.

@@ -15,6 +15,7 @@ from .._implicit import frozen, with_derivatives
 from .._results import RESULTS
 from .._show import amount, brief, number, shown
 from .._types import Lanes, as_float64, check_float64
+from ..elements import AddedHarmonic
 from ..excitations import AbstractExcitation
 from ._as_isolator import Modelled, as_isolator
 from ._instant import Instant
@@ -89,10 +90,22 @@ def _states(live: tuple[Isolator, AbstractExcitation, State], held: Held) -> tup
     steps = jnp.arange((time.size - 1) * substeps + 1, dtype=float) / (rate * substeps)
 
     def field(t: Lanes, y: State) -> State:
-        acted = t - model.shift(t)
-        return model.rates(y, Instant(excitation(acted), excitation.rate(acted)), quantity)
+        return model.rates(y, _acting(model, excitation, t - model.shift(t)), quantity)
 
     return solve_ode(field, integrator, state, time, steps)
+
+
+def _acting(model: Isolator, excitation: AbstractExcitation, t: Lanes) -> Instant:
+    """Give the drive at a time of its record, with the harmonics that elements add to a sine."""
+    at = Instant(excitation(t), excitation.rate(t))
+    for one in model.harmonics:
+
+        def harmonic(time: Array, one: AddedHarmonic = one) -> Array:
+            return one.share * excitation.harmonic(time, jnp.asarray(one.order), jnp.asarray(one.phase))
+
+        value, rate = jax.jvp(harmonic, (jnp.asarray(t, dtype=float),), (jnp.ones_like(t, dtype=float),))
+        at = at._replace(drive=at.drive + value, drive_rate=at.drive_rate + rate)
+    return at
 
 
 def simulate(
@@ -153,7 +166,7 @@ def simulate(
     time = jnp.arange(count + 1, dtype=float) / rate
     states, ended = _solve_ode(model, excitation, time, state, integrator, quantity, rate)
     acted = time - model.shift(time)
-    at = Instant(jax.vmap(excitation)(acted), jax.vmap(excitation.rate)(acted))
+    at = jax.vmap(lambda t: _acting(model, excitation, t))(acted)
     ran = ended == diffrax.RESULTS.successful
     finite = jnp.all(jnp.isfinite(jnp.stack(states)))
     result = RESULTS.where(ran & ~finite, RESULTS.not_finite, RESULTS.promote(ended))

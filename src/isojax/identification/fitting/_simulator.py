@@ -47,7 +47,12 @@ class Simulator:
 
         Returns:
             The batches.
+
+        Raises:
+            ValueError: if an effect follows signals that no record has.
         """
+        for element in model.elements:
+            element.check_record()
         problem = self.problem
         steps = problem.integrator.table_steps(
             Isolator(model.mass, model.elements[:carried], model.excitation)

@@ -15,7 +15,7 @@ from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, as_isolator
-from ..orbit import ascending, period_map, recorded_sine
+from ..orbit import ascending, integrator_for, period_map, recorded_sine
 from ._stroboscope import Repetition, Watch, bounded_or_not, check_counts, repeats_after, settle_down
 
 _SAME_ATTRACTOR = 1000.0
@@ -100,7 +100,7 @@ def basins_of_attraction(
     model = as_isolator(model)
     check_float64()
     check_counts(settle=settle, most=most, longest=longest)
-    integrator = Integrator() if integrator is None else integrator
+    integrator = integrator_for(model, integrator)
     places = ascending("displacements", displacements, positive=False)
     speeds = ascending("velocities", velocities, positive=False)
     x, v = (grid.ravel() for grid in np.meshgrid(places, speeds, indexing="ij"))

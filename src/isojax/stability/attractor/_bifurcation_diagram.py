@@ -14,7 +14,7 @@ from ..._results import RESULTS
 from ..._show import shown
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, State, as_isolator
-from ..orbit import ascending, recorded_sine
+from ..orbit import ascending, integrator_for, recorded_sine
 from ._stroboscope import (
     Repetition,
     Watch,
@@ -164,7 +164,7 @@ def bifurcation_diagram(
     """
     model = as_isolator(model)
     check_float64()
-    integrator = Integrator() if integrator is None else integrator
+    integrator = integrator_for(model, integrator)
     parameter, forces, band = _points(amplitudes, frequency, amplitude, frequencies)
     if direction not in get_args(SweepDirection):
         raise ValueError(

@@ -14,7 +14,7 @@ from ..._show import amount, shown
 from ..._types import Lanes, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, as_isolator
-from ..orbit import recorded_sine
+from ..orbit import integrator_for, recorded_sine
 from ._stroboscope import Watch, any_disturbance, bounded_or_not, check_counts, start_states, watch_settled
 
 _BLOCKS = 20
@@ -79,7 +79,7 @@ def largest_lyapunov_exponent(
     check_counts(settle=settle, periods=periods)
     if periods < _BLOCKS:
         raise ValueError(f"Argument `periods` must be at least {_BLOCKS}, but is {periods}.")
-    integrator = Integrator() if integrator is None else integrator
+    integrator = integrator_for(model, integrator)
     return _exponent(model, excitation, start_states(model, "start", start), integrator, settle, periods)
 
 

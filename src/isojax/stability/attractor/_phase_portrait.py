@@ -11,7 +11,7 @@ from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, as_isolator
-from ..orbit import AbstractStatePath, recorded_sine, trajectory
+from ..orbit import AbstractStatePath, integrator_for, recorded_sine, trajectory
 from ._stroboscope import bounded_or_not, check_counts, settle_down, start_states
 
 
@@ -59,7 +59,7 @@ def phase_portrait(
     model = as_isolator(model)
     check_float64()
     check_counts(settle=settle, periods=periods)
-    integrator = Integrator() if integrator is None else integrator
+    integrator = integrator_for(model, integrator)
     return _portrait(model, excitation, start_states(model, "start", start), integrator, settle, periods)
 
 

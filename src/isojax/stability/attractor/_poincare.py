@@ -14,7 +14,7 @@ from ..._show import shown
 from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, advance, as_isolator
-from ..orbit import AbstractStatePath, Sine, recorded_sine, trajectory
+from ..orbit import AbstractStatePath, PeriodicDrive, integrator_for, recorded_sine, trajectory
 from ._stroboscope import Watch, bounded_or_not, check_counts, settle_down, start_states
 
 
@@ -67,7 +67,7 @@ def poincare_section(
     model = as_isolator(model)
     check_float64()
     check_counts(settle=settle, periods=periods)
-    integrator = Integrator() if integrator is None else integrator
+    integrator = integrator_for(model, integrator)
     turns = np.asarray(phases, dtype=float)
     if turns.ndim != 1 or not turns.size:
         raise ValueError(f"Argument `phases` must be a list of numbers, but has shape {turns.shape}.")
@@ -106,12 +106,12 @@ def _section(
 def _short_step(
     model: Isolator,
     integrator: Integrator,
-    drive: Sine,
+    drive: PeriodicDrive,
     state: State,
     phase: Float[Array, " phase"],
     share: Float[Array, " phase"],
 ) -> State:
     """Give the states a share of a period later, by one step."""
     angles = [phase + 2.0 * math.pi * share * part for part in (0.0, 0.5, 1.0)]
-    stages = tuple(drive.at(jnp.sin(angle), jnp.cos(angle)) for angle in angles)
+    stages = tuple(drive.at(drive.waves(angle)) for angle in angles)
     return advance(model, integrator.solver, "acceleration", share / drive.frequency, state, stages)

@@ -15,7 +15,7 @@ from ..._results import RESULTS
 from ..._show import brief, shown
 from ..._types import Lanes, check_float64
 from ...models import Integrator, Isolator, State
-from ..orbit import Orbit, Sine, modulus, multipliers, period_map, recorded_sine
+from ..orbit import Orbit, PeriodicDrive, integrator_for, modulus, multipliers, period_map, recorded_sine
 from ._stroboscope import bounded_or_not, check_counts
 
 _FIXED_POINT_STEPS = 4
@@ -97,7 +97,7 @@ def return_to_orbit(
     """
     check_float64()
     check_counts(periods=periods)
-    integrator = Integrator(steps_per_period=256) if integrator is None else integrator
+    integrator = integrator_for(model, integrator, 256)
     kick = jnp.asarray(np.asarray(perturbation, dtype=float))
     if kick.shape != orbit.y0.shape:
         raise ValueError(
@@ -140,12 +140,14 @@ def _return(
     )
 
 
-def _after_one(model: Isolator, integrator: Integrator, drive: Sine, orbit: Orbit, state: State) -> State:
+def _after_one(
+    model: Isolator, integrator: Integrator, drive: PeriodicDrive, orbit: Orbit, state: State
+) -> State:
     return period_map(model, integrator, drive, state, turns=float(orbit.periods))
 
 
 def _fixed_point(
-    model: Isolator, integrator: Integrator, drive: Sine, orbit: Orbit, size: Float[Array, " state"]
+    model: Isolator, integrator: Integrator, drive: PeriodicDrive, orbit: Orbit, size: Float[Array, " state"]
 ) -> Float[Array, " state"]:
     """Give the orbit of the very steps that the disturbed motion takes, so that it can be reached."""
 

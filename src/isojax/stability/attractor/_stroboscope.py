@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._results import RESULTS
 from ..._types import Lanes, as_float64
 from ...models import Integrator, Isolator, State
-from ..orbit import Sine, period_map
+from ..orbit import PeriodicDrive, period_map
 
 _TURNING = 20
 """Periods before the first sample in which a disturbance turns to the direction in which it grows most."""
@@ -66,7 +66,7 @@ def any_disturbance(state: State) -> State:
 
 
 def watch(
-    model: Isolator, integrator: Integrator, drive: Sine, state: State, tangent: State, periods: int
+    model: Isolator, integrator: Integrator, drive: PeriodicDrive, state: State, tangent: State, periods: int
 ) -> Watched:
     """Watch the motion once a period.
 
@@ -105,7 +105,9 @@ def watch(
     return Watched(state, tangent, samples, growth)
 
 
-def settle_down(model: Isolator, integrator: Integrator, drive: Sine, state: State, periods: int) -> State:
+def settle_down(
+    model: Isolator, integrator: Integrator, drive: PeriodicDrive, state: State, periods: int
+) -> State:
     """Give the state after some periods.
 
     Args:
@@ -125,7 +127,7 @@ def settle_down(model: Isolator, integrator: Integrator, drive: Sine, state: Sta
     return jax.lax.scan(body, state, length=periods)[0]
 
 
-def watch_settled(model: Isolator, how: Watch, drive: Sine, state: State, tangent: State) -> Watched:
+def watch_settled(model: Isolator, how: Watch, drive: PeriodicDrive, state: State, tangent: State) -> Watched:
     """Watch the motion once it has settled; a disturbance follows it from shortly before.
 
     Args:

@@ -15,7 +15,15 @@ from ..._results import RESULTS
 from ..._show import Row, amount, brief, number, shown
 from ..._types import Scalar
 from ...models import Integrator, Isolator, State
-from ..orbit import ShootingMethod, Sine, modulus, multipliers, pair_angle, trajectory, value_and_jacobian
+from ..orbit import (
+    PeriodicDrive,
+    ShootingMethod,
+    modulus,
+    multipliers,
+    pair_angle,
+    trajectory,
+    value_and_jacobian,
+)
 from ._parameter_family import ParameterFamily
 
 
@@ -265,7 +273,7 @@ class Branch(eqx.Module):
         return f"{how[self.connection]}{after}: {span}, up to {size}, {held}"
 
 
-def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float[Array, ""]:
+def half_range(model: Isolator, drive: PeriodicDrive, path: State, turns: float) -> Float[Array, ""]:
     """Give half the peak-to-peak displacement, each peak by a parabola through its sample [m].
 
     Args:
@@ -283,7 +291,7 @@ def half_range(model: Isolator, drive: Sine, path: State, turns: float) -> Float
         place = jnp.argmax(sign * path[0])
         state = tuple(along[place] for along in path)
         phase = 2.0 * math.pi * turns * place / (samples - 1)
-        bend = model.acceleration(state, drive.at(jnp.sin(phase), jnp.cos(phase)))
+        bend = model.acceleration(state, drive.at(drive.waves(phase)))
         return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
 
     return 0.5 * (peak(1.0) - peak(-1.0))

@@ -248,7 +248,7 @@ def _curve(
     for name, value in counts:
         if not value > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
-    integrator = tracing_steps() if integrator is None else integrator
+    integrator = tracing_steps(model, integrator)
     if start is None:
         start = _meet(model, search, integrator)
     elif isinstance(start, SpecialPoint):

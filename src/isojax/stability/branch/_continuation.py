@@ -15,7 +15,7 @@ from ..._parameters import list_parameters
 from ..._quick_jit import quick_jit
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator
-from ..orbit import ShootingMethod, is_odd, refuse_traced, response_start
+from ..orbit import ShootingMethod, integrator_for, is_odd, refuse_traced, response_start
 from ._arc_length import Departure, Followed, Stride
 from ._branch import Branch, BranchEvent
 from ._criticality import BifurcationKind
@@ -27,13 +27,17 @@ _SIZED_AT = 33
 """Parameters at which the size of the motion is estimated beforehand."""
 
 
-def tracing_steps() -> Integrator:
-    """Give the steps with which curves are followed where none are asked for.
+def tracing_steps(model: Isolator, integrator: Integrator | None) -> Integrator:
+    """Give the steps with which curves are followed.
+
+    Args:
+        model: the isolator.
+        integrator: of the caller; None where none was given.
 
     Returns:
-        256 steps a period: what is located along a curve starts the search for the exact point.
+        That, or 256 steps a period: what is located along a curve starts the search for the exact point.
     """
-    return Integrator(steps_per_period=256)
+    return integrator_for(frozen(model), integrator, 256)
 
 
 def continue_branch(
@@ -106,7 +110,7 @@ def continue_branch(
     model = as_isolator(model)
     check_float64()
     refuse_traced(model, amplitude, frequency, start, stop)
-    integrator = tracing_steps() if integrator is None else integrator
+    integrator = tracing_steps(model, integrator)
     family, batched = swept_family(model, parameter, start, stop, amplitude, frequency)
     states = 2 + model.internal_states
     if start_state is not None and len(start_state) != states:
@@ -181,6 +185,9 @@ def swept_family(
                 f"Argument `parameter` must be amplitude, frequency or one of {', '.join(names)}, but is "
                 f"{parameter!r}."
             )
+        varied = (frozen(model).replace(**{parameter: frozen(as_float64(end))}) for end in (start, stop))
+        if len({tuple(float(one.order) for one in there.harmonics) for there in varied}) > 1:
+            raise ValueError(f"Argument `parameter` must be continuous, but {parameter} is a count.")
     held = {"amplitude": amplitude, "frequency": frequency}
     for name, value in held.items():
         if (value is None) != (name == parameter):

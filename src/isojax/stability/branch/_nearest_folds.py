@@ -145,7 +145,7 @@ def find_nearest_folds(
         raise ValueError(f"Argument `starts` must have shape {(count, size)}, but has shape {begin.shape}.")
     if not all(0.0 < share < 1.0 for share in reach):
         raise ValueError(f"Argument `reach` must lie between 0 and 1, but is {reach}.")
-    integrator = tracing_steps() if integrator is None else integrator
+    integrator = tracing_steps(model, integrator)
     turns = 0.5 if is_odd(model) else 1.0
     lanes = min(_FOLLOWED_AT_ONCE, 1 << max(2, (count - 1).bit_length()))
     parts = []

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._quick_jit import quick_jit
-from ..orbit import imposed_balance, rest_displacement
+from ..orbit import balanced_motion, imposed_balance, rest_displacement
 from ._parameter_family import ParameterFamily
 
 PLACES = 12
@@ -84,7 +84,13 @@ def _tables(
         needed, _ = imposed_balance(setting.model, sizes, setting.frequency / periods + 0.0 * sizes, rest)
         cosine = jnp.broadcast_to(jnp.asarray(needed.cosine), sizes.shape)
         drive = jnp.asarray(setting.amplitude), jnp.asarray(setting.frequency)
-        return jnp.hypot(needed.sine, cosine), cosine, *drive
+        force = jnp.hypot(needed.sine, cosine)
+        if setting.model.harmonics:
+            # They take part in the motion of one period; a free part of several has none of them.
+            whole = balanced_motion(setting.model, sizes, setting.frequency + 0.0 * sizes, rest).drive
+            share = jnp.where(periods == 1.0, jnp.hypot(whole.sine, jnp.asarray(whole.cosine)) / force, 1.0)
+            force, cosine = share * force, share * cosine
+        return force, cosine, *drive
 
     return jax.vmap(row)(shares)
 
@@ -99,12 +105,13 @@ def _balanced_states(
         setting = family.at(share[None])
         model, frequency = setting.model, jnp.asarray(setting.frequency)
         rest = rest_displacement(model)
-        drive, internal = imposed_balance(model, size, frequency, rest)
+        balanced = balanced_motion(model, size, frequency, rest)
+        drive, internal, _ = balanced
         phase = -jnp.arctan2(drive.cosine, drive.sine) - 2.0 * math.pi * frequency * model.shift()
-        x, v = rest + size * jnp.cos(phase), -size * drive.angular_frequency * jnp.sin(phase)
+        x, v = balanced.at(size, phase)
         samples = internal[0].shape[0] if internal else 1
         place = jnp.round(phase / (2.0 * math.pi) * samples).astype(int) % samples
-        return jnp.stack([x, v, *(values[place] for values in internal)])
+        return jnp.stack([rest + x, v, *(values[place] for values in internal)])
 
     return jax.vmap(one)(shares, sizes)
 

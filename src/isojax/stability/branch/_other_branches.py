@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen
-from ...models import Integrator
-from ..orbit import ShootingMethod, is_odd
+from ..orbit import ShootingMethod, integrator_for, is_odd
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride
 from ._branch import Branch, BranchEvent, Searched
 from ._orbit_search import FoundOrbits, OrbitSearch
@@ -17,8 +16,8 @@ from ._orbit_starts import PLACES, OrbitStarts, one_harmonic, orbit_starts
 from ._parameter_family import ParameterFamily
 from ._tracing import assemble, trace
 
-_COARSE = Integrator(steps_per_period=64)
-"""Steps with which orbits are sought."""
+_COARSE_STEPS = 64
+"""Steps a period with which orbits are sought."""
 
 _NEAR_A_BRANCH, _ON_A_BRANCH = 2e-2, 1e-3
 """Distance from a branch, in scaled unknowns, below which an orbit lies on it: found by coarse steps, and by
@@ -141,12 +140,12 @@ def _other_curves(
     branches that were not followed any more.
     """
     known, reach, left = [main], 0.0, 0
-    forced = one_harmonic(family)
+    forced, coarse = one_harmonic(family), integrator_for(family.model, None, _COARSE_STEPS)
     unknowns = main.unknowns if len(main.unknowns) else np.zeros((1, main.scale.size + 1))
     for periods in search.periods:
         starts = orbit_starts(family, forced, periods, unknowns, main.scale)
         reach = max(reach, float(starts.sizes.max()))
-        closed = OrbitSearch(family, _COARSE, odd, periods).closed(starts)
+        closed = OrbitSearch(family, coarse, odd, periods).closed(starts)
         closed = _off(closed, known)
         if not closed.shares.size:
             continue

@@ -10,7 +10,7 @@ from ..._parameters import find_parameter, list_parameters, replace_parameters
 from ..._show import shown
 from ..._types import Lanes
 from ...models import Isolator
-from ..orbit import ShootingMethod, Sine, period_map, recorded_sine
+from ..orbit import PeriodicDrive, ShootingMethod, period_map, recorded_sine
 
 
 class Setting(NamedTuple):
@@ -27,7 +27,7 @@ class Setting(NamedTuple):
     frequency: Lanes
 
     @property
-    def drive(self) -> Sine:
+    def drive(self) -> PeriodicDrive:
         """The drive that acts."""
         return recorded_sine(self.model, self.amplitude, self.frequency)
 

@@ -18,7 +18,7 @@ from ..._cores import usable_cores
 from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Sine, modulus, multipliers, trajectory
+from ..orbit import Sine, modulus, multipliers, trajectory, with_overtones
 from ._map_method import Lane, MapMethod, advance, kinks_between
 from ._nodes import half_peak_to_peak
 from ._starts import Candidates, PlacedSurface, joined, read_surface
@@ -134,7 +134,8 @@ def _newton_steps(
 
 @quick_jit
 def _sizes(model: Isolator, method: MapMethod, states: Array, push: Array, frequency: Array) -> Lanes:
-    drive, turns = Sine(push[:, 0], push[:, 1], frequency), 0.5 if method.half else 1.0
+    drive = with_overtones(model, Sine(push[:, 0], push[:, 1], frequency))
+    turns = 0.5 if method.half else 1.0
     path = trajectory(model, method.integrator, drive, tuple(states.T), turns=turns)[0]
     return half_peak_to_peak(path, method.half)
 
@@ -357,7 +358,8 @@ def states_at_zero(model: Isolator, method: MapMethod, lanes: Lane) -> State:
         target = jnp.mod(-lead, whole)
         turned = method.half & (target >= math.pi)
         target = jnp.where(turned, target - math.pi, target)
-        state = advance(model, method.integrator, drive, lane.state, target, 4 * method.steps)
+        acting = with_overtones(model, drive)
+        state = advance(model, method.integrator, acting, lane.state, target, 4 * method.steps)
         return tuple(jnp.where(turned, -value, value) for value in state)
 
     return jax.vmap(one)(lanes)

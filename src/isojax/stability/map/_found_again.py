@@ -24,6 +24,7 @@ from ..orbit import (
     recorded_sine,
     trajectory,
     value_and_jacobian,
+    with_overtones,
 )
 from ._map import StabilityMap
 from ._map_method import Lane, MapMethod, kinks_between
@@ -181,9 +182,17 @@ def _close(
         _, (real, matrix) = _gap_and_matrix(root, still, way)
         real, matrix = with_derivatives((real, matrix), _gap_and_matrix, root, live, way)
         state, drive = _state_and_drive(real, live, states)
-        path = trajectory(model, method.integrator, drive, tuple(state), turns=0.5 if method.half else 1.0)
+        path = trajectory(
+            model,
+            method.integrator,
+            with_overtones(model, drive),
+            tuple(state),
+            turns=0.5 if method.half else 1.0,
+        )
         # A motion starts at its largest displacement; the rest of one that is symmetric adds nothing to it.
-        response = jnp.abs(state[0]) if method.half else half_peak_to_peak(path[0], False)
+        response = half_peak_to_peak(path[0], method.half)
+        if method.half and not model.harmonics:
+            response = jnp.abs(state[0])
         roots = multipliers(matrix)
         roots = roots * roots if method.half else roots
         found = (size <= method.integrator.map_tolerance) & jnp.all(jnp.isfinite(matrix))
@@ -253,7 +262,7 @@ def _single(
     def one(cell: tuple[Array, Array, Array]) -> _Cells:
         start, push, rate = cell
         orbit = find_periodic_orbit(model, Harmonic(push, rate), start=start)
-        drive = recorded_sine(model, jnp.ones(()), rate)
+        drive = recorded_sine(model, jnp.ones(()), rate).fundamental
         blank = jnp.where(orbit.result == RESULTS.successful, 1.0, jnp.nan)
         direction = jnp.stack([drive.sine, jnp.asarray(drive.cosine)]) * blank
         roots, good = orbit.floquet.multipliers, jnp.isfinite(blank)

@@ -24,7 +24,7 @@ from ...models import (
     as_isolator,
     coefficient_errors,
 )
-from ..orbit import Sine, ascending, is_odd, refuse_transformed
+from ..orbit import Sine, ascending, fewest_steps, integrator_for, is_odd, refuse_transformed
 from ._batched_newton import (
     FOUND,
     NO_FURTHER_ORBIT,
@@ -254,6 +254,8 @@ def stability_map(
     model = as_isolator(model)
     check_float64()
     refuse_transformed(model, _INSTEAD)
+    if integrator is not None:
+        integrator = integrator_for(model, integrator)
     carried = None if fit is None else coefficient_errors(fit, model)
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:
@@ -306,7 +308,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         The map, and the surface from which its orbits came.
     """
     half, (forces, band, _) = is_odd(model), window
-    integrator = Integrator() if run.integrator is None else run.integrator
+    integrator = integrator_for(model, None) if run.integrator is None else run.integrator
     sought = seek(model, integrator, half, window, integrator.map_error, run)
     goal = _READING_SHARE * integrator.map_error
     if run.integrator is None and sought.reading_error > goal:
@@ -315,7 +317,8 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     first = sought.groups[0]
     if run.integrator is None and isinstance(first.solver, CellSolver):
         # Nothing is read off: each orbit is integrated for itself, and steps cost.
-        integrator = integrator.with_steps(steps_needed(first.solver, first.candidates, window))
+        steps = steps_needed(first.solver, first.candidates, window)
+        integrator = integrator.with_steps(max(steps, fewest_steps(model)))
         sought = sought.with_steps(integrator.steps_a_period(model))
     if run.progress is not None:
         run.progress("orbits over displacement and frequency found")

@@ -9,7 +9,15 @@ from jaxtyping import Array, Float, Int
 
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Crossings, Sine, advance_across_kinks, event_places, follow_events
+from ..orbit import (
+    Crossings,
+    PeriodicDrive,
+    Sine,
+    advance_across_kinks,
+    event_places,
+    follow_events,
+    with_overtones,
+)
 
 
 class Lane(NamedTuple):
@@ -17,7 +25,7 @@ class Lane(NamedTuple):
 
     Attributes:
         state: start.
-        drive: the drive, tau counted from the start.
+        drive: the fundamental of the drive, tau counted from the start.
         phases: where the orbit passes kinks.
         response: half the peak-to-peak displacement [m].
     """
@@ -36,7 +44,7 @@ def kinks_between(sides: Float[Array, "piece kink"]) -> Int[Array, " crossing"]:
 def advance(
     model: Isolator,
     integrator: Integrator,
-    drive: Sine,
+    drive: PeriodicDrive,
     state: State,
     end: Float[Array, ""] | float,
     steps: Array,
@@ -116,10 +124,10 @@ class MapMethod(eqx.Module):
         Returns:
             The state, and the values, zero where the phases are right.
         """
-        end = math.pi if self.half else 2.0 * math.pi
+        end, drive = math.pi if self.half else 2.0 * math.pi, with_overtones(model, lane.drive)
         if self.sides is None:
             steps = (self.steps + 1) // 2 if self.half else self.steps
-            after = advance(model, self.integrator, lane.drive, lane.state, end, steps)
+            after = advance(model, self.integrator, drive, lane.state, end, steps)
             return (tuple(-value for value in after) if self.half else after), jnp.zeros(0)
         phases = lane.phases
         pieces = len(phases) + 1
@@ -132,6 +140,6 @@ class MapMethod(eqx.Module):
             jnp.array(True),
         )
         after, reached = advance_across_kinks(
-            model, self.integrator, lane.drive, lane.state, crossings, end, steps
+            model, self.integrator, drive, lane.state, crossings, end, steps
         )
         return (tuple(-value for value in after) if self.half else after), reached

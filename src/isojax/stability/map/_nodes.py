@@ -16,12 +16,14 @@ from ..._types import Lanes
 from ...models import Integrator, Isolator
 from ..orbit import (
     Crossings,
+    PeriodicDrive,
     Sine,
+    balanced_motion,
     follow_events,
-    imposed_balance,
     period_map,
     trajectory,
     value_and_jacobian,
+    with_overtones,
 )
 from ._map_method import Lane, MapMethod, kinks_between
 
@@ -54,8 +56,8 @@ class NodeStarts(NamedTuple):
     """Orbits of nodes, not split at kinks; node first.
 
     Attributes:
-        unknown: drive in phase (sine) and in quadrature (cosine) over the displacement amplitude [N/m], then
-            the internal states at the largest displacement over it.
+        unknown: fundamental of the drive in phase (sine) and in quadrature (cosine) over the displacement
+            amplitude [N/m], then the internal states at the largest displacement over it.
         crossings: the kinks that each passes.
     """
 
@@ -127,15 +129,15 @@ def _starts(
     turns = 0.5 if half else 1.0
 
     def node(a: Array, f: Array) -> tuple[Array, Crossings]:
-        guess, cycle = imposed_balance(model, a, f, rest)
+        guess, cycle, _ = balanced_motion(model, a, f, rest)
         push = jnp.hypot(guess.sine, jnp.asarray(guess.cosine))
         internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
         inner = jnp.where(internal == 0.0, a, jnp.abs(internal))
         omega = 2.0 * math.pi * f
 
-        def unpack(unknown: Array) -> tuple[Sine, tuple[Lanes, ...]]:
+        def unpack(unknown: Array) -> tuple[PeriodicDrive, tuple[Lanes, ...]]:
             state = (rest + a, 0.0 * a, *(unknown[2:] * inner))
-            return Sine(unknown[0] * push, unknown[1] * push, f), state
+            return with_overtones(model, Sine(unknown[0] * push, unknown[1] * push, f)), state
 
         def gap(unknown: Array) -> Array:
             drive, state = unpack(unknown)
@@ -315,7 +317,7 @@ def _responses(
 ) -> Array:
     push, internal = unknown[:, :2].T * amplitude[None], unknown[:, 2:].T * amplitude[None]
     state = (rest + amplitude, 0.0 * amplitude, *internal)
-    drive = Sine(push[0], push[1], frequency)
+    drive = with_overtones(model, Sine(push[0], push[1], frequency))
     path = trajectory(model, integrator, drive, state, turns=0.5 if half else 1.0)[0]
     return half_peak_to_peak(path, half) / amplitude
 

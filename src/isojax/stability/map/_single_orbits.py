@@ -132,7 +132,7 @@ def _shoot(
         blank = jnp.where(code == FOUND, 1.0, jnp.nan)
         roots = multipliers(solution.matrix)
         roots = (roots * roots if method.half else roots) * blank
-        unit = recorded_sine(model, jnp.ones(()), rate)
+        unit = recorded_sine(model, jnp.ones(()), rate).fundamental
         direction = jnp.stack([unit.sine, jnp.asarray(unit.cosine, dtype=float)])
         size = half_peak_to_peak(path, method.half) * blank
         state = solution.state * blank

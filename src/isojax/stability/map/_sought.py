@@ -119,6 +119,11 @@ def seek(
     reader = SurfaceReader(half, split.surface, split.sharding)
     expected = surface.error[candidates.frequency, candidates.part]
     read, error = (expected <= integrator.map_error) & (model.internal_states == 0), math.nan
+    shared = surface.shared[candidates.frequency, candidates.part]
+    if model.harmonics:
+        # Where another of several maxima becomes the largest the surface has a step. It gives starts that may
+        # be no maxima: neither its numbers nor its order of kinks are those of the orbit.
+        read, shared = np.zeros_like(read), np.zeros_like(shared)
     if read.any():
         some = _chosen(candidates, _sample(surface, candidates, np.flatnonzero(read)))
         # In the lanes of the map, which then compiles nothing more.
@@ -130,7 +135,6 @@ def seek(
                 read, error = np.zeros_like(read), math.nan
     if read.all():
         return Sought(surface, (Group("read", reader, candidates),), error)
-    shared = surface.shared[candidates.frequency, candidates.part]
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
     if model.splits:
         # Where sharp laws give each orbit events of its own, no compiled step serves all.

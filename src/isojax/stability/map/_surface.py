@@ -15,7 +15,7 @@ from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
-from ..orbit import response_amplitudes, rest_displacement
+from ..orbit import integrator_for, response_amplitudes, rest_displacement
 from ._map_method import MapMethod
 from ._nodes import closed_nodes, node_responses, node_starts
 from ._shared_kinks import AROUND, SharedKinks, shared_kinks
@@ -228,7 +228,7 @@ def _start_grid(
     logarithms, band = _axes(ends, frequencies, 0)
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
     # Starts need no more steps where the map takes more, and what is compiled for one grid serves the next.
-    steps = min(integrator.steps_per_period, Integrator().steps_per_period)
+    steps = min(integrator.steps_per_period, integrator_for(model, None).steps_per_period)
     coarse = integrator.with_steps(2 * (steps // 4 + 2))
     starts = node_starts(model, coarse, half, rest, amplitude, frequency)
     shape = len(band), len(logarithms)

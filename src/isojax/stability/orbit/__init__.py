@@ -8,7 +8,9 @@ attractor and derivatives build on this one.
 """
 
 from ._axis import ascending as ascending
+from ._describing_function import balanced_motion as balanced_motion
 from ._describing_function import imposed_balance as imposed_balance
+from ._describing_function import overtone_response as overtone_response
 from ._describing_function import response_amplitudes as response_amplitudes
 from ._describing_function import response_start as response_start
 from ._describing_function import rest_displacement as rest_displacement
@@ -34,8 +36,13 @@ from ._period_map import trajectory as trajectory
 from ._shooting import Accuracy as Accuracy
 from ._shooting import shoot as shoot
 from ._shooting_method import ShootingMethod as ShootingMethod
+from ._sine import PeriodicDrive as PeriodicDrive
 from ._sine import Sine as Sine
+from ._sine import fewest_steps as fewest_steps
+from ._sine import highest_order as highest_order
+from ._sine import integrator_for as integrator_for
 from ._sine import recorded_sine as recorded_sine
+from ._sine import with_overtones as with_overtones
 from ._smoothness import has_continuous_slopes as has_continuous_slopes
 from ._split_period_map import FEWEST_STEPS as FEWEST_STEPS
 from ._split_period_map import MOST_STEPS_A_PERIOD as MOST_STEPS_A_PERIOD

@@ -1,18 +1,22 @@
-"""One harmonic in closed form: the sine that holds a given amplitude at a given frequency."""
+"""One harmonic in closed form: the drive that holds a given amplitude at a given frequency."""
 
 import math
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from ..._types import Lanes, Scalar, as_float64
 from ...models import ContinuedLaw, Instant, Isolator
-from ._sine import Sine
+from ._sine import PeriodicDrive, Sine
 
 _SAMPLES = 64
 """Samples a cycle; the first harmonic of |x|x is then good to 1e-5, so good that only the others matter."""
+
+_PHASES, _POLISHING = 256, 2
+"""Phases at which the largest displacement is sought under harmonics; steps of Newton's method from there."""
 
 _IMPOSED_CYCLES = 3
 """Cycles of imposed motion after which internal states count as settled."""
@@ -95,6 +99,126 @@ def imposed_internal(
     return tuple(values[-count:] for values in along)
 
 
+class BalancedMotion(NamedTuple):
+    """A motion about rest with a given largest displacement, tau counted from there.
+
+    Attributes:
+        drive: fundamental of the drive that holds it.
+        internal: internal states along a cycle, time first.
+        parts: order, cosine and sine part of each multiple of tau in the displacement [m], where the drive
+            holds harmonics; the motion is `amplitude cos(tau)` where there is none.
+    """
+
+    drive: Sine
+    internal: tuple[Lanes, ...]
+    parts: tuple[tuple[Lanes | float, Lanes, Lanes], ...]
+
+    def at(self, amplitude: Lanes, phase: Lanes) -> tuple[Lanes, Lanes]:
+        """Give displacement from rest and velocity.
+
+        Args:
+            amplitude: largest displacement [m].
+            phase: tau [rad].
+
+        Returns:
+            Both [m, m/s].
+        """
+        omega = self.drive.angular_frequency
+        if not self.parts:
+            return amplitude * jnp.cos(phase), -amplitude * omega * jnp.sin(phase)
+        x, v = 0.0 * amplitude, 0.0 * amplitude
+        for order, cosine, sine in self.parts:
+            turned = order * phase
+            x = x + cosine * jnp.cos(turned) + sine * jnp.sin(turned)
+            v = v + order * omega * (sine * jnp.cos(turned) - cosine * jnp.sin(turned))
+        return x, v
+
+
+def balanced_motion(
+    model: Isolator, amplitude: Lanes, frequency: Lanes, rest: Lanes | float = 0.0
+) -> BalancedMotion:
+    """Give a motion in the balance of one harmonic, and the drive that holds it.
+
+    Where the drive holds harmonics, each moves the mass as the equivalent linear isolator of this amplitude
+    lets it, and the drive is the one under which all of them together reach the amplitude.
+
+    Args:
+        model: the isolator.
+        amplitude: largest displacement over rest [m], positive.
+        frequency: [Hz], same shape.
+        rest: centre of the motion [m].
+
+    Returns:
+        The motion.
+    """
+    drive, internal = imposed_balance(model, amplitude, frequency, rest)
+    if not model.harmonics:
+        return BalancedMotion(drive, internal, ())
+    pairs = zip(model.harmonics, _receptances(model, amplitude, frequency, rest), strict=True)
+    waves: list[tuple[Lanes | float, Array]] = [(1.0, amplitude / _phasor(drive))]
+    waves.extend((jnp.asarray(one.order), one.share * jnp.exp(1j * one.phase) * own) for one, own in pairs)
+
+    def height(phase: Array, power: int) -> Array:
+        """Give the displacement at the start under a unit drive of some phase, or its derivative by it."""
+        own = [jnp.real((1j * n) ** power * one * jnp.exp(1j * n * phase)) for n, one in waves]
+        return sum(own[1:], start=own[0])
+
+    phases = jnp.asarray(2.0 * np.pi / _PHASES * np.arange(_PHASES))
+    best = phases[jnp.argmax(jax.vmap(lambda phase: height(phase, 0))(phases), axis=0)]
+    for _ in range(_POLISHING):
+        bend = height(best, 2)
+        best = best - jnp.where(bend < 0.0, height(best, 1) / jnp.where(bend < 0.0, bend, 1.0), 0.0)
+    push = amplitude / height(best, 0)
+    moved = [(n, push * one * jnp.exp(1j * n * best)) for n, one in waves]
+    parts = tuple((n, jnp.real(one), -jnp.imag(one)) for n, one in moved)
+    held = Sine(-push * jnp.sin(best), push * jnp.cos(best), frequency)
+    motion = BalancedMotion(held, internal, parts)
+    if model.internal_states:
+        tau = jnp.asarray(2.0 * np.pi / _SAMPLES * np.arange(_SAMPLES))
+        x, v = jax.vmap(lambda phase: motion.at(amplitude + 0.0 * frequency, phase))(tau)
+        motion = motion._replace(internal=imposed_internal(model, rest + x, v, frequency))
+    return motion
+
+
+def _receptances(
+    model: Isolator, amplitude: Lanes, frequency: Lanes, rest: Lanes | float
+) -> list[Complex[Array, "..."]]:
+    """Give displacement over force of the equivalent linear isolator at each harmonic of a drive."""
+    found = []
+    for one in model.harmonics:
+        upper, _ = imposed_balance(model, amplitude, one.order * frequency, rest)
+        found.append(amplitude / _phasor(upper))
+    return found
+
+
+def overtone_response(
+    model: Isolator, drive: PeriodicDrive, amplitude: Lanes, rest: Lanes | float = 0.0
+) -> tuple[Lanes, Lanes]:
+    """Give what the harmonics of a drive add to displacement and velocity at tau = 0.
+
+    Args:
+        model: the isolator.
+        drive: the drive.
+        amplitude: of the whole motion [m], for which the equivalent linear isolator is taken.
+        rest: centre of the motion [m].
+
+    Returns:
+        Both [m, m/s]; zero where the drive is a sine.
+    """
+    x, v = 0.0 * amplitude, 0.0 * amplitude
+    pairs = zip(drive.overtones, _receptances(model, amplitude, drive.frequency, rest), strict=True)
+    for one, receptance in pairs:
+        moved = receptance * (one.cosine - 1j * one.sine)
+        x = x + jnp.real(moved)
+        v = v - one.order * drive.angular_frequency * jnp.imag(moved)
+    return x, v
+
+
+def _phasor(drive: Sine) -> Complex[Array, "..."]:
+    """Give D of `D exp(i tau)`."""
+    return jnp.asarray(drive.cosine) - 1j * drive.sine
+
+
 def imposed_balance(
     model: Isolator, amplitude: Lanes, frequency: Lanes, rest: Lanes | float = 0.0
 ) -> tuple[Sine, tuple[Lanes, ...]]:
@@ -149,7 +273,7 @@ def response_amplitudes(
     """
 
     def needed(amplitude: Array) -> Array:
-        drive, _ = imposed_balance(model, amplitude + 0.0 * frequency, frequency, rest)
+        drive = balanced_motion(model, amplitude + 0.0 * frequency, frequency, rest).drive
         return jnp.hypot(drive.sine, jnp.asarray(drive.cosine))
 
     return jax.vmap(needed)(amplitudes)
@@ -179,10 +303,11 @@ def response_start(model: Isolator, amplitude: Scalar, frequency: Scalar) -> Flo
     span = needed[place + 1] - needed[place]
     share = jnp.where(jnp.any(rises), (jnp.abs(amplitude) - needed[place]) / span, 0.0)
     motion = grid[place] + share * (grid[place + 1] - grid[place])
-    drive, internal = imposed_balance(model, motion, frequency, rest)
-    # The motion is `rest + a cos(tau)`; the recorded drive passes zero upwards at this tau.
+    balanced = balanced_motion(model, motion, frequency, rest)
+    drive, internal, _ = balanced
+    # The motion is largest at tau = 0; the recorded drive passes zero upwards at this tau.
     lead = jnp.where(amplitude < 0, math.pi, 0.0) + 2.0 * math.pi * frequency * model.shift()
     phase = -jnp.arctan2(drive.cosine, drive.sine) - lead
-    x, v = rest + motion * jnp.cos(phase), -motion * drive.angular_frequency * jnp.sin(phase)
+    x, v = balanced.at(motion, phase)
     sample = jnp.round(phase / (2.0 * math.pi) * _SAMPLES).astype(int) % _SAMPLES
-    return jnp.stack([x, v, *(values[sample] for values in internal)])
+    return jnp.stack([rest + x, v, *(values[sample] for values in internal)])

@@ -17,7 +17,7 @@ from ...models import (
     sliding_switch,
 )
 from ._kink_crossings import Crossings
-from ._sine import Sine
+from ._sine import PeriodicDrive
 
 _PHASE_ROUNDING = 1e-12
 """Share of the size of a switch that it may be off by, and share of a step that an instant may be."""
@@ -57,7 +57,7 @@ class _Walk(NamedTuple):
 
 def follow_events(
     model: Isolator,
-    drive: Sine,
+    drive: PeriodicDrive,
     state: State,
     end: Lanes | float,
     steps: Int[Array, ""] | int,
@@ -125,7 +125,7 @@ def follow_events(
     return EventPath(tuple(value * blank for value in last.state), last.crossings, last.path * blank)
 
 
-def first_sides(model: Isolator, drive: Sine, state: State) -> Float[Array, " switch"]:
+def first_sides(model: Isolator, drive: PeriodicDrive, state: State) -> Float[Array, " switch"]:
     """Give the side of each switch on which a motion begins."""
     values = model.switches(state)
     if not values:
@@ -134,7 +134,7 @@ def first_sides(model: Isolator, drive: Sine, state: State) -> Float[Array, " sw
     place = sliding_switch(model)
     if place < 0:
         return sides
-    at = drive.at(jnp.zeros(()), jnp.ones(()))
+    at = drive.at(drive.waves(jnp.zeros(())))
     direction = jnp.where(state[1] == 0.0, _leaves(model, state, at, sides), jnp.sign(state[1]))
     return sides.at[place].set(direction)
 
@@ -146,7 +146,7 @@ def _leaves(model: Isolator, state: State, at: Instant, sides: Float[Array, " sw
 
 
 def _step(
-    model: Isolator, drive: Sine, walk: _Walk, length: Array
+    model: Isolator, drive: PeriodicDrive, walk: _Walk, length: Array
 ) -> tuple[Array, Int[Array, ""], State, Float[Array, " switch"]]:
     """Give the share of a step at which an event ends it, which one, the state and the sides there."""
     sides, place = walk.sides, sliding_switch(model)
@@ -157,8 +157,7 @@ def _step(
         start = (start[0], jnp.where(sides[place] == 0.0, 0.0, start[1]), *start[2:])
 
     def acting(share: Array | float) -> Instant:
-        phase = walk.phase + share * length
-        return drive.at(jnp.sin(phase), jnp.cos(phase))
+        return drive.at(drive.waves(walk.phase + share * length))
 
     begin, middle, finish = (acting(share) for share in (0.0, 0.5, 1.0))
     powers = _cubic(model, law, start, time, (begin, middle, finish))

@@ -19,7 +19,7 @@ from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import imposed_internal, response_start, rest_displacement
-from ._sine import recorded_sine
+from ._sine import highest_order, recorded_sine
 
 
 @shown
@@ -126,7 +126,7 @@ def harmonic_balance(
 
     Raises:
         ValueError: if the frequency is not positive, `start` has the wrong length, `harmonics` is no positive
-            count or `samples` too few.
+            count or lacks a harmonic of the drive, or `samples` are too few.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Cameron & Griffin 1989, J. Appl. Mech. 56:149.
@@ -145,6 +145,11 @@ def harmonic_balance(
         raise ValueError(f"Argument `start` must hold {size} states, but holds {len(start)}.")
     if harmonics < 1:
         raise ValueError(f"Argument `harmonics` must be a positive count, but is {harmonics}.")
+    order = highest_order(frozen(model))
+    if harmonics < order:
+        raise ValueError(
+            f"Argument `harmonics` must be at least {order}, as of the drive, but is {harmonics}."
+        )
     if samples <= 2 * harmonics:
         raise ValueError(
             f"Argument `samples` must be more than twice the harmonics ({harmonics}), but is {samples}."
@@ -186,6 +191,10 @@ def _balance(
     left, row = _defect(root, live, (scale, samples))
     row = with_derivatives(row, _defect, root, (model, excitation), (scale, samples))
     closed = jnp.all(jnp.isfinite(left)) & (jnp.max(jnp.abs(left)) < 1e3 * tolerance)
+    if model.harmonics:
+        # Of a model that is being traced no one could say before.
+        drive = recorded_sine(still, held.amplitude, held.frequency)
+        closed = closed & (drive.highest_order <= harmonics)
     result = RESULTS.where(
         closed,
         RESULTS.promote(diffrax.RESULTS.successful),
@@ -214,7 +223,7 @@ def _defect(
     omega = 2.0 * math.pi * excitation.frequency
     values, slopes = wave(row), wave(1j * order * (omega * row))
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
-    rates = model.rates((values[0], slopes[0], *values[1:]), drive.at(jnp.sin(phase), jnp.cos(phase)))
+    rates = model.rates((values[0], slopes[0], *values[1:]), drive.at(drive.waves(phase)))
     bend = wave(-(order**2) * (omega**2 * row))[0]
     inner = [slope - rate for slope, rate in zip(slopes[1:], rates[2:], strict=True)]
     gaps = jnp.stack([(bend - rates[1]) / omega, *inner])

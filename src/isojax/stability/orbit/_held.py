@@ -9,13 +9,13 @@ from jaxtyping import Array, Bool
 from ...models import Isolator, freeing_accelerations
 from ._describing_function import rest_displacement
 from ._event_path import first_sides
-from ._sine import Sine
+from ._sine import PeriodicDrive
 
 _PHASES_OF_REST = 256
 """Instants of a drive period at which friction is asked: its peak is met within a ten-thousandth."""
 
 
-def is_held(model: Isolator, drive: Sine) -> Bool[Array, ""]:
+def is_held(model: Isolator, drive: PeriodicDrive) -> Bool[Array, ""]:
     """Say whether dry friction holds the mass where it rests without a drive, over a whole drive period.
 
     Then it also rests anywhere beside, as far as friction reaches: no orbit is isolated there.
@@ -34,7 +34,7 @@ def is_held(model: Isolator, drive: Sine) -> Bool[Array, ""]:
     sides = tuple(first_sides(model, drive, state))
 
     def stays(phase: Array) -> Array:
-        at = drive.at(jnp.sin(phase), jnp.cos(phase))
+        at = drive.at(drive.waves(phase))
         forward, backward = freeing_accelerations(model, state, at, sides)
         return (forward <= 0.0) & (backward >= 0.0)
 

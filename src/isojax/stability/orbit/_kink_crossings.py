@@ -18,7 +18,7 @@ from ...models import (
     law_beside,
     sliding_switch,
 )
-from ._sine import Sine
+from ._sine import PeriodicDrive, Waves
 
 
 class Crossings(NamedTuple):
@@ -39,15 +39,18 @@ class Crossings(NamedTuple):
     complete: Bool[Array, ""]
 
 
-def _turned(angle: tuple[Lanes, Lanes], turn: tuple[Lanes, Lanes]) -> tuple[Lanes, Lanes]:
-    """Give sine and cosine of the sum of two angles."""
-    return angle[0] * turn[1] + angle[1] * turn[0], angle[1] * turn[1] - angle[0] * turn[0]
+def _turned(phase: Waves, turn: Waves) -> Waves:
+    """Give sine and cosine of the sums of angles."""
+    return tuple(
+        (sine * own[1] + cosine * own[0], cosine * own[1] - sine * own[0])
+        for (sine, cosine), own in zip(phase, turn, strict=True)
+    )
 
 
 def advance_across_kinks(
     model: Isolator,
     integrator: Integrator,
-    drive: Sine,
+    drive: PeriodicDrive,
     state: State,
     crossings: Crossings,
     end: Lanes | float,
@@ -78,16 +81,14 @@ def advance_across_kinks(
         if sides is not None and sliding >= 0:
             # What is held has no velocity, nor a derivative of it.
             carry = (carry[0], jnp.where(sides[sliding] == 0.0, 0.0, carry[1]), *carry[2:])
-        turn = jnp.sin(0.5 * length), jnp.cos(0.5 * length)
+        turn = drive.waves(0.5 * length)
 
-        def step(
-            index: Array | int, here: tuple[State, tuple[Array, Array]]
-        ) -> tuple[State, tuple[Array, Array]]:
+        def step(index: Array | int, here: tuple[State, Waves]) -> tuple[State, Waves]:
             state, begin = here
             # Turned from stage to stage: a sine a stage and lane would cost as much as the law.
             middle = _turned(begin, turn)
             finish = _turned(middle, turn)
-            stages = [drive.at(*angle) for angle in (begin, middle, finish)]
+            stages = [drive.at(waves) for waves in (begin, middle, finish)]
 
             def field(t: float, y: State, args: None) -> State:
                 rates = model.rates(y, stages[round(2.0 * t)], law=law)
@@ -99,8 +100,8 @@ def advance_across_kinks(
 
         # A place that no crossing uses is a piece of no length.
         count = jnp.where(stop > start, steps, 1)
-        last, _ = jax.lax.fori_loop(0, count, step, (carry, (jnp.sin(start), jnp.cos(start))))
-        return last, _events(model, last, drive.at(jnp.sin(stop), jnp.cos(stop)), sides)
+        last, _ = jax.lax.fori_loop(0, count, step, (carry, drive.waves(start)))
+        return last, _events(model, last, drive.at(drive.waves(stop)), sides)
 
     final, values = jax.lax.scan(piece, state, (bounds[:-1], bounds[1:], crossings.sides))
     if not values.shape[1]:

@@ -26,7 +26,7 @@ from ._held import is_held
 from ._period_map import trajectory
 from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
-from ._sine import recorded_sine
+from ._sine import highest_order, integrator_for, recorded_sine
 from ._split_period_map import event_places
 from ._state_path import AbstractStatePath
 from ._symmetry import is_odd
@@ -76,7 +76,7 @@ class Orbit(AbstractStatePath):
         def peak(sign: float) -> Array:
             place = jnp.argmax(sign * self.displacement)
             state = tuple(self.states[place])
-            at = drive.at(jnp.sin(phase[place]), jnp.cos(phase[place]))
+            at = drive.at(drive.waves(phase[place]))
             bend = self.model.acceleration(state, at)
             return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
 
@@ -123,7 +123,7 @@ def find_periodic_orbit(
 
     Args:
         model: the isolator.
-        excitation: the drive.
+        excitation: the drive; harmonics that elements of the model add to it act, too.
         start: state at t = 0 to start from; the one-harmonic balance with the smallest motion if omitted, and
             where this leads nowhere (and is not inside `jax.jit` or `jax.vmap`) the balance of several.
         periods: drive periods after which the motion repeats (2 for an orbit of doubled period).
@@ -150,7 +150,7 @@ def find_periodic_orbit(
     """
     model = as_isolator(model)
     check_float64()
-    integrator = Integrator() if integrator is None else integrator
+    integrator = integrator_for(frozen(model), integrator)
     tolerance = integrator.orbit_tolerance
     solver = optx.Newton(rtol=tolerance, atol=tolerance) if solver is None else solver
     size = 2 + model.internal_states
@@ -180,7 +180,10 @@ def find_periodic_orbit(
         places *= 2
         solution = _solve(still, drive, method, solver, begin, places)
     if begin is None and not isinstance(solution.found, Tracer) and not solution.found:
-        balance = harmonic_balance(still, drive, integrator=integrator)
+        order = highest_order(still)
+        balance = harmonic_balance(
+            still, drive, harmonics=max(7, 2 * order), samples=max(128, 16 * order), integrator=integrator
+        )
         if is_successful(balance.result):
             solution = _solve(still, drive, method, solver, balance.y0, places)
     return _orbit(model, excitation, method, solution)

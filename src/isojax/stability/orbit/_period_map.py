@@ -8,14 +8,14 @@ import jax.numpy as jnp
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State, advance
 from ._event_path import follow_events
-from ._sine import Sine, stage_table
+from ._sine import PeriodicDrive, Waves, stage_phases
 
 _EVENTS_A_TURN = 8
 """Events of each switch in a period to make room for, where laws jump or bend."""
 
 
 def period_map(
-    model: Isolator, integrator: Integrator, drive: Sine, state: State, *, turns: float = 1.0
+    model: Isolator, integrator: Integrator, drive: PeriodicDrive, state: State, *, turns: float = 1.0
 ) -> State:
     """Give the state after `turns` drive periods.
 
@@ -41,7 +41,7 @@ def period_map(
 def trajectory(
     model: Isolator,
     integrator: Integrator,
-    drive: Sine,
+    drive: PeriodicDrive,
     state: State,
     *,
     turns: float = 1.0,
@@ -68,7 +68,7 @@ def trajectory(
 def _advance(
     model: Isolator,
     integrator: Integrator,
-    drive: Sine,
+    drive: PeriodicDrive,
     state: State,
     turns: float,
     keep: bool,
@@ -78,11 +78,12 @@ def _advance(
         return _along_events(model, integrator, drive, state, turns, keep)
     steps = integrator.steps_a_period(model)
     step_time = 1.0 / (steps * drive.frequency)
-    tables = tuple(jnp.asarray(table) for table in stage_table(steps, turns))
+    tables = drive.waves(stage_phases(steps, turns))
 
-    def body(carry: State, table: tuple[Lanes, ...]) -> tuple[State, State]:
-        sines, cosines = table
-        stages = tuple(drive.at(sines[stage], cosines[stage]) for stage in range(3))
+    def body(carry: State, table: Waves) -> tuple[State, State]:
+        stages = tuple(
+            drive.at(tuple((sines[stage], cosines[stage]) for sines, cosines in table)) for stage in range(3)
+        )
         moved = advance(model, integrator.solver, "acceleration", step_time, carry, stages)
         return moved, carry if keep else ()
 
@@ -90,19 +91,19 @@ def _advance(
 
 
 def _along_events(
-    model: Isolator, integrator: Integrator, drive: Sine, state: State, turns: float, keep: bool
+    model: Isolator, integrator: Integrator, drive: PeriodicDrive, state: State, turns: float, keep: bool
 ) -> tuple[State, State]:
     """Step the sharp laws from event to event, lane by lane."""
-    shape = jnp.broadcast_shapes(*(jnp.shape(value) for value in (*state, *drive)))
+    shape = jnp.broadcast_shapes(*(jnp.shape(value) for value in jax.tree.leaves((state, drive))))
     steps = round(integrator.steps_a_period(model) * turns)
     places = math.ceil(_EVENTS_A_TURN * (len(model.switches(state)) + 2) * turns)
 
-    def one(lane: State, own: tuple[Lanes, ...]) -> tuple[State, Lanes]:
+    def one(lane: State, own: PeriodicDrive) -> tuple[State, Lanes]:
         end = 2.0 * math.pi * turns
-        motion = follow_events(model, Sine(*own), lane, end, steps, places, steps + 1 if keep else 0)
+        motion = follow_events(model, own, lane, end, steps, places, steps + 1 if keep else 0)
         return motion.end, motion.path[:-1]
 
-    lanes, own = (tuple(jnp.broadcast_to(value, shape) for value in values) for values in (state, drive))
+    lanes, own = jax.tree.map(lambda value: jnp.broadcast_to(value, shape), (state, drive))
     for _ in shape:
         one = jax.vmap(one)
     end, path = one(lanes, own)

@@ -14,7 +14,7 @@ from ._event_path import follow_events, same_events
 from ._jacobian import value_and_jacobian
 from ._period_map import period_map, trajectory
 from ._shooting_method import ShootingMethod
-from ._sine import Sine, recorded_sine
+from ._sine import PeriodicDrive, recorded_sine
 from ._split_period_map import Split, split_at_events, split_image, state_scale, steps_wanted
 
 _MOST_STEPS_A_PIECE = 1 << 14
@@ -75,7 +75,7 @@ class _Round(NamedTuple):
 
 
 def _gap(
-    unknown: Array, method: ShootingMethod, split: Split, model: Isolator, drive: Sine
+    unknown: Array, method: ShootingMethod, split: Split, model: Isolator, drive: PeriodicDrive
 ) -> Float[Array, " equation"]:
     """Give the residual of the closure condition for a scaled state and the phases of its crossings."""
     moved, missed = split_image(model, method, drive, split, unknown)
@@ -83,7 +83,7 @@ def _gap(
 
 
 def _gap_and_transition(
-    unknown: Array, method: ShootingMethod, split: Split, model: Isolator, drive: Sine
+    unknown: Array, method: ShootingMethod, split: Split, model: Isolator, drive: PeriodicDrive
 ) -> tuple[Array, Array, Float[Array, "state state"]]:
     """Give the residual, its derivative, and that of the map, in scaled units."""
     states = split.scale.size
@@ -117,7 +117,7 @@ def shoot(
     model: Isolator,
     method: ShootingMethod,
     solver: optx.AbstractRootFinder,
-    drive: Sine,
+    drive: PeriodicDrive,
     start: Float[Array, " state"],
     places: int,
     accuracy: Accuracy | None = None,
@@ -179,7 +179,7 @@ def _closed(
     model: Isolator,
     method: ShootingMethod,
     solver: optx.AbstractRootFinder,
-    drive: Sine,
+    drive: PeriodicDrive,
     near: Float[Array, " state"],
     places: int,
     rounds: Int[Array, ""],

@@ -11,13 +11,13 @@ from ...models import Isolator, State
 from ._event_path import follow_events
 from ._kink_crossings import Crossings, advance_across_kinks
 from ._shooting_method import ShootingMethod
-from ._sine import Sine
+from ._sine import PeriodicDrive
 
 FEWEST_STEPS = 16
 """Steps a piece of the coarsest trial."""
 
-_EVENTS_A_PERIOD = 4
-"""Events of each kind in a period to make room for first."""
+_EVENTS_A_PERIOD, _MORE_EVENTS = 4, 2
+"""Events of each kind in a period to make room for first; times as many where the drive holds harmonics."""
 
 MOST_STEPS_A_PERIOD = 1 << 12
 """Steps a piece of a drive period at most, for a bifurcation."""
@@ -42,7 +42,11 @@ class Split(NamedTuple):
 
 
 def split_image(
-    model: Isolator, method: ShootingMethod, drive: Sine, split: Split, unknown: Float[Array, " unknown"]
+    model: Isolator,
+    method: ShootingMethod,
+    drive: PeriodicDrive,
+    split: Split,
+    unknown: Float[Array, " unknown"],
 ) -> tuple[Float[Array, " state"], Float[Array, " crossing"]]:
     """Give the state after the turns of the method, and how far each kink is missed.
 
@@ -68,7 +72,11 @@ def split_image(
 
 
 def split_jacobian(
-    model: Isolator, method: ShootingMethod, drive: Sine, split: Split, unknown: Float[Array, " unknown"]
+    model: Isolator,
+    method: ShootingMethod,
+    drive: PeriodicDrive,
+    split: Split,
+    unknown: Float[Array, " unknown"],
 ) -> tuple[Float[Array, "state state"], Float[Array, "crossing state"]]:
     """Give the derivative of the image by the state, the instants of the kinks following along.
 
@@ -91,7 +99,7 @@ def split_jacobian(
 def first_split(
     model: Isolator,
     method: ShootingMethod,
-    drive: Sine,
+    drive: PeriodicDrive,
     state: Float[Array, " state"],
     places: int,
 ) -> tuple[Split, Float[Array, " unknown"]]:
@@ -111,7 +119,9 @@ def first_split(
     return split, jnp.concatenate([state / split.scale, split.crossings.phases])
 
 
-def split_at_events(model: Isolator, method: ShootingMethod, drive: Sine, state: State, places: int) -> Split:
+def split_at_events(
+    model: Isolator, method: ShootingMethod, drive: PeriodicDrive, state: State, places: int
+) -> Split:
     """Split a motion at its events, with the fewest steps.
 
     Args:
@@ -130,7 +140,8 @@ def split_at_events(model: Isolator, method: ShootingMethod, drive: Sine, state:
     path, crossings = tuple(motion.path.T), motion.crossings
     scale = state_scale(path)
     sizes = _switch_scale(model, path, crossings, drive.angular_frequency**2 * scale[0])
-    least = jnp.asarray(max(FEWEST_STEPS, method.periods * steps // (places + 1)))
+    # A harmonic takes as many more as its period is shorter; what multipliers need says nothing of it.
+    least = jnp.asarray(max(FEWEST_STEPS, method.periods * steps // (places + 1))) * drive.highest_order
     return Split(scale, crossings, sizes, least, crossings.complete)
 
 
@@ -146,7 +157,7 @@ def event_places(model: Isolator, turns: float) -> int:
     """
     rest = tuple(jnp.zeros(()) for _ in range(2 + model.internal_states))
     kinds = len(model.switches(rest)) + (2 if model.slides else 0)
-    return math.ceil(_EVENTS_A_PERIOD * kinds * turns)
+    return math.ceil(_EVENTS_A_PERIOD * kinds * turns) * (_MORE_EVENTS if model.harmonics else 1)
 
 
 def steps_wanted(

@@ -1,4 +1,4 @@
-"""Whether a model answers a turned drive with the turned motion."""
+"""Whether a model answers half a period of its drive with minus the motion of the other half."""
 
 import jax
 import jax.numpy as jnp
@@ -36,6 +36,8 @@ def _defects(
 def is_odd(model: Isolator) -> bool:
     """Say whether `z -> -z`, `F -> -F` leaves the equations as they are, whatever the coefficients.
 
+    The drive, with the harmonics that elements add to a sine, must turn its sign after half a period.
+
     The second half matters where derivatives are taken: an even spring whose coefficient happens to be zero
     leaves the equations odd, but the derivative by it is not.
 
@@ -47,6 +49,9 @@ def is_odd(model: Isolator) -> bool:
         being traced, of which nothing can be said.
     """
     if any(isinstance(entry.value, Tracer) for entry in list_parameters(model)):
+        return False
+    if any(float(one.order) % 2.0 != 1.0 for one in model.harmonics):
+        # An even harmonic is the same half a period later; an odd one turns with the drive.
         return False
     random = np.random.default_rng(20)
     size = 2 + model.internal_states

@@ -28,7 +28,17 @@ from ...models import (
     find_band,
 )
 from ..map import Lane, MapMethod, states_at_zero
-from ..orbit import Sine, ascending, imposed_balance, rest_displacement, trajectory, value_and_jacobian
+from ..orbit import (
+    Sine,
+    ascending,
+    balanced_motion,
+    imposed_balance,
+    integrator_for,
+    rest_displacement,
+    trajectory,
+    value_and_jacobian,
+    with_overtones,
+)
 from ._free_vibration import natural_frequencies
 from ._frequency_response import drive_amplitude, fundamental
 
@@ -104,7 +114,7 @@ def backbone_curve(
     check_float64()
     errors = None if fit is None else coefficient_errors(fit, model)
     amplitudes = jnp.asarray(ascending("displacements", displacements))
-    integrator = Integrator(steps_per_period=256) if integrator is None else integrator
+    integrator = integrator_for(frozen(model), integrator, 256)
 
     def curve_of(isolator: Isolator) -> BackboneCurve:
         return _resonance(isolator, amplitudes, natural_frequencies(isolator, amplitudes), integrator)
@@ -193,7 +203,8 @@ def _balanced(
     pull = jnp.abs(model.acceleration((rest + amplitude, zero, *internal), Instant(zero))) / amplitude
     begin = jnp.where(pull > 0.0, pull, 1.0)
     square = jax.lax.fori_loop(0, _BALANCE, approach, begin)
-    return imposed_balance(model, amplitude, jnp.sqrt(square) / (2.0 * math.pi), rest)
+    drive, internal, _ = balanced_motion(model, amplitude, jnp.sqrt(square) / (2.0 * math.pi), rest)
+    return drive, internal
 
 
 def _out_of_resonance(
@@ -205,7 +216,7 @@ def _out_of_resonance(
     (model, rest), (integrator, amplitude, sizes) = live, held
     sine, cosine, frequency, *internal = unknown * sizes
     drive, state = Sine(sine, cosine, frequency), (rest + amplitude, 0.0 * amplitude, *internal)
-    path = trajectory(model, integrator, drive, state)
+    path = trajectory(model, integrator, with_overtones(model, drive), state)
     scale = (amplitude, amplitude * drive.angular_frequency, *sizes[3:])
     open_end = [(along[-1] - along[0]) / size for along, size in zip(path, scale, strict=True)]
     turned = fundamental(path[0]) * jnp.conj(drive_amplitude(drive))

@@ -228,10 +228,10 @@ def fundamental(path: Float[Array, "time ..."], periods: int | float = 1) -> Com
 
 
 def drive_amplitude(drive: Sine) -> Complex[Array, "..."]:
-    """Give the complex amplitude of a drive.
+    """Give the complex amplitude of a sine.
 
     Args:
-        drive: the drive.
+        drive: the sine.
 
     Returns:
         D of `D exp(i omega t)`.

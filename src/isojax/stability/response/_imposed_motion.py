@@ -14,7 +14,16 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..._quick_jit import quick_jit
 from ...models import CoefficientErrors, Integrator, Isolator
-from ..orbit import Sine, imposed_balance, is_odd, rest_displacement, trajectory, value_and_jacobian
+from ..orbit import (
+    Sine,
+    imposed_balance,
+    is_odd,
+    overtone_response,
+    rest_displacement,
+    trajectory,
+    value_and_jacobian,
+    with_overtones,
+)
 from ._frequency_response import fundamental
 
 _TRIED = np.logspace(-9.0, 1.0, 241)
@@ -47,12 +56,15 @@ FUNDAMENTALS = ("drive", "acted", "displacement", "passed")
 through the isolator: the force on the ground, or the absolute acceleration under base excitation."""
 
 
+_DISPLACEMENT = FUNDAMENTALS.index("displacement")
+
+
 class ImposedMotions(NamedTuple):
     """Orbits of imposed displacement, frequency first.
 
     Attributes:
         frequencies: [Hz].
-        displacements: largest displacement over rest [m].
+        displacements: largest over rest [m]; under a drive with harmonics that of the fundamental alone.
         fundamentals: complex amplitudes of `FUNDAMENTALS`, over the displacement.
         changes: of these by each independent step, at the same displacement and frequency.
         multipliers: Floquet multipliers over one drive period.
@@ -136,6 +148,8 @@ def _grid(
     start, sizes = np.split(begin.reshape(begin.shape[0], -1).T, [states], axis=1)
     sizes = np.concatenate([np.repeat(np.hypot(*start.T[:2])[:, None], 2, axis=1), sizes], axis=1)
     half = is_odd(errors.model)
+    if errors.model.harmonics:
+        start, sizes = _with_begin(errors.model, displacements, frequencies, rest, start, sizes)
     found = _closed(
         errors,
         integrator,
@@ -147,7 +161,7 @@ def _grid(
         half,
     )
     values, changes, matrices, closed = (np.asarray(one) for one in found)
-    closed = closed & (np.abs(values[:, FUNDAMENTALS.index("displacement")]) < _LARGEST)
+    closed = closed & (np.abs(values[:, _DISPLACEMENT]) < _LARGEST)
     roots = np.linalg.eigvals(np.where(closed[:, None, None], matrices, 0.0)).astype(complex)
     roots = roots**2 if half else roots
 
@@ -162,6 +176,33 @@ def _grid(
         gridded(roots),
         gridded(closed),
     )
+
+
+def _with_begin(
+    model: Isolator,
+    displacements: Float[np.ndarray, " displacement"],
+    frequencies: Float[np.ndarray, " frequency"],
+    rest: Float[np.ndarray, ""],
+    start: Float[np.ndarray, "node unknown"],
+    sizes: Float[np.ndarray, "node unknown"],
+) -> tuple[Float[np.ndarray, "node more"], Float[np.ndarray, "node more"]]:
+    """Add what displacement and velocity at tau = 0 have beside the fundamental, and their sizes.
+
+    With harmonics of the drive a node imposes the fundamental of the displacement: the largest displacement
+    hangs on the phases of all of them, and goes from one maximum to another.
+    """
+    a, f = np.repeat(displacements, frequencies.size), np.tile(frequencies, displacements.size)
+    beside = _beside_fundamental(model, *(jnp.asarray(one) for one in (a, f, rest, start[:, :2])))
+    own = np.stack([a, 2.0 * np.pi * f * a], axis=1)
+    return np.concatenate([start, np.asarray(beside).T], axis=1), np.concatenate([sizes, own], axis=1)
+
+
+@quick_jit
+def _beside_fundamental(
+    model: Isolator, amplitude: Array, frequency: Array, rest: Array, drive: Float[Array, "node 2"]
+) -> Float[Array, "2 node"]:
+    acting = with_overtones(model, Sine(drive[:, 0], drive[:, 1], frequency))
+    return jnp.stack(overtone_response(model, acting, amplitude, rest))
 
 
 @quick_jit
@@ -213,40 +254,47 @@ def _closed(
     half: bool,
 ) -> tuple[Complex[Array, "node 4"], Complex[Array, "node 4 step"], Float[Array, "node state state"], Array]:
     states = 2 + errors.model.internal_states
-
+    count = start.shape[1]
     turns, sign = (0.5, -1.0) if half else (1.0, 1.0)
     sizes = jnp.where(sizes == 0.0, displacement[:, None], sizes)
 
     def ends(a: Array, f: Array, size: Array, moved: Array) -> tuple[Array, Array]:
         """Give what an orbit leaves open, over the size of its states, and its fundamentals over a."""
-        unknown, shift, steps = jnp.split(moved, [states, 2 * states])
+        unknown, shift, steps = jnp.split(moved, [count, count + states])
         isolator, unknown = errors.moved(steps), unknown * size
-        own = jnp.concatenate([jnp.stack([a, a * 2.0 * np.pi * f]), size[2:]])
-        state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), unknown[2:]]) + shift * own
-        drive = Sine(unknown[0], unknown[1], f)
+        own = jnp.concatenate([jnp.stack([a, a * 2.0 * np.pi * f]), size[2:states]])
+        begin = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), unknown[2:states]])
+        if count > states:
+            begin = begin.at[:2].add(unknown[states:])
+        state = begin + shift * own
+        drive = with_overtones(isolator, Sine(unknown[0], unknown[1], f))
         path = trajectory(isolator, integrator, drive, tuple(state), turns=turns, rounded=True)
         left = (sign * jnp.stack([along[-1] for along in path]) - state) / own
         phase = 2.0 * np.pi * turns / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
-        at = drive.at(jnp.asarray(np.sin(phase)), jnp.asarray(np.cos(phase)))
+        at = drive.at(drive.waves(phase))
         acted, _ = isolator.drive(at)
         if isolator.excitation == "base_acceleration":
             passed = isolator.motion(path, at, "acceleration")
         else:
             passed = isolator.restoring_force(path)
         signals = (at.drive, acted, path[0], passed)
-        return left, jnp.stack([fundamental(jnp.asarray(signal), turns) for signal in signals]) / a
+        found = jnp.stack([fundamental(jnp.asarray(signal), turns) for signal in signals]) / a
+        if count > states:
+            off = found[_DISPLACEMENT] - 1.0
+            left = jnp.concatenate([left, jnp.stack([jnp.real(off), jnp.imag(off)])])
+        return left, found
 
     def evaluated(a: Array, f: Array, size: Array, unknown: Array) -> tuple[Array, ...]:
         still = jnp.zeros(states + errors.steps)
         (left, values), (slope, change) = value_and_jacobian(
             lambda moved: ends(a, f, size, moved), jnp.concatenate([unknown, still])
         )
-        by_unknown, by_state, by_step = jnp.split(slope, [states, 2 * states], axis=1)
+        by_unknown, by_state, by_step = jnp.split(slope, [count, count + states], axis=1)
         follow = jnp.linalg.solve(by_unknown, jnp.concatenate([left[:, None], by_step], axis=1))
         step, moves = follow[:, 0], follow[:, 1:]
-        values = values - change[:, :states] @ step
-        changes = change[:, 2 * states :] - change[:, :states] @ moves
-        return step, values, changes, by_state + jnp.eye(states)
+        values = values - change[:, :count] @ step
+        changes = change[:, count + states :] - change[:, :count] @ moves
+        return step, values, changes, by_state[:states] + jnp.eye(states)
 
     def body(carry: tuple) -> tuple:
         unknown, _, count = carry

@@ -98,7 +98,7 @@ def find_resonance(
     model = as_isolator(model)
     check_float64()
     refuse_traced(model, amplitude)
-    integrator = tracing_steps() if integrator is None else integrator
+    integrator = tracing_steps(model, integrator)
     push = as_float64(amplitude)
     curve = frequency_response(
         frozen(model), np.asarray(frozen(push)), frequencies, step=step, integrator=integrator

@@ -27,7 +27,7 @@ from ...models import (
     band_around,
     coefficient_errors,
 )
-from ..orbit import ascending, margin_beside_folds
+from ..orbit import ascending, integrator_for, margin_beside_folds
 from ._imposed_motion import ImposedMotions, impose_motions
 
 _STEPS = 64, 256
@@ -169,7 +169,8 @@ def response_bands(
     if ends.size < 2:
         raise ValueError(f"Argument `frequencies` must hold two different ones, but is {frequencies}.")
     nodes = np.geomspace(ends[0], ends[-1], _GRID_FREQUENCIES)
-    tries = [Integrator(steps_per_period=steps) for steps in _STEPS] if integrator is None else [integrator]
+    steps = _STEPS if integrator is None else _STEPS[:1]
+    tries = [integrator_for(errors.model, integrator, count) for count in steps]
     motions = impose_motions(errors, forces, nodes, tries[0])
     for finer in tries[1:]:
         # Where steps are too long for a stiff law, there are no orbits.

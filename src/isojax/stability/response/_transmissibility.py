@@ -26,7 +26,18 @@ from ...models import (
     find_band,
 )
 from ..map import StabilityMap, found_again, stability_map
-from ..orbit import Sine, ascending, period_map, recorded_sine, refuse_traced, trajectory, value_and_jacobian
+from ..orbit import (
+    PeriodicDrive,
+    Sine,
+    ascending,
+    integrator_for,
+    period_map,
+    recorded_sine,
+    refuse_traced,
+    trajectory,
+    value_and_jacobian,
+    with_overtones,
+)
 from ._frequency_response import fundamental
 
 _CLOSING_STEPS = 4
@@ -120,7 +131,7 @@ def transmissibility(
     model = as_isolator(model)
     check_float64()
     errors = None if fit is None else coefficient_errors(fit, model)
-    integrator = Integrator(steps_per_period=256) if integrator is None else integrator
+    integrator = integrator_for(frozen(model), integrator, 256)
     grid = ascending("frequencies", frequencies)
     force = as_float64(amplitude)
     refuse_traced(model, force)
@@ -176,16 +187,14 @@ def _passed(
     frequency = jnp.broadcast_to(frequencies, shape).ravel()
     # From the phase zero of the recorded drive: one that moved with the orbit would move the steps along it.
     drive = recorded_sine(model, jnp.broadcast_to(amplitude, frequency.shape), frequency)
-    drive = drive._replace(cosine=jnp.broadcast_to(jnp.asarray(drive.cosine), frequency.shape))
-    state = _closed(model, integrator, half, drive, y0.reshape(-1, y0.shape[-1]))
+    state = _closed(model, integrator, half, drive.fundamental, y0.reshape(-1, y0.shape[-1]))
     path = trajectory(model, integrator, drive, tuple(state.T))
     turn = 2.0 * np.pi / (path[0].shape[0] - 1) * np.arange(path[0].shape[0])
-    at = jax.vmap(drive.at)(jnp.asarray(np.sin(turn)), jnp.asarray(np.cos(turn)))
+    at = jax.vmap(drive.at)(drive.waves(turn))
     acted, _ = model.drive(at)
     if model.excitation == "base_acceleration":
         absolute = model.motion(path, at, "acceleration")
-        # A sine's displacement is minus its acceleration over omega^2.
-        base = -(acted - jnp.mean(acted[:-1], axis=0)[None]) / drive.angular_frequency[None] ** 2
+        base = _base_displacement(acted, drive)
         ratio = fundamental(absolute) / fundamental(acted)
         peak = _half_range(path[0] + base) / _half_range(base)
     else:
@@ -195,10 +204,24 @@ def _passed(
     return ratio.reshape(shape), peak.reshape(shape)
 
 
+def _base_displacement(acted: Float[Array, "time lane"], drive: PeriodicDrive) -> Float[Array, "time lane"]:
+    """Give the displacement of a base about its mean from its acceleration over a period, with both ends."""
+    square = drive.angular_frequency[None] ** 2
+    if not drive.overtones:
+        # A sine's displacement is minus its acceleration over omega^2.
+        return -(acted - jnp.mean(acted[:-1], axis=0)[None]) / square
+    steps = acted.shape[0] - 1
+    order = np.arange(steps // 2 + 1)
+    over = np.where(order == 0, 0.0, -1.0 / np.maximum(order, 1) ** 2)
+    along = jnp.fft.irfft(over[:, None] * jnp.fft.rfft(acted[:-1], axis=0), n=steps, axis=0) / square
+    return jnp.concatenate([along, along[:1]])
+
+
 def _closed(
     model: Isolator, integrator: Integrator, half: bool, drive: Sine, start: Float[Array, "lane state"]
 ) -> Float[Array, "lane state"]:
     """Close each orbit to machine precision: only there do its equations have the derivative of the orbit."""
+    cosine = jnp.broadcast_to(jnp.asarray(drive.cosine), drive.frequency.shape)
 
     def lane(sine: Array, cosine: Array, frequency: Array, state: Array) -> Array:
         live = model, Sine(sine, cosine, frequency)
@@ -211,7 +234,7 @@ def _closed(
         near = jax.lax.fori_loop(0, _CLOSING_STEPS, closing, frozen(state))
         return with_derivatives(near, _open_end, near, live, held)
 
-    return jax.vmap(lane)(drive.sine, jnp.asarray(drive.cosine), drive.frequency, start)
+    return jax.vmap(lane)(drive.sine, cosine, drive.frequency, start)
 
 
 def _open_end(
@@ -219,7 +242,8 @@ def _open_end(
 ) -> tuple[Float[Array, " state"], Float[Array, " state"]]:
     """Give how far a motion misses its own start, and the start."""
     (model, drive), (integrator, half) = live, held
-    end = period_map(model, integrator, drive, tuple(state), turns=0.5 if half else 1.0)
+    acting = with_overtones(model, drive)
+    end = period_map(model, integrator, acting, tuple(state), turns=0.5 if half else 1.0)
     return jnp.stack(end) - state, state
 
 
