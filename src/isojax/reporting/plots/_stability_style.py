@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from ...models import Isolator
 from ...stability import SpecialPoint
-from ..words import typeset_unit
+from ..words import DRIVE_UNITS, typeset_unit
 from ._style import AFTER, BEFORE, LEVELS
 
 MILLIMETRES = 1e3
@@ -75,7 +75,7 @@ def drive_unit(excitation: str) -> str:
     Returns:
         Such as "N".
     """
-    return "N" if excitation == "force" else typeset_unit("m/s^2")
+    return typeset_unit(DRIVE_UNITS[excitation])
 
 
 def parameter_label(model: Isolator, parameter: str) -> str:

@@ -14,8 +14,9 @@ from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS
 from ..._show import Row, amount, brief, number, shown
 from ..._types import Scalar
-from ...models import Integrator, Isolator, State
+from ...models import Band, Integrator, Isolator, State
 from ..orbit import ShootingMethod, Sine, modulus, multipliers, pair_angle, trajectory, value_and_jacobian
+from ._drive_words import drive_in_words
 from ._parameter_family import ParameterFamily
 
 
@@ -103,6 +104,7 @@ class SpecialPoint(eqx.Module):
         family: isolators and drives along the parameter.
         integrator: steps and solver.
         symmetric: whether it was closed with the half-period map.
+        band: of value, amplitude and frequency, where a fit was given; zero wide for what is held fixed.
     """
 
     kind: str = eqx.field(static=True)
@@ -119,6 +121,7 @@ class SpecialPoint(eqx.Module):
     family: ParameterFamily
     integrator: Integrator
     symmetric: bool = eqx.field(static=True)
+    band: Band | None = None
 
     @property
     def method(self) -> ShootingMethod:
@@ -139,7 +142,7 @@ class SpecialPoint(eqx.Module):
         return angle if self.kind == "neimark_sacker" else jnp.nan * angle
 
     def _headline(self) -> str:
-        drive = f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
+        drive = drive_in_words(self.family.model, self.amplitude, self.frequency, self.band)
         after = "" if self.periods == 1 else f", orbit over {self.periods} drive periods"
         torus = ""
         if self.kind == "neimark_sacker" and np.isfinite(np.asarray(self.value)):
@@ -148,7 +151,8 @@ class SpecialPoint(eqx.Module):
         return f"{self.kind.replace('_', ' ')} at {drive}{after}{torus}"
 
     def _rows(self) -> list[str]:
-        return ["value", "y0", "multipliers", "direction", "result"]
+        own = ["value", *(["band"] if self.band is not None else [])]
+        return [*own, "y0", "multipliers", "direction", "result"]
 
 
 @shown
@@ -202,6 +206,7 @@ class Branch(eqx.Module):
             orbits that are one motion counted from another drive period.
         searched: where they were sought; None if they were not.
         events: what was looked out for.
+        band: of value and response, across the branch, where a fit was given.
     """
 
     model: Isolator
@@ -219,6 +224,7 @@ class Branch(eqx.Module):
     others: tuple["Branch", ...] = ()
     searched: Searched | None = None
     events: tuple[BranchEvent, ...] = ()
+    band: Band | None = None
 
     @property
     def connection(self) -> Literal["none", "bifurcation", "unknown"]:
@@ -241,7 +247,7 @@ class Branch(eqx.Module):
         points = self.points
         own = ["model", "closed", "result"]
         span = [Row(name, brief(getattr(points, name))) for name in ("amplitude", "frequency", "response")]
-        return [*own, *span]
+        return [*own, *span, *(["band"] if self.band is not None else [])]
 
     def _lines(self) -> list[str]:
         lines = [f"  {point._headline()}" for point in self.special_points]
