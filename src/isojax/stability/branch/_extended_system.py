@@ -276,11 +276,12 @@ def polish(
     def body(search: _Search) -> _Search:
         own = eqx.tree_at(lambda one: one.split.steps, system, search.steps)
         beside = _expand(own, family, search.unknown, search.right)
-        bend, rise, missed = _bend(own, beside), search.rise, None
+        bend, rise, missed, ahead = _bend(own, beside), search.rise, None, zero
         if to_zero:
             bend = _coefficient(own, family, beside, search.unknown, bend)
             rise = _secant(search, bend)
             missed = bend / rise
+            ahead = -missed
         residual, step = _newton(own, beside, search.unknown, missed)
         trying = search.evaluations < _TRIALS
         trials = jnp.stack([search.trial, beside.matrix])
@@ -303,7 +304,7 @@ def polish(
             beside.matrix,
             bend,
             rise,
-            jnp.where(moves, -missed, 0.0) if to_zero else zero,
+            jnp.where(moves, ahead, 0.0),
         )
 
     # All depend on the guess, so that JAX sees at once over what a batch runs: it traces the loop anew for

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._quantities import DRIVE_UNITS
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import amount, number, shown
@@ -75,12 +76,14 @@ class FrequencyResponse(eqx.Module):
     @property
     def band(self) -> Band | None:
         """Of frequency and amplitude, across the curve, where a fit was given."""
-        own, names = self.branch.band, {"value": "frequency", "response": "amplitude"}
+        own = self.branch.band
         if own is None:
             return None
-        parts = (own.standard_error, own.lower, own.upper)
-        named = ({new: part[name] for name, new in names.items()} for part in parts)
-        return Band(*named, own.confidence)
+        error, lower, upper = (
+            {"frequency": part["value"], "amplitude": part["response"]}
+            for part in (own.standard_error, own.lower, own.upper)
+        )
+        return Band(error, lower, upper, own.confidence)
 
     @property
     def result(self) -> RESULTS:
@@ -91,7 +94,7 @@ class FrequencyResponse(eqx.Module):
         points = self.branch.points
         response, frequency = np.asarray(points.response), np.asarray(points.frequency)
         top = np.nanargmax(response)
-        drive = number(float(np.asarray(points.amplitude).ravel()[top]))
+        drive = amount(np.asarray(points.amplitude).ravel()[top], DRIVE_UNITS[self.branch.model.excitation])
         peak = f"{amount(response.ravel()[top], 'm')} at {number(frequency.ravel()[top])} Hz"
         return f"largest response {peak} under a drive of {drive}; {self.branch._headline()}"
 
