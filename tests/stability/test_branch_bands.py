@@ -12,7 +12,7 @@ import isojax as ij
 
 TURN = 2.0 * np.pi
 HALF = norm.ppf(0.975)
-SHARE = 0.02
+SHARE = 0.002
 """Relative standard error of the only coefficient that is uncertain."""
 
 SUCCESS = ij.RESULTS.promote(diffrax.RESULTS.successful)
@@ -96,41 +96,15 @@ def test_the_ends_of_a_branch_band_lie_on_the_scaled_branch(branch):
 
 
 @pytest.mark.slow
-def test_cusps_have_the_error_of_their_scaling():
-    folds = ij.fold_curve(
-        DUFFING,
-        amplitude_range=(0.05, 1.0),
-        frequency_range=(1.05 / TURN, 1.5 / TURN),
-        search=3,
-        step=0.05,
-        fit=STIFF,
-    )
+def test_cusps_have_the_error_of_their_scaling(branch):
+    window = {"amplitude_range": (0.05, 1.0), "frequency_range": (1.1 / TURN, 1.7 / TURN)}
+    folds = ij.fold_curve(DUFFING, **window, start=branch.special_points[0], step=0.1, fit=STIFF)
     (cusp,) = folds.cusps
     wanted = 0.5 * SHARE * float(cusp.amplitude)
     assert float(cusp.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-6)
     assert abs(float(cusp.band.standard_error["frequency"])) < 1e-6 * SHARE * float(cusp.frequency)
     assert " ± " in str(cusp)
     assert ij.plot.fold_curve(folds).axes[0].containers
-
-
-@pytest.mark.slow
-def test_the_period_doubling_force_has_the_error_of_its_scaling():
-    # x'' + c x' + x + q x^2 = F sin(w t): motion and force go with 1 / q.
-    spring = (ij.LinearStiffness(1.0), ij.LinearDamping(0.1), ij.QuadraticStiffness(1.0))
-    model = ij.Isolator(1.0, spring)
-    curve = ij.period_doubling_curve(
-        model,
-        amplitude_range=(0.2, 0.4),
-        frequency_range=(1.88 / TURN, 2.06 / TURN),
-        search=3,
-        step=0.2,
-        fit=uncertain(model, "quadratic_stiffness.coefficient"),
-    )
-    point = next(one for one in curve.special_points if one.kind == "generalised_doubling")
-    wanted = SHARE * float(point.amplitude)
-    assert float(point.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-4)
-    assert abs(float(point.band.standard_error["frequency"])) < 1e-4 * SHARE * float(point.frequency)
-    assert ij.plot.bifurcation_curve(curve).axes[0].patches
 
 
 def test_an_event_of_a_linear_branch_has_the_error_of_its_closed_form():
@@ -153,9 +127,12 @@ def test_an_event_of_a_linear_branch_has_the_error_of_its_closed_form():
     wanted = 0.05**2 * abs(spring) / force * SHARE * 50.0
     assert float(point.band.standard_error["value"]) == pytest.approx(wanted, rel=1e-6)
     # The response at a point moves across the line X = F / |Z|: all of the error is in its slope.
-    slope = np.asarray(branch.band.upper["response"]) / np.asarray(branch.band.upper["value"])
-    shift = HALF * SHARE * 50.0 * abs(spring) / (spring**2 + damper**2)
-    np.testing.assert_allclose(np.abs(slope * np.hypot(spring, damper) - 1.0), shift, rtol=0.05)
+    upper, lower = (
+        np.asarray(end["response"]) / np.asarray(end["value"])
+        for end in (branch.band.upper, branch.band.lower)
+    )
+    shift = HALF * SHARE * 50.0 * abs(spring) / (spring**2 + damper**2) ** 1.5
+    np.testing.assert_allclose(0.5 * np.abs(upper - lower), shift, rtol=0.02)
 
 
 def test_a_branch_asks_for_the_model_of_the_fit():
