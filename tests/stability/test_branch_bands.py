@@ -6,13 +6,14 @@ from typing import NamedTuple
 import diffrax
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.stats import norm
 
 import isojax as ij
 
 TURN = 2.0 * np.pi
 HALF = norm.ppf(0.975)
-SHARE = 0.002
+SHARE = 0.005
 """Relative standard error of the only coefficient that is uncertain."""
 
 SUCCESS = ij.RESULTS.promote(diffrax.RESULTS.successful)
@@ -72,7 +73,7 @@ def test_the_ends_of_a_branch_band_lie_on_the_scaled_branch(branch):
     known = np.stack([np.asarray(branch.points.value), np.asarray(branch.points.response)])
     shift, scale = 0.5 * SHARE * HALF, np.ptp(known, axis=1)[:, None]
     places = np.arange(known.shape[1])
-    fine = np.stack([np.interp(np.arange(0.0, places[-1], 0.02), places, one) for one in known]) / scale
+    fine = CubicSpline(places, known / scale, axis=1)(np.arange(0.0, places[-1], 0.02))
     along, here = np.gradient(known / scale, axis=1), known / scale
     along, here = along / np.hypot(*along), here / np.hypot(*here)
     # Where the branch runs towards the origin, scaling shifts it along itself.
@@ -88,7 +89,8 @@ def test_the_ends_of_a_branch_band_lie_on_the_scaled_branch(branch):
             best.append(scales[np.argmin(np.min(np.sum(away**2, axis=1), axis=1))] - 1.0)
         sides.append(np.array(best))
     assert len(sides[0]) > 5
-    np.testing.assert_allclose(np.abs(sides), shift, rtol=0.05)
+    # Their mean is free of the second order, by which the branch bends within the band.
+    np.testing.assert_allclose(np.mean(np.abs(sides), axis=0), shift, rtol=0.05)
     assert np.all(sides[0] * sides[1] < 0.0)
     ax = ij.plot.branch(branch).axes[0]
     assert ax.patches

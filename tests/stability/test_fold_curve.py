@@ -91,29 +91,21 @@ def test_the_quadratic_coefficient_vanishes_at_the_cusps_by_scipy(lens):
 
 
 @pytest.mark.slow
-def test_a_cusp_is_found_again_for_other_models_by_scipy_and_moves_as_differences_say(lens):
+def test_a_cusp_is_found_again_for_other_models_by_scipy(lens):
     usual = max(abs(bend(lens.amplitude[place], lens.frequency[place], lens.y0[place])) for place in (0, 60))
-    cusp, masses = lens.cusps[0], np.array([780.0, 800.0, 824.0])
+    cusp, masses = lens.cusps[0], np.array([800.0, 780.0, 824.0])
 
     def again(mass):
         found = ij.find_again(cusp, MODEL.replace(mass=mass))
         return found.amplitude, found.frequency, found.y0
 
-    found = jax.jit(jax.vmap(again))(jnp.asarray(masses))
-    for mass, amplitude, frequency, y0 in zip(masses, *map(np.asarray, found), strict=True):
+    found = [np.asarray(one) for one in jax.jit(jax.vmap(again))(jnp.asarray(masses))]
+    for mass, amplitude, frequency, y0 in zip(masses, *found, strict=True):
         end, matrix = half_map(amplitude, frequency, y0, mass)
         np.testing.assert_allclose(end, y0, atol=1e-8 * np.abs(y0).max())
         assert abs(np.linalg.det(matrix - np.eye(2))) < 1e-7
         assert abs(bend(amplitude, frequency, y0, mass)) < 1e-4 * usual
-    np.testing.assert_allclose(found[0][1], cusp.amplitude, rtol=1e-9)
-
-    slopes = jax.jacfwd(lambda mass: jnp.stack(again(mass)[:2]))(800.0)
-    beside = jax.jit(jax.vmap(again))(jnp.array([800.0 - 1.0, 800.0 - 0.5, 800.0 + 0.5, 800.0 + 1.0]))
-    low, lower, higher, high = np.transpose(beside[:2])
-    differences = (8.0 * (higher - lower) - (high - low)) / 6.0
-    np.testing.assert_allclose(slopes, differences, rtol=1e-6)
-    backwards = jax.grad(lambda mass: again(mass)[0])(800.0)
-    assert float(backwards) == pytest.approx(float(slopes[0]), rel=1e-9)
+    np.testing.assert_allclose(found[0][0], cusp.amplitude, rtol=1e-9)
     with pytest.raises(ValueError, match="`frequency` must be omitted for a cusp"):
         ij.find_again(cusp, MODEL, frequency=4.0)
 
