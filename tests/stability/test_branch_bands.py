@@ -100,7 +100,7 @@ def test_the_ends_of_a_branch_band_lie_on_the_scaled_branch(branch):
 @pytest.mark.slow
 def test_cusps_have_the_error_of_their_scaling(branch):
     window = {"amplitude_range": (0.05, 1.0), "frequency_range": (1.1 / TURN, 1.7 / TURN)}
-    folds = ij.fold_curve(DUFFING, **window, start=branch.special_points[0], step=0.1, fit=STIFF)
+    folds = ij.fold_curve(DUFFING, **window, start=branch.special_points[0], step=0.03, fit=STIFF)
     (cusp,) = folds.cusps
     wanted = 0.5 * SHARE * float(cusp.amplitude)
     assert float(cusp.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-6)
