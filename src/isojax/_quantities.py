@@ -11,6 +11,9 @@ INPUT_WORDS = {
 }
 """What the input of each quantity is once it is read, and its SI unit."""
 
+DRIVE_UNITS = {excitation: INPUT_WORDS[excitation][1] for excitation in ("force", "base_acceleration")}
+"""SI unit of the drive of an isolator, by its `excitation`."""
+
 _RAISED = str.maketrans("0123456789-.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·")
 _UNKNOWN = "–"
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 import isojax as ij
 from isojax.reporting import compile_seconds, map_arrays, map_summary
+from isojax.stability.branch import ParameterFamily
 
 FOLDS = {4.1: (190.62, 194.01), 4.2: (171.89, 178.12), 4.4: (144.52, 150.66)}
 """Lower and upper fold force [N] by frequency [Hz] of the paper's y model, found with another program."""
@@ -177,12 +178,20 @@ def test_every_kind_of_bifurcation_has_a_mark_of_its_own():
     assert len({mark.marker for mark in MARKS.values()}) == len(MARKS)
 
 
+def codimension_two(kind, along, amplitude, frequency, multipliers):
+    """A special point of a curve that nobody followed."""
+    good, nothing = ij.RESULTS.promote(diffrax.RESULTS.successful), jnp.array(jnp.nan)
+    pair, window = jnp.zeros(2), (jnp.array([1.0, 1.0]), jnp.array([9.0, 9.0]))
+    family = ParameterFamily(ij.paper.y_direction(), nothing, nothing, *window, ("amplitude", "frequency"))
+    place = jnp.asarray(amplitude), jnp.asarray(frequency)
+    rest = (1, False, family, ij.Integrator(), jnp.zeros(4), pair, nothing)
+    return ij.CodimensionTwoPoint(kind, *place, pair, multipliers, good, along, *rest)
+
+
 def test_fold_curve_shows_both_cusps():
     angle = np.linspace(0.0, 2.0 * np.pi, 9)
-    good = ij.RESULTS.promote(diffrax.RESULTS.successful)
     cusps = tuple(
-        ij.CodimensionTwoPoint("cusp", jnp.array(a), jnp.array(f), jnp.zeros(2), jnp.ones(2) + 0j, good)
-        for a, f in ((5.0, 3.0), (5.0, 5.0))
+        codimension_two("cusp", "fold", a, f, jnp.ones(2) + 0j) for a, f in ((5.0, 3.0), (5.0, 5.0))
     )
     curve = ij.FoldCurve(
         jnp.asarray(5.0 + np.sin(angle)),
@@ -209,7 +218,7 @@ def test_curves_of_other_bifurcations_show_their_resonances():
     turned = jnp.exp(1j * jnp.array([[0.1, -0.1], [1.0, -1.0], [3.0, -3.0]]))
     values = jnp.array([4.0, 5.0, 6.0])
     ends = tuple(
-        ij.CodimensionTwoPoint(kind, value, value, jnp.zeros(2), turned[0], good)
+        codimension_two(kind, "neimark_sacker", value, value, turned[0])
         for kind, value in (("resonance_1_1", values[0]), ("resonance_1_2", values[2]))
     )
     curve = ij.NeimarkSackerCurve(

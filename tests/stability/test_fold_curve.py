@@ -24,20 +24,20 @@ def lens():
     return ij.fold_curve(MODEL, **WINDOW)
 
 
-def half_map(amplitude, frequency, y0):
-    end, matrix, _ = scipy_map.after(LAW, 800.0, float(amplitude), float(frequency), np.asarray(y0), 0.5)
+def half_map(amplitude, frequency, y0, mass=800.0):
+    end, matrix, _ = scipy_map.after(LAW, mass, float(amplitude), float(frequency), np.asarray(y0), 0.5)
     return -end, -matrix
 
 
-def bend(amplitude, frequency, y0):
+def bend(amplitude, frequency, y0, mass=800.0):
     """Give the quadratic coefficient of the half-period map by differences of SciPy's derivative."""
     scale = np.array([1e-3, 3e-2])
-    _, matrix = half_map(amplitude, frequency, y0)
+    _, matrix = half_map(amplitude, frequency, y0, mass)
     matrix = matrix / scale[:, None] * scale[None]
     right, left = np.linalg.svd(matrix - np.eye(2))[2][-1], np.linalg.svd((matrix - np.eye(2)).T)[2][-1]
     moved = []
     for sign in (1.0, -1.0):
-        _, there = half_map(amplitude, frequency, np.asarray(y0) + sign * 1e-3 * right * scale)
+        _, there = half_map(amplitude, frequency, np.asarray(y0) + sign * 1e-3 * right * scale, mass)
         moved.append(there / scale[:, None] * scale[None])
     return left @ ((moved[0] - moved[1]) / 2e-3) @ right / (left @ right)
 
@@ -88,6 +88,26 @@ def test_the_quadratic_coefficient_vanishes_at_the_cusps_by_scipy(lens):
         np.testing.assert_allclose(end, y0, atol=1e-8 * np.abs(y0).max())
         assert abs(np.linalg.det(matrix - np.eye(2))) < 1e-7
         assert abs(bend(cusp.amplitude, cusp.frequency, y0)) < 1e-3 * usual
+
+
+@pytest.mark.slow
+def test_a_cusp_is_found_again_for_other_models_by_scipy(lens):
+    usual = max(abs(bend(lens.amplitude[place], lens.frequency[place], lens.y0[place])) for place in (0, 60))
+    cusp, masses = lens.cusps[0], np.array([800.0, 780.0, 824.0])
+
+    def again(mass):
+        found = ij.find_again(cusp, MODEL.replace(mass=mass))
+        return found.amplitude, found.frequency, found.y0
+
+    found = [np.asarray(one) for one in jax.jit(jax.vmap(again))(jnp.asarray(masses))]
+    for mass, amplitude, frequency, y0 in zip(masses, *found, strict=True):
+        end, matrix = half_map(amplitude, frequency, y0, mass)
+        np.testing.assert_allclose(end, y0, atol=1e-8 * np.abs(y0).max())
+        assert abs(np.linalg.det(matrix - np.eye(2))) < 1e-7
+        assert abs(bend(amplitude, frequency, y0, mass)) < 1e-4 * usual
+    np.testing.assert_allclose(found[0][0], cusp.amplitude, rtol=1e-9)
+    with pytest.raises(ValueError, match="`frequency` must be omitted for a cusp"):
+        ij.find_again(cusp, MODEL, frequency=4.0)
 
 
 @pytest.mark.slow

@@ -1,5 +1,8 @@
 """Where doublings turn from stable to unstable: SciPy's doubled orbits on both sides of the point."""
 
+from typing import NamedTuple
+
+import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,15 +23,23 @@ def oscillator(damping=0.1):
     return ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.LinearDamping(damping), ij.QuadraticStiffness(1.0)))
 
 
-def doublings(model):
-    return ij.period_doubling_curve(
-        model, amplitude_range=(0.2, 0.4), frequency_range=(1.88 * ONE, 2.06 * ONE), search=3, step=0.2
-    )
+def doublings(model, fit=None):
+    window = {"amplitude_range": (0.2, 0.4), "frequency_range": (1.88 * ONE, 2.06 * ONE)}
+    return ij.period_doubling_curve(model, **window, search=3, step=0.2, fit=fit)
+
+
+class Fitted(NamedTuple):
+    """What a band asks of a fit: a standard error of 1 % of the quadratic term."""
+
+    model: ij.Isolator
+    free: tuple[str, ...] = ("quadratic_stiffness.coefficient",)
+    covariance: np.ndarray = np.array([[1e-4]])
+    result: ij.RESULTS = ij.RESULTS.promote(diffrax.RESULTS.successful)
 
 
 @pytest.fixture(scope="module")
 def curve():
-    return doublings(oscillator())
+    return doublings(oscillator(), Fitted(oscillator()))
 
 
 def after(state, force, frequency, turns):
@@ -84,11 +95,34 @@ def test_doubled_orbits_of_scipy_change_sides_at_the_point(curve):
 
 @pytest.mark.slow
 def test_the_point_moves_with_the_damping_as_differences_say(curve):
-    def place(damping):
-        points = doublings(oscillator(damping)).special_points
+    def of(points):
         point = next(one for one in points if one.kind == "generalised_doubling")
         return jnp.stack([point.amplitude, point.frequency])
 
+    def place(damping):
+        return of(doublings(oscillator(damping)).special_points)
+
     exact = jax.jacfwd(place)(0.1)
-    difference = (np.asarray(place(0.1 + 1e-4)) - np.asarray(place(0.1 - 1e-4))) / 2e-4
-    np.testing.assert_allclose(exact, difference, rtol=1e-4)
+    high, low = np.asarray(place(0.1 + 1e-4)), np.asarray(place(0.1 - 1e-4))
+    np.testing.assert_allclose(exact, (high - low) / 2e-4, rtol=1e-4)
+    # Found again by itself it lies where its curve says.
+    known = next(one for one in curve.special_points if one.kind == "generalised_doubling")
+    again = of((ij.find_again(known, oscillator(0.1 + 1e-4)),))
+    np.testing.assert_allclose(again, high, atol=1e-3 * np.abs(high - low).min())
+
+
+@pytest.mark.slow
+def test_the_errors_of_the_forces_are_those_of_their_scaling(curve):
+    # Motion and force of x'' + c x' + x + q x^2 = F sin(w t) go with 1 / q at the same frequency.
+    point = next(one for one in curve.special_points if one.kind == "generalised_doubling")
+    error = {name: float(value) for name, value in point.band.standard_error.items()}
+    assert error["amplitude"] == pytest.approx(0.01 * float(point.amplitude), rel=1e-4)
+    assert error["frequency"] < 1e-6 * float(point.frequency)
+    assert " ± " in str(point)
+    middle = slice(2, -2)
+    force, low, high = (
+        np.asarray(one)[middle]
+        for one in (curve.amplitude, curve.band.lower["amplitude"], curve.band.upper["amplitude"])
+    )
+    assert np.all((low - force) * (high - force) < 0.0)
+    assert ij.plot.bifurcation_curve(curve).axes[0].patches

@@ -53,7 +53,9 @@ def test_points_of_the_curve_carry_a_pair_on_the_unit_circle_by_scipy(curve):
 def test_the_curve_ends_at_the_resonances_where_the_pair_meets_and_names_the_others_by_scipy(curve):
     cosines = {"resonance_1_1": 1.0, "resonance_1_4": 0.0, "resonance_1_3": -0.5, "resonance_1_2": -1.0}
     assert [point.kind for point in curve.special_points] == list(cosines)
-    for point in curve.special_points:
+    # The strongest is found again by itself too: by its cosine, where two multipliers meet.
+    again = ij.find_again(curve.special_points[2], van_der_pol(STRENGTH, SKEW))
+    for point in (*curve.special_points, again):
         assert ij.is_successful(point.result)
         y0 = np.asarray(point.y0)
         end, matrix, _ = scipy_map.after(law, 1.0, float(point.amplitude), float(point.frequency), y0, 1.0)

@@ -73,19 +73,26 @@ def draw_lens(ax: Axes, curve: FoldCurve, *, filled: bool) -> list[Any]:
         ax.fill(frequency, amplitude, facecolor=_INSIDE, edgecolor="none", zorder=0)
         handles.append(Patch(facecolor=_INSIDE, label="several orbits"))
     colour, width = (BEFORE, 1.4) if filled else (_OVER_MAP, 1.0)
-    if curve.band is not None:
-        ends = (curve.band.lower, curve.band.upper)
-        lower, upper = ((np.asarray(end["frequency"]), np.asarray(end["amplitude"])) for end in ends)
-        draw_band(ax, lower, upper, colour)
+    _draw_curve_band(ax, curve, colour)
     ax.plot(frequency, amplitude, color=colour, linewidth=width)
     handles.insert(0, Line2D([], [], color=colour, linewidth=width, label=MARKS["fold"].words))
     return handles + _special_handles(ax, curve)
 
 
+def _draw_curve_band(
+    ax: Axes, curve: FoldCurve | PeriodDoublingCurve | NeimarkSackerCurve, colour: str
+) -> None:
+    """Draw how far a curve may be off, where a fit was given."""
+    if curve.band is not None:
+        ends = (curve.band.lower, curve.band.upper)
+        lower, upper = ((np.asarray(end["frequency"]), np.asarray(end["amplitude"])) for end in ends)
+        draw_band(ax, lower, upper, colour)
+
+
 def _special_handles(ax: Axes, curve: FoldCurve | PeriodDoublingCurve | NeimarkSackerCurve) -> list[Any]:
     """Mark the special points of a curve, and give their entries in the legend."""
     points = [(point, float(point.frequency), float(point.amplitude)) for point in curve.special_points]
-    return [mark_handle(kind) for kind in draw_special_points(ax, points)]
+    return [mark_handle(kind) for kind in draw_special_points(ax, points, ("frequency", "amplitude"))]
 
 
 def plot_bifurcation_curve(
@@ -105,6 +112,7 @@ def plot_bifurcation_curve(
     torus = isinstance(curve, NeimarkSackerCurve)
     mark = MARKS["neimark_sacker" if torus else "period_doubling"]
     frequency, amplitude = np.asarray(curve.frequency), np.asarray(curve.amplitude)
+    _draw_curve_band(ax, curve, mark.colour)
     ax.plot(frequency, amplitude, color=mark.colour, linewidth=1.4)
     handles: list[Any] = [Line2D([], [], color=mark.colour, linewidth=1.4, label=mark.words)]
     handles += _special_handles(ax, curve)

@@ -59,8 +59,10 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
         unstable |= _any_unstable(y, stable)
         label = _beside_words(one) if any(one is other for other in beside) else _level(one, place)
         draw_curve(ax, x, MILLIMETRES * y, stable, colour, label if len(curves) > 1 else "")
+        _draw_branch_band(ax, one, place, colour)
     for one in (branch, *others, *beside):
-        kinds |= set(draw_special_points(ax, [_placed(one, point) for point in one.special_points]))
+        marked = [_placed(one, point) for point in one.special_points]
+        kinds |= set(draw_special_points(ax, marked, ("value", None)))
     ax.set_xlabel(parameter_label(branch.model, branch.parameter))
     ax.set_ylabel("response, half peak to peak [mm]")
     title = "Periodic response" + (f" at {_level(branch, 0)}" if len(curves) == 1 else "")
@@ -106,21 +108,14 @@ def plot_frequency_response(
         if number >= drives:
             words = _beside_words(one.branch) + (f", {words}" if drives > 1 else "")
         draw_curve(ax, x, y, stable, colour, words)
-        if one.band is not None and what == "displacement":
-            lower, upper = (
-                (
-                    _row(np.asarray(end["frequency"]), place),
-                    MILLIMETRES * _row(np.asarray(end["amplitude"]), place),
-                )
-                for end in (one.band.lower, one.band.upper)
-            )
-            draw_band(ax, lower, upper, colour)
+        if what == "displacement":
+            _draw_branch_band(ax, one.branch, place, colour)
         for point in one.special_points:
             if point.branch == place:
                 nearest = _nearest_point(one.branch, place, point)
                 height = MILLIMETRES * nearest[1] if what == "displacement" else y[nearest[0]]
                 places.append((point, float(point.frequency), float(height)))
-    kinds = draw_special_points(ax, places)
+    kinds = draw_special_points(ax, places, ("frequency", None))
     extra = _draw_backbone(ax, backbone) if backbone is not None and what == "displacement" else []
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel(
@@ -246,6 +241,16 @@ def _draw_backbone(ax: Axes, backbone: BackboneCurve) -> list[Line2D]:
         Line2D([], [], label="free vibration, no damping", **free),
         Line2D([], [], label="phase resonance", **forced),
     ]
+
+
+def _draw_branch_band(ax: Axes, branch: Branch, place: int, colour: str) -> None:
+    """Draw how far a branch may be off, where a fit was given."""
+    if branch.band is not None:
+        lower, upper = (
+            (_row(np.asarray(end["value"]), place), MILLIMETRES * _row(np.asarray(end["response"]), place))
+            for end in (branch.band.lower, branch.band.upper)
+        )
+        draw_band(ax, lower, upper, colour)
 
 
 def _motion_count(branch: Branch) -> int:

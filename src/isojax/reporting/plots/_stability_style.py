@@ -8,9 +8,9 @@ from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ...models import Isolator
-from ...stability import SpecialPoint
-from ..words import typeset_unit
+from ...models import Band, Isolator
+from ...stability import CodimensionTwoPoint, SpecialPoint
+from ..words import DRIVE_UNITS, typeset_unit
 from ._style import AFTER, BEFORE, LEVELS
 
 MILLIMETRES = 1e3
@@ -75,7 +75,7 @@ def drive_unit(excitation: str) -> str:
     Returns:
         Such as "N".
     """
-    return "N" if excitation == "force" else typeset_unit("m/s^2")
+    return typeset_unit(DRIVE_UNITS[excitation])
 
 
 def parameter_label(model: Isolator, parameter: str) -> str:
@@ -126,16 +126,46 @@ def draw_curve(
 
 
 def draw_special_points(
-    ax: Axes, points: Iterable[tuple[SpecialPoint | Any, float, float]]
+    ax: Axes,
+    points: Iterable[tuple[SpecialPoint | CodimensionTwoPoint | str, float, float]],
+    names: tuple[str | None, str | None] = (None, None),
 ) -> tuple[str, ...]:
-    """Mark bifurcations."""
+    """Mark bifurcations, with their intervals where they have some.
+
+    Args:
+        ax: the axes.
+        points: each, or its kind, with its place.
+        names: what of a point's band lies along each axis; None for nothing.
+
+    Returns:
+        The kinds that were drawn.
+    """
     found: dict[str, list[tuple[float, float]]] = {}
     for point, x, y in points:
         if np.isfinite(x) and np.isfinite(y):
             found.setdefault(point if isinstance(point, str) else point.kind, []).append((x, y))
+            if not isinstance(point, str) and point.band is not None:
+                _draw_interval(ax, (x, y), point.band, names)
     for kind, places in found.items():
         ax.plot(*np.transpose(places), zorder=5, **_form(mark_of(kind)))
     return tuple(found)
+
+
+def _draw_interval(
+    ax: Axes, place: tuple[float, float], band: Band, names: tuple[str | None, str | None]
+) -> None:
+    """Draw the interval of a special point along the axes that its band names."""
+    sides = [
+        None
+        if name is None
+        else [
+            [abs(own - float(band.lower[name]))],
+            [abs(float(band.upper[name]) - own)],
+        ]
+        for own, name in zip(place, names, strict=True)
+    ]
+    style = {"fmt": "none", "ecolor": "#222222", "elinewidth": 1.0, "capsize": 3.0, "zorder": 4}
+    ax.errorbar(*place, xerr=sides[0], yerr=sides[1], **style)
 
 
 def _form(mark: Mark) -> dict[str, Any]:

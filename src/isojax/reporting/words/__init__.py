@@ -5,6 +5,7 @@ plain dictionaries for result.json. Read `isojax/_quantities.py` (one number), `
 then the words on other laws that would do, on data health and on the remainder.
 """
 
+from ..._quantities import DRIVE_UNITS as DRIVE_UNITS
 from ..._quantities import INPUT_WORDS as INPUT_WORDS
 from ..._quantities import finite_or_none as finite_or_none
 from ..._quantities import typeset_goodness as typeset_goodness

@@ -5,8 +5,9 @@ period doublings and Neimark-Sacker bifurcations, nearest folds. Read _parameter
 curve is followed), _branch, _continuation with _tracing; then _other_branches (what the branch does not
 reach) with _orbit_search and _orbit_starts; _criticality (what vanishes where an orbit bifurcates),
 _locating and _special_points (what is found along a branch) with _bifurcation_system (its exact equations)
-and _extended_system (their solution); then _branch_switching, _codimension_two with _orbit_curve and
-_bifurcation_curves, and _nearest_folds.
+and _extended_system (their solution); then _branch_switching, _codimension_two with _orbit_curve,
+_bifurcation_curves and _curve_special_points, _branch_bands (errors of a fit) with _drive_words, and
+_nearest_folds.
 """
 
 from ._bifurcation_curves import CodimensionTwoPoint as CodimensionTwoPoint
@@ -26,8 +27,8 @@ from ._codimension_two import period_doubling_curve as period_doubling_curve
 from ._continuation import continue_branch as continue_branch
 from ._continuation import tracing_steps as tracing_steps
 from ._criticality import BifurcationKind as BifurcationKind
-from ._extended_system import PointGuess as PointGuess
+from ._curve_special_points import find_codimension_two_again as find_codimension_two_again
 from ._nearest_folds import NearestFolds as NearestFolds
 from ._nearest_folds import find_nearest_folds as find_nearest_folds
 from ._parameter_family import ParameterFamily as ParameterFamily
-from ._special_points import special_point as special_point
+from ._special_points import find_bifurcation_again as find_bifurcation_again

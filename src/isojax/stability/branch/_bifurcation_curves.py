@@ -6,9 +6,12 @@ from jaxtyping import Array, Bool, Complex, Float
 
 from ..._implicit import frozen
 from ..._results import RESULTS
-from ..._show import brief, number, shown
-from ...models import Band
-from ..orbit import pair_angle
+from ..._show import brief, shown
+from ...models import Band, Integrator
+from ..orbit import ShootingMethod, pair_angle
+from ._criticality import BifurcationKind
+from ._drive_words import drive_in_words
+from ._parameter_family import ParameterFamily
 
 WORDS = {
     "cusp": "cusp",
@@ -36,6 +39,15 @@ class CodimensionTwoPoint(eqx.Module):
             critical direction; those of amplitude and frequency hold.
         multipliers: over the period of the orbit, in falling modulus.
         result: whether it was found; if not, its numbers are NaN.
+        along: kind of the curve on which it lies.
+        periods: drive periods after which the orbit repeats.
+        symmetric: whether it was closed with the half-period map.
+        family: isolators and drives over the window.
+        integrator: steps and solver.
+        towards: unit vector along the curve, of the scaled state and the shares of the window.
+        scale: size of each state.
+        rise: change along it of the coefficient that vanishes there; NaN where none does.
+        band: of amplitude and frequency, where a fit was given.
 
     Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, sec. 9.5.
     """
@@ -46,11 +58,25 @@ class CodimensionTwoPoint(eqx.Module):
     y0: Float[Array, " state"]
     multipliers: Complex[Array, " multiplier"]
     result: RESULTS
+    along: BifurcationKind = eqx.field(static=True)
+    periods: int = eqx.field(static=True)
+    symmetric: bool = eqx.field(static=True)
+    family: ParameterFamily
+    integrator: Integrator
+    towards: Float[Array, " unknown"]
+    scale: Float[Array, " state"]
+    rise: Float[Array, ""]
+    band: Band | None = None
+
+    @property
+    def method(self) -> ShootingMethod:
+        """How the orbit is closed."""
+        return ShootingMethod(self.integrator, self.periods, self.symmetric)
 
     def _headline(self) -> str:
         if not np.isfinite(np.asarray(self.amplitude)):
             return f"{WORDS[self.kind]}, not found. {brief(self.result)}"
-        where = f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
+        where = drive_in_words(self.family.model, self.amplitude, self.frequency, self.band)
         return f"{WORDS[self.kind]} at {where}"
 
 
@@ -108,6 +134,7 @@ class PeriodDoublingCurve(eqx.Module):
         closed: whether the last point is the first.
         periods: drive periods after which the orbits that double repeat.
         result: see `FoldCurve`.
+        band: see `FoldCurve`.
     """
 
     amplitude: Float[Array, " point"]
@@ -118,6 +145,7 @@ class PeriodDoublingCurve(eqx.Module):
     closed: Bool[Array, ""]
     periods: int = eqx.field(static=True)
     result: RESULTS
+    band: Band | None = None
 
     def _headline(self) -> str:
         return _headline("period doublings", self)
@@ -141,6 +169,7 @@ class NeimarkSackerCurve(eqx.Module):
         symmetric: whether they were closed with the half-period map.
         result: whether the curve was followed until it closed, left the window or ended at a resonance 1:1 or
             1:2, every point to the tolerance of a single orbit; points that were not are NaN.
+        band: see `FoldCurve`.
     """
 
     amplitude: Float[Array, " point"]
@@ -152,6 +181,7 @@ class NeimarkSackerCurve(eqx.Module):
     periods: int = eqx.field(static=True)
     symmetric: bool = eqx.field(static=True)
     result: RESULTS
+    band: Band | None = None
 
     @property
     def angle(self) -> Float[Array, " point"]:

@@ -14,7 +14,7 @@ from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS
 from ..._show import Row, amount, brief, number, shown
 from ..._types import Scalar
-from ...models import Integrator, Isolator, State
+from ...models import Band, Integrator, Isolator, State
 from ..orbit import (
     PeriodicDrive,
     ShootingMethod,
@@ -24,6 +24,7 @@ from ..orbit import (
     trajectory,
     value_and_jacobian,
 )
+from ._drive_words import drive_in_words
 from ._parameter_family import ParameterFamily
 
 
@@ -111,6 +112,7 @@ class SpecialPoint(eqx.Module):
         family: isolators and drives along the parameter.
         integrator: steps and solver.
         symmetric: whether it was closed with the half-period map.
+        band: of value, amplitude and frequency, where a fit was given; zero wide for what is held fixed.
     """
 
     kind: str = eqx.field(static=True)
@@ -127,6 +129,7 @@ class SpecialPoint(eqx.Module):
     family: ParameterFamily
     integrator: Integrator
     symmetric: bool = eqx.field(static=True)
+    band: Band | None = None
 
     @property
     def method(self) -> ShootingMethod:
@@ -147,7 +150,7 @@ class SpecialPoint(eqx.Module):
         return angle if self.kind == "neimark_sacker" else jnp.nan * angle
 
     def _headline(self) -> str:
-        drive = f"{number(float(self.amplitude))} N or m/s², {number(float(self.frequency))} Hz"
+        drive = drive_in_words(self.family.model, self.amplitude, self.frequency, self.band)
         after = "" if self.periods == 1 else f", orbit over {self.periods} drive periods"
         torus = ""
         if self.kind == "neimark_sacker" and np.isfinite(np.asarray(self.value)):
@@ -156,7 +159,8 @@ class SpecialPoint(eqx.Module):
         return f"{self.kind.replace('_', ' ')} at {drive}{after}{torus}"
 
     def _rows(self) -> list[str]:
-        return ["value", "y0", "multipliers", "direction", "result"]
+        own = ["value", *(["band"] if self.band is not None else [])]
+        return [*own, "y0", "multipliers", "direction", "result"]
 
 
 @shown
@@ -210,6 +214,7 @@ class Branch(eqx.Module):
             orbits that are one motion counted from another drive period.
         searched: where they were sought; None if they were not.
         events: what was looked out for.
+        band: of value and response, across the branch, where a fit was given.
     """
 
     model: Isolator
@@ -227,6 +232,7 @@ class Branch(eqx.Module):
     others: tuple["Branch", ...] = ()
     searched: Searched | None = None
     events: tuple[BranchEvent, ...] = ()
+    band: Band | None = None
 
     @property
     def connection(self) -> Literal["none", "bifurcation", "unknown"]:
@@ -249,7 +255,7 @@ class Branch(eqx.Module):
         points = self.points
         own = ["model", "closed", "result"]
         span = [Row(name, brief(getattr(points, name))) for name in ("amplitude", "frequency", "response")]
-        return [*own, *span]
+        return [*own, *span, *(["band"] if self.band is not None else [])]
 
     def _lines(self) -> list[str]:
         lines = [f"  {point._headline()}" for point in self.special_points]

@@ -5,9 +5,11 @@ import jax.numpy as jnp
 from ..._implicit import frozen
 from ..._results import is_successful
 from ..._types import check_float64
+from ...models import EndsEstimated, Estimated, coefficient_errors
 from ..orbit import ShootingMethod, refuse_traced
 from ._arc_length import Departure, Stride
 from ._branch import Branch, SpecialPoint
+from ._branch_bands import with_bands
 from ._tracing import assemble, trace
 
 _ASIDE = 0.25
@@ -15,7 +17,12 @@ _ASIDE = 0.25
 
 
 def switch_branch(
-    branch: Branch, special_point: SpecialPoint, *, step: float | None = None, most: int = 1000
+    branch: Branch,
+    special_point: SpecialPoint,
+    *,
+    step: float | None = None,
+    most: int = 1000,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> Branch:
     """Follow the branch that leaves at a period doubling or at a broken symmetry.
 
@@ -28,19 +35,23 @@ def switch_branch(
         special_point: of kind "period_doubling" or "symmetry_breaking".
         step: largest step; that of `branch` if omitted.
         most: points to give up after.
+        fit: with whose errors the new branch and its special points are given bands; `branch.model` is its
+            model. None for no band.
 
     Returns:
         The new branch, over the range of the old one.
 
     Raises:
-        ValueError: if the point is of another kind, was not found, or lies on no branch of the batch, or
-            `step` or `most` is not positive.
+        ValueError: if the point is of another kind, was not found, or lies on no branch of the batch,
+            `step` or `most` is not positive, or `fit` failed, leaves a coefficient undetermined or is of
+            another model.
 
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Kuznetsov 2004, Elements of Applied
     Bifurcation Theory, sec. 10.2.
     """
     check_float64()
     refuse_traced(branch.model, special_point.value)
+    errors = None if fit is None else coefficient_errors(fit, branch.model)
     step = branch.longest if step is None else step
     for name, value in (("step", step), ("most", most)):
         if not value > 0:
@@ -70,4 +81,5 @@ def switch_branch(
     departure = Departure((origin + _ASIDE * step * tangent)[None], tangent[None], tangent[None])
     method = ShootingMethod(branch.integrator, periods, False)
     followed = trace(still, method, scale, departure, Stride(step, most))
-    return assemble(family, method, scale, followed, batched=False, step=step, events=branch.events)
+    found = assemble(family, method, scale, followed, batched=False, step=step, events=branch.events)
+    return found if errors is None else with_bands(found, errors)

@@ -1,5 +1,6 @@
 """Curves of bifurcations over the plane of the drive's amplitude and frequency."""
 
+import dataclasses
 import math
 from typing import NamedTuple
 
@@ -12,6 +13,8 @@ from ..._implicit import frozen
 from ..._results import is_successful
 from ..._types import check_float64
 from ...models import (
+    Band,
+    CoefficientErrors,
     EndsEstimated,
     Estimated,
     Integrator,
@@ -25,6 +28,7 @@ from ..orbit import ShootingMethod, is_odd, refuse_traced
 from ._arc_length import Stride
 from ._bifurcation_curves import CodimensionTwoPoint, FoldCurve, NeimarkSackerCurve, PeriodDoublingCurve
 from ._branch import SpecialPoint
+from ._branch_bands import with_bands_at
 from ._branch_switching import switch_branch
 from ._continuation import continue_branch, follow_branches, swept_family, tracing_steps
 from ._criticality import BifurcationKind
@@ -63,14 +67,16 @@ def fold_curve(
         step: largest step, over the size of the motion and the window.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
-        fit: with whose errors the curve is given a band; `model` is its model. None for no band.
+        fit: with whose errors the curve and its special points are given bands; `model` is its model. None
+            for no band.
 
     Returns:
         The curve: closed, or from edge to edge of the window.
 
     Raises:
         ValueError: if a range is not positive and ascending, `start` is no fold that was found, none was met
-            inside the window, or `search`, `step` or `most` is not positive.
+            inside the window, `search`, `step` or `most` is not positive, or `fit` failed, leaves a
+            coefficient undetermined or is of another model.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, secs. 9.5 (cusp) and 10.3; Govaerts 2000,
@@ -87,16 +93,8 @@ def fold_curve(
     search_for = _Search("fold", (amplitude_range, frequency_range), search, Stride(step, most))
     curve = _curve(model, search_for, start, integrator)
     followed, points, special = _followed(curve)
-    method, closed = curve.method, jnp.array(followed.closed)
-
-    def across(isolator: Isolator) -> Array:
-        moved = _curve(isolator, search_for, curve.start, integrator)
-        own = moved.numbers(moved.polished(followed))
-        return jnp.stack([own.frequency, own.amplitude])
-
-    names = ("frequency", "amplitude")
-    band = None if errors is None else find_band(errors, names, across, across=True)
-    result = followed.result(points.found)
+    method, closed, result = curve.method, jnp.array(followed.closed), followed.result(points.found)
+    special, band = _bands(curve, followed, special, errors)
     return FoldCurve(*points[:4], special, closed, method.periods, method.half, result, band)
 
 
@@ -110,6 +108,7 @@ def period_doubling_curve(
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> PeriodDoublingCurve:
     """Follow the period doublings over the plane of the drive's amplitude and frequency.
 
@@ -126,10 +125,13 @@ def period_doubling_curve(
     Source: as of `fold_curve`; Swift & Wiesenfeld 1984, Phys. Rev. Lett. 52:705.
     """
     search_for = _Search("period_doubling", (amplitude_range, frequency_range), search, Stride(step, most))
-    curve = _curve(as_isolator(model), search_for, start, integrator)
+    model = as_isolator(model)
+    errors = None if fit is None else coefficient_errors(fit, model)
+    curve = _curve(model, search_for, start, integrator)
     followed, points, special = _followed(curve)
     closed, result = jnp.array(followed.closed), followed.result(points.found)
-    return PeriodDoublingCurve(*points[:4], special, closed, curve.method.periods, result)
+    special, band = _bands(curve, followed, special, errors)
+    return PeriodDoublingCurve(*points[:4], special, closed, curve.method.periods, result, band)
 
 
 def neimark_sacker_curve(
@@ -142,6 +144,7 @@ def neimark_sacker_curve(
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
+    fit: Estimated | EndsEstimated | None = None,
 ) -> NeimarkSackerCurve:
     """Follow the Neimark-Sacker bifurcations over the plane of the drive's amplitude and frequency.
 
@@ -170,7 +173,9 @@ def neimark_sacker_curve(
         (True, False)
     """
     search_for = _Search("neimark_sacker", (amplitude_range, frequency_range), search, Stride(step, most))
-    curve = _curve(as_isolator(model), search_for, start, integrator)
+    model = as_isolator(model)
+    errors = None if fit is None else coefficient_errors(fit, model)
+    curve = _curve(model, search_for, start, integrator)
     followed = curve.follow()
     followed, found = _between_resonances(followed, curve.polished(followed))
     special = curve.special_points(followed, found)
@@ -181,7 +186,9 @@ def neimark_sacker_curve(
     points = curve.numbers(jax.tree.map(lambda own: own[inside], found))
     closed, result = jnp.array(followed.closed), followed.result(points.found)
     method = curve.method
-    return NeimarkSackerCurve(*points[:4], special, closed, method.periods, method.half, result)
+    on = followed._replace(unknowns=followed.unknowns[inside], tangents=followed.tangents[inside])
+    special, band = _bands(curve, on, special, errors)
+    return NeimarkSackerCurve(*points[:4], special, closed, method.periods, method.half, result, band)
 
 
 def _followed(curve: OrbitCurve) -> tuple[Whole, CurvePoints, tuple[CodimensionTwoPoint, ...]]:
@@ -189,6 +196,25 @@ def _followed(curve: OrbitCurve) -> tuple[Whole, CurvePoints, tuple[CodimensionT
     followed = curve.follow()
     found = curve.polished(followed)
     return followed, curve.numbers(found), curve.special_points(followed, found)
+
+
+def _bands(
+    curve: OrbitCurve,
+    followed: Whole,
+    special: tuple[CodimensionTwoPoint, ...],
+    errors: CoefficientErrors | None,
+) -> tuple[tuple[CodimensionTwoPoint, ...], Band | None]:
+    """Give the special points with their bands, and the band of the curve, where there are errors."""
+    if errors is None:
+        return special, None
+
+    def across(isolator: Isolator) -> Array:
+        moved = dataclasses.replace(curve, family=dataclasses.replace(curve.family, model=isolator))
+        own = moved.numbers(moved.polished(followed))
+        return jnp.stack([own.frequency, own.amplitude])
+
+    band = find_band(errors, ("frequency", "amplitude"), across, across=True)
+    return with_bands_at(special, errors), band
 
 
 _ENDS = ("resonance_1_1", "resonance_1_2")

@@ -14,10 +14,19 @@ from ..._implicit import frozen
 from ..._parameters import list_parameters
 from ..._quick_jit import quick_jit
 from ..._types import Lanes, Scalar, as_float64, check_float64
-from ...models import Integrator, Isolator, Modelled, as_isolator
+from ...models import (
+    EndsEstimated,
+    Estimated,
+    Integrator,
+    Isolator,
+    Modelled,
+    as_isolator,
+    coefficient_errors,
+)
 from ..orbit import ShootingMethod, integrator_for, is_odd, refuse_traced, response_start
 from ._arc_length import Departure, Followed, Stride
 from ._branch import Branch, BranchEvent
+from ._branch_bands import with_bands
 from ._criticality import BifurcationKind
 from ._other_branches import BranchSearch, find_other_branches
 from ._parameter_family import ParameterFamily
@@ -56,6 +65,7 @@ def continue_branch(
     most: int = 1000,
     integrator: Integrator | None = None,
     events: Sequence[BranchEvent] = (),
+    fit: Estimated | EndsEstimated | None = None,
 ) -> Branch:
     """Follow a branch of periodic orbits along the drive's amplitude, its frequency or any coefficient.
 
@@ -88,6 +98,8 @@ def continue_branch(
         integrator: solver and steps; 256 a period if omitted.
         events: numbers of the orbits whose zeros are to be located too; they are among the special points,
             by their names. Passing the same events again uses what was compiled for them.
+        fit: with whose errors branches and special points are given bands; `model` is its model. None for
+            no band.
 
     Returns:
         The branch. Where it ends early `result` says so, and the points found so far stand.
@@ -96,7 +108,8 @@ def continue_branch(
         ValueError: if `parameter` is none of the model's, the drive is incomplete or said twice, the range is
             empty or not finite, a frequency is not positive, `start_state` has the wrong length, `symmetric`
             is asked of a model that is not odd, or `step`, `most`, `periods` or one of `other_periods` is not
-            positive, or two events have one name or that of a bifurcation.
+            positive, two events have one name or that of a bifurcation, or `fit` failed, leaves a
+            coefficient undetermined or is of another model.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Keller 1977, Applications of Bifurcation Theory, p. 359; Nayfeh & Balachandran 1995, sec. 6.1.
@@ -110,6 +123,7 @@ def continue_branch(
     model = as_isolator(model)
     check_float64()
     refuse_traced(model, amplitude, frequency, start, stop)
+    errors = None if fit is None else coefficient_errors(fit, model)
     integrator = tracing_steps(model, integrator)
     family, batched = swept_family(model, parameter, start, stop, amplitude, frequency)
     states = 2 + model.internal_states
@@ -138,11 +152,11 @@ def continue_branch(
     method, stride = ShootingMethod(integrator, periods, half), Stride(step, most)
     scale, followed = follow_branches(frozen(family), method, frozen(begin), stride)
     branch = assemble(family, method, scale, followed, batched, step, tuple(events))
-    if not other_periods:
-        return branch
-    search = BranchSearch(tuple(other_periods), stride, tuple(events))
-    found, searched = find_other_branches(family, method, scale, followed, search)
-    return dataclasses.replace(branch, others=found, searched=searched)
+    if other_periods:
+        search = BranchSearch(tuple(other_periods), stride, tuple(events))
+        found, searched = find_other_branches(family, method, scale, followed, search)
+        branch = dataclasses.replace(branch, others=found, searched=searched)
+    return branch if errors is None else with_bands(branch, errors)
 
 
 def follow_branches(

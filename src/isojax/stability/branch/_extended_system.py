@@ -33,8 +33,18 @@ MOST_PLACES = 1000
 LOCATED_WITHIN = 0.02
 """Distance from a start located on a branch, over the range of a parameter, up to which a point counts."""
 
+MOVED_WITHIN = 1.0
+"""The same for a known point that is found again: it moves with the model."""
+
 _DIFFERENCE = 1e-4
 """Shift of an unknown for second derivatives: their error is then a hundred-millionth."""
+
+_ZERO_WITHIN = 1e-6
+"""Scaled distance along a curve to which a coefficient's zero is found. At a cusp the parameters do not move
+along it to first order."""
+
+_SECANT_FROM, _SECANT_WITHIN = 1e-5, 4.0
+"""Step of the secant method from which it says how the coefficient changes, and by which factor at most."""
 
 _TRIALS, _MOST_STEPS = 2, 22
 """Motions by which the steps are chosen, and evaluations at most, those included."""
@@ -97,12 +107,16 @@ class PointGuess(NamedTuple):
         plane: for two parameters, the normal of a plane across the curve over (scaled state, shares), and the
             scale of its states.
         cosine: for two parameters, in place of the plane, that of the angle of the pair of multipliers.
+        rise: for two parameters, how the coefficient of a fold or a doubling changes along the normal of the
+            plane: given, the coefficient vanishes in place of the distance from the plane. That of a fold
+            counts in the critical direction on the side of the normal.
     """
 
     state: Float[Array, " state"]
     shares: Float[Array, " parameter"]
     plane: tuple[Float[Array, " unknown"], Float[Array, " state"]] | None = None
     cosine: Float[Array, ""] | None = None
+    rise: Float[Array, ""] | None = None
 
 
 def _start(
@@ -180,15 +194,21 @@ def _expand(system: BifurcationSystem, family: ParameterFamily, unknown: Array, 
     return _Expansion(moved, slope, right, left, matrix, curved)
 
 
-def _newton(system: BifurcationSystem, beside: _Expansion, unknown: Array) -> tuple[Array, Array]:
-    """Give the residual at a point, and the step of Newton's method from it."""
+def _newton(
+    system: BifurcationSystem, beside: _Expansion, unknown: Array, missed: Array | None
+) -> tuple[Array, Array]:
+    """Give the residual at a point, and the step of Newton's method from it.
+
+    `missed` is how far along the normal the coefficient vanishes, in place of the distance from the plane.
+    """
     states = system.states
     gap = beside.moved.at[:states].add(-unknown[:states])
     by_matrix = jax.jacfwd(system.tests)(beside.matrix)
     rows = jnp.einsum("tsk,sku->tu", by_matrix, beside.matrix_slope)
     closing = beside.slope.at[:states, :states].add(-jnp.eye(states))
     plane = jax.jacfwd(system.plane)(unknown)
-    residual = jnp.concatenate([gap, system.tests(beside.matrix), system.plane(unknown)])
+    last = system.plane(unknown) if missed is None else missed[None]
+    residual = jnp.concatenate([gap, system.tests(beside.matrix), last])
     jacobian = jnp.concatenate([closing, rows, plane])
     return residual, jnp.linalg.solve(jacobian, residual)
 
@@ -206,6 +226,8 @@ class _Search(NamedTuple):
     mismatch: Float[Array, ""]
     matrix: Float[Array, "state state"]
     bend: Float[Array, ""]
+    rise: Float[Array, ""]
+    ahead: Float[Array, ""]
 
 
 def polish(
@@ -224,8 +246,9 @@ def polish(
         `P(z, p) = z`, `T(D P) = 0`
 
     with the polynomial T of `criticality`. In two parameters a plane across the curve closes the equations,
-    or the angle of a pair. One loop holds the motion to second order, once: two motions choose the steps,
-    Newton's method follows, and the last evaluation reads the solution.
+    or the angle of a pair, or a coefficient that vanishes, by the secant method along the curve. One loop
+    holds the motion to second order, once: two motions choose the steps, Newton's method follows, and the
+    last evaluation reads the solution.
 
     Args:
         family: isolators and drives.
@@ -244,13 +267,22 @@ def polish(
     """
     family, guess = frozen((family, guess))
     system, begin = _start(family, method, kind, guess, places)
-    states, whole, goal = system.states, system.whole, method.integrator.orbit_tolerance
+    states, whole = system.states, system.whole
+    to_zero = guess.rise is not None
+    # A step moves the coefficient in all directions: the last must be shorter than what is asked for.
+    goal = 0.1 * _ZERO_WITHIN if to_zero else method.integrator.orbit_tolerance
     least, most = system.split.steps, method.periods * MOST_STEPS_A_PERIOD
 
     def body(search: _Search) -> _Search:
         own = eqx.tree_at(lambda one: one.split.steps, system, search.steps)
         beside = _expand(own, family, search.unknown, search.right)
-        residual, step = _newton(own, beside, search.unknown)
+        bend, rise, missed, ahead = _bend(own, beside), search.rise, None, zero
+        if to_zero:
+            bend = _coefficient(own, family, beside, search.unknown, bend)
+            rise = _secant(search, bend)
+            missed = bend / rise
+            ahead = -missed
+        residual, step = _newton(own, beside, search.unknown, missed)
         trying = search.evaluations < _TRIALS
         trials = jnp.stack([search.trial, beside.matrix])
         wanted = steps_wanted(least, trials, tolerance, doublings=0, most=most)
@@ -268,9 +300,11 @@ def polish(
             search.evaluations + 1,
             last,
             search.last | (~trying & ~sane),
-            jnp.max(jnp.abs(residual)),
+            jnp.max(jnp.abs(residual[:-1] if to_zero else residual)),
             beside.matrix,
-            _bend(own, beside),
+            bend,
+            rise,
+            jnp.where(moves, ahead, 0.0),
         )
 
     # All depend on the guess, so that JAX sees at once over what a batch runs: it traces the loop anew for
@@ -278,7 +312,8 @@ def polish(
     zero = 0.0 * jnp.sum(guess.shares)
     square, none, no = zero * jnp.ones((states, states)), zero.astype(int), zero > 1.0
     right = jnp.concatenate([jnp.eye(states), jnp.zeros((whole - states, states))]) + zero
-    start = _Search(begin, right, least + none, square, none, no, no, zero, square, zero)
+    rise = zero if guess.rise is None else guess.rise + zero
+    start = _Search(begin, right, least + none, square, none, no, no, zero, square, zero, rise, zero)
     end = jax.lax.while_loop(lambda search: ~search.done, body, start)
     system = eqx.tree_at(lambda one: one.split.steps, system, end.steps)
     shares, state, matrix, direction = system.read(end.unknown, end.matrix)
@@ -286,7 +321,9 @@ def polish(
     near = jnp.max(jnp.abs(shares - guess.shares)) < within
     good = jnp.isfinite(end.mismatch) & (end.mismatch < method.integrator.residual_tolerance) & near
     split, cosine, bend = system.split, pair_cosine(end.matrix), end.bend
-    if kind == "period_doubling" and system.across.size:
+    if to_zero:
+        good &= jnp.abs(bend) < _ZERO_WITHIN * jnp.abs(end.rise)
+    elif kind == "period_doubling" and system.across.size:
         bend = system.cubic(family, end.unknown, end.matrix)
     return Polished(
         end.unknown,
@@ -312,6 +349,24 @@ def _bend(system: BifurcationSystem, beside: _Expansion) -> Float[Array, ""]:
     lifted = beside.right @ right
     twice = jnp.einsum("kcu,k,u->c", beside.curved[..., : system.whole], right, lifted)
     return jnp.dot(left @ beside.left, twice) / jnp.dot(left, right)
+
+
+def _coefficient(
+    system: BifurcationSystem, family: ParameterFamily, beside: _Expansion, unknown: Array, bend: Array
+) -> Float[Array, ""]:
+    """Give the coefficient that vanishes at a special point; of a fold with the sign of `PointGuess.rise`."""
+    if system.kind == "period_doubling":
+        return system.cubic(family, unknown, beside.matrix)
+    right = null_direction(beside.matrix - jnp.eye(system.states))
+    return bend * jnp.where(jnp.dot(right, system.across[: system.states]) < 0.0, -1.0, 1.0)
+
+
+def _secant(search: _Search, bend: Array) -> Float[Array, ""]:
+    """Give how the coefficient changes along the normal, by the last step where that says it."""
+    moved = jnp.abs(search.ahead) > _SECANT_FROM
+    rise = (bend - search.bend) / jnp.where(moved, search.ahead, 1.0)
+    share = rise / search.rise
+    return jnp.where(moved & (share > 1.0 / _SECANT_WITHIN) & (share < _SECANT_WITHIN), rise, search.rise)
 
 
 polish_jitted = quick_jit(polish)

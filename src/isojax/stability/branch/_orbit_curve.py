@@ -16,6 +16,7 @@ from ..orbit import ShootingMethod, event_places, multipliers, state_scale, traj
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._bifurcation_curves import CodimensionTwoPoint
 from ._criticality import BifurcationKind, criticality
+from ._curve_special_points import TESTS, codimension_two_point
 from ._extended_system import MOST_PLACES, PointGuess, Polished, polish
 from ._parameter_family import ParameterFamily
 
@@ -30,19 +31,6 @@ _SECANTS = 4
 
 _ZERO_TO = 1e-6
 """Value of a test function, over its change along the piece of the curve, up to which its zero is found."""
-
-TESTS: dict[BifurcationKind, dict[str, float | None]] = {
-    "fold": {"cusp": None, "resonance_1_1": 1.0},
-    "period_doubling": {"generalised_doubling": None, "resonance_1_2": -1.0},
-    "neimark_sacker": {
-        "resonance_1_1": 1.0,
-        "resonance_1_2": -1.0,
-        "resonance_1_3": -0.5,
-        "resonance_1_4": 0.0,
-    },
-}
-"""Special points of each kind of curve, with the cosine of the critical pair's angle there; None where the
-quadratic coefficient of a fold, or the cubic one of a doubling, vanishes."""
 
 
 class CurveStart(NamedTuple):
@@ -206,20 +194,28 @@ class OrbitCurve(eqx.Module):
             if not np.isfinite(value) or abs(value) <= 1e-3 * _ZERO_TO * size:
                 break
         good = bool(change.size) and bool(abs(value) <= _ZERO_TO * size)
-        return self._codimension_two(name, found, good)
-
-    def _codimension_two(self, name: str, found: Polished, good: bool) -> CodimensionTwoPoint:
-        # Moves with the model as the two conditions say, and not across the curve.
-        found = found._replace(system=found.system.at_special_point(TESTS[self.kind][name]))
-        found = found._replace(found=jnp.asarray(found.found) & good)
-        points = self.numbers(jax.tree.map(lambda own: jnp.asarray(own)[None], found))
-        amplitude, frequency, y0, roots, known = jax.tree.map(lambda own: own[0], points)
-        result = RESULTS.where(known, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
-        return CodimensionTwoPoint(name, amplitude, frequency, y0, roots, result)
+        along, rise = _rise(section, values, at, towards if self.kind == "fold" else None)
+        found = jax.tree.map(jnp.asarray, found._replace(found=found.found & good))
+        return codimension_two_point(name, self.family, self.method, self.kind, found, along, rise)
 
     def numbers(self, found: Polished) -> CurvePoints:
         """Give what is known of points, with their derivatives by the model."""
         return _numbers(self, found)
+
+
+def _rise(
+    section: Polished, values: np.ndarray, at: int, critical: np.ndarray | None
+) -> tuple[Float[Array, " unknown"], Float[Array, ""]]:
+    """Give the unit vector along a curve, and how a coefficient changes along it, between two points of it.
+
+    `critical` is the direction in which the coefficient of a fold counts: its sign is that of the vector.
+    """
+    pair = slice(at, at + 2)
+    state, shares = (np.diff(own[pair], axis=0)[0] for own in (section.state, section.shares))
+    step = np.concatenate([state / section.scale[at], shares])
+    size = np.linalg.norm(step)
+    turned = 1.0 if critical is None else np.where(critical @ step[: critical.size] < 0.0, -1.0, 1.0)
+    return jnp.asarray(step / size), jnp.asarray(turned * (values[at + 1] - values[at]) / size)
 
 
 @quick_jit

@@ -15,6 +15,7 @@ from ._criticality import BifurcationKind
 from ._extended_system import (
     LOCATED_WITHIN,
     MOST_PLACES,
+    MOVED_WITHIN,
     PointGuess,
     Polished,
     polish_jitted,
@@ -101,6 +102,41 @@ def special_point(
         places *= 2
         found = polish_jitted(still, method, kind, guess, places, within=reach)
     return _found_point(family, method, kind, branch, found)
+
+
+def find_bifurcation_again(
+    point: SpecialPoint, kind: BifurcationKind, family: ParameterFamily
+) -> SpecialPoint:
+    """Find a bifurcation of a branch again among other isolators and drives.
+
+    Args:
+        point: the known point; no number of it is traced.
+        kind: which bifurcation it is.
+        family: isolators and drives along the same parameter over the same range.
+
+    Returns:
+        The point there.
+    """
+    guess = PointGuess(point.y0, point.family.shares(point.value[None]))
+    return special_point(family, point.method, kind, point.branch, guess, MOVED_WITHIN)
+
+
+def find_event_again(
+    point: SpecialPoint, event: BranchEvent, family: ParameterFamily, scale: Float[Array, " state"]
+) -> SpecialPoint:
+    """Give an event of a branch with its derivatives by other isolators and drives.
+
+    Args:
+        point: the known point; no number of it is traced.
+        event: which event it is.
+        family: the same isolators and drives; their derivatives reach the point.
+        scale: size of each state.
+
+    Returns:
+        The point.
+    """
+    guess = PointGuess(point.y0, point.family.shares(point.value[None]))
+    return _event_point(family, point.method, event, point.branch, scale, guess)
 
 
 @quick_jit

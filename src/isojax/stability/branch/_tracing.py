@@ -46,9 +46,26 @@ def trace(
 
 
 @quick_jit
-def _branch_points(
-    family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
+def branch_points(
+    family: ParameterFamily,
+    method: ShootingMethod,
+    scale: Float[Array, "branch state"],
+    unknowns: Float[Array, "branch point unknown"],
+    tangents: Float[Array, "branch point unknown"],
 ) -> BranchPoints:
+    """Give what is known of the points of a batch of branches.
+
+    Args:
+        family: isolators and drives, drive with a leading axis.
+        method: how the orbits are closed.
+        scale: size of each state.
+        unknowns: points: scaled states and shares.
+        tangents: along the branches.
+
+    Returns:
+        The points. Their derivatives by the model are those of the branches moving across themselves.
+    """
+
     def lane(
         amplitude: Array, frequency: Array, scale: Array, unknown: Array, tangent: Array
     ) -> BranchPoints:
@@ -89,7 +106,7 @@ def assemble(
     counts = np.asarray(followed.found)
     room = room_for(counts, followed.unknowns.shape[1])
     unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
-    points = _branch_points(family, method, scale, unknowns, tangents)
+    points = branch_points(family, method, scale, unknowns, tangents)
     curves = BranchCurves(scale, unknowns, tangents, counts)
     special = find_special_points(family, method, curves, events, points)
     longest = int(counts.max())

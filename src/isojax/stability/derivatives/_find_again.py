@@ -9,15 +9,21 @@ from jax.core import Tracer
 from ..._types import Scalar, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Isolator, Modelled, as_isolator
-from ..branch import BifurcationKind, ParameterFamily, PointGuess, SpecialPoint, special_point
+from ..branch import (
+    BifurcationKind,
+    CodimensionTwoPoint,
+    ParameterFamily,
+    SpecialPoint,
+    find_bifurcation_again,
+    find_codimension_two_again,
+)
 from ..map import StabilityMap, found_again
 from ..orbit import Orbit, find_periodic_orbit
 from ..response import Resonance, Transmissibility, resonance_near, transmissibility_again
 
-_MOVED_WITHIN = 1.0
-"""Share of the range of its branch by which a bifurcation may move: it does so with the model."""
-
-Answer = TypeVar("Answer", Orbit, SpecialPoint, StabilityMap, Resonance, Transmissibility)
+Answer = TypeVar(
+    "Answer", Orbit, SpecialPoint, CodimensionTwoPoint, StabilityMap, Resonance, Transmissibility
+)
 
 
 def find_again(
@@ -27,16 +33,16 @@ def find_again(
     amplitude: Scalar | float | None = None,
     frequency: Scalar | float | None = None,
 ) -> Answer:
-    """Find a known orbit, bifurcation, resonance, transmissibility or map again for a model close by.
+    """Find a known orbit, bifurcation, cusp, resonance, transmissibility or map again for a model close by.
 
     From the known one by Newton's method, so that the shape of the answer is known beforehand: `jax.jit`,
     `jax.vmap`, `jax.jacfwd` and `jax.grad` go through, also where those that found it in the first place
     refuse. What vanishes on the way, as an orbit does past its fold, is NaN.
 
     Args:
-        answer: an orbit; a special point of a branch, such as a fold; a resonance; a transmissibility; or a
-            map, of which each cell is found again. Its numbers must be known: find it outside what JAX
-            transforms.
+        answer: an orbit; a special point of a branch, such as a fold, or of a curve of bifurcations, such as
+            a cusp; a resonance; a transmissibility; or a map, of which each cell is found again. Its numbers
+            must be known: find it outside what JAX transforms.
         model: the isolator, with the same elements; its numbers may be traced.
         amplitude: of the drive, in place of that of the answer [N, or m/s^2 for base excitation].
         frequency: of the drive, in place of that of the answer [Hz].
@@ -65,14 +71,15 @@ def find_again(
     finders: dict[type, Any] = {
         Orbit: _orbit,
         SpecialPoint: _special_point,
+        CodimensionTwoPoint: _codimension_two,
         StabilityMap: _map,
         Resonance: _resonance,
         Transmissibility: _transmissibility,
     }
     if type(answer) not in finders:
         raise ValueError(
-            "Argument `answer` must be an orbit, a special point, a resonance, a transmissibility or a map, "
-            f"but is of type {type(answer).__name__}."
+            "Argument `answer` must be an orbit, a special point of a branch or of a curve of bifurcations, "
+            f"a resonance, a transmissibility or a map, but is of type {type(answer).__name__}."
         )
     if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(answer)):
         raise ValueError(
@@ -116,8 +123,18 @@ def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequen
         known.frequency if frequency is None else frequency,
     )
     family = ParameterFamily(model, *fixed, known.start, known.stop, known.names)
-    guess = PointGuess(point.y0, known.shares(point.value[None]))
-    return special_point(family, point.method, kind, point.branch, guess, _MOVED_WITHIN)
+    return find_bifurcation_again(point, kind, family)
+
+
+def _codimension_two(
+    point: CodimensionTwoPoint, model: Isolator, amplitude: Any, frequency: Any
+) -> CodimensionTwoPoint:
+    for name, value in (("amplitude", amplitude), ("frequency", frequency)):
+        if value is not None:
+            raise ValueError(
+                f"Argument `{name}` must be omitted for a {point.kind}, which solves for it, but is {value}."
+            )
+    return find_codimension_two_again(point, model)
 
 
 def _map(smap: StabilityMap, model: Isolator, amplitude: Any, frequency: Any) -> StabilityMap:

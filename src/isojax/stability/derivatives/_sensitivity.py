@@ -11,7 +11,7 @@ from ..._parameters import list_parameters
 from ..._show import Row, brief, shown
 from ..._types import check_float64
 from ...models import Isolator
-from ..branch import SpecialPoint
+from ..branch import CodimensionTwoPoint, SpecialPoint
 from ..map import StabilityMap
 from ..orbit import Orbit
 from ..response import Resonance
@@ -99,6 +99,7 @@ def sensitivity(
     subject: Orbit
     | StabilityMap
     | SpecialPoint
+    | CodimensionTwoPoint
     | Resonance
     | Callable[[Isolator], Mapping[str, Array] | Array],
     model: Isolator | None = None,
@@ -112,11 +113,12 @@ def sensitivity(
     By the implicit function theorem at the orbit, not through the iterations that found it.
 
     Args:
-        subject: an orbit (`y0`, `amplitude`, `multipliers`, `spectral_radius`); a map (`response`,
-            `multipliers`, `spectral_radius` in every cell); a special point of a branch, such as a fold
-            (`value` of the branch's parameter, `y0`); a resonance (`amplitude`, `frequency`,
-            `spectral_radius`); or a function of a model that gives one array or
-            several by name, such as `lambda m: ij.transmissibility(m, ...).force`.
+        subject: an orbit (`y0`, `amplitude`, and `multipliers` and `spectral_radius` of its `floquet`); a map
+            (`response`, `multipliers`, `spectral_radius` in every cell); a special point of a branch, such as
+            a fold (`value` of the branch's parameter, `y0`), or of a curve of bifurcations, such as a cusp
+            (`amplitude`, `frequency`); a resonance (`amplitude`, `frequency`, and `spectral_radius` of its
+            orbit); or a function of a model that gives one array or several by name, such as
+            `lambda m: ij.transmissibility(m, ...).force`.
         model: the isolator, where `subject` is a function.
         parameters: names of the parameters to differentiate by; all of the model and, but for a
             function, the drive, if omitted; at a special point without the branch's own parameter.

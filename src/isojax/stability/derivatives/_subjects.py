@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from ...models import Isolator
-from ..branch import SpecialPoint
+from ..branch import CodimensionTwoPoint, SpecialPoint
 from ..map import StabilityMap, found_again
 from ..orbit import Orbit
 from ..response import Resonance
@@ -52,6 +52,11 @@ def _of_point(point: SpecialPoint) -> Subject:
     return _of_answer(point, family.model, drive, solved)
 
 
+def _of_codimension_two(point: CodimensionTwoPoint) -> Subject:
+    drive = (jnp.asarray(point.amplitude), jnp.asarray(point.frequency))
+    return _of_answer(point, point.family.model, drive, DRIVE)
+
+
 def _of_answer(answer: Any, model: Isolator, drive: tuple[Array, Array], solved: tuple[str, ...]) -> Subject:
     def slopes(names: tuple[str, ...], at: Array) -> Derivatives:
         def quantities(numbers: Array) -> dict[str, Array]:
@@ -93,6 +98,10 @@ _QUANTITIES: dict[type, dict[str, Callable[[Any], Array]]] = {
         "spectral_radius": lambda smap: smap.spectral_radius,
     },
     SpecialPoint: {"value": lambda point: point.value, "y0": lambda point: point.y0},
+    CodimensionTwoPoint: {
+        "amplitude": lambda point: point.amplitude,
+        "frequency": lambda point: point.frequency,
+    },
     Resonance: {
         "amplitude": lambda resonance: resonance.amplitude,
         "frequency": lambda resonance: resonance.frequency,
@@ -117,6 +126,7 @@ _ADAPTERS: dict[type, Callable[..., Subject]] = {
     Orbit: _of_orbit,
     StabilityMap: _of_map,
     SpecialPoint: _of_point,
+    CodimensionTwoPoint: _of_codimension_two,
     Resonance: _of_resonance,
 }
 """How each result of the package is seen as a subject; all else is a function of a model."""

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
+from ..._quantities import DRIVE_UNITS
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import amount, number, shown
@@ -23,8 +24,6 @@ from ...models import (
     Modelled,
     State,
     as_isolator,
-    coefficient_errors,
-    find_band,
 )
 from ..branch import Branch, SpecialPoint, continue_branch
 from ..orbit import Sine, recorded_sine, trajectory
@@ -40,7 +39,6 @@ class FrequencyResponse(eqx.Module):
         branch: the orbits.
         receptance: complex amplitude of the fundamental of the displacement over that of the recorded drive
             [m/N, or s^2 for base excitation].
-        band: of frequency and amplitude, across the curve, where a fit was given.
         others: responses that the curve does not reach within the band of frequencies, each a curve of its
             own: isolas, subharmonics, and what leaves the curve at a bifurcation; `branch.searched` says
             where they were sought.
@@ -48,7 +46,6 @@ class FrequencyResponse(eqx.Module):
 
     branch: Branch
     receptance: Complex[Array, "*branch point"]
-    band: Band | None = None
     others: tuple["FrequencyResponse", ...] = ()
 
     @property
@@ -77,6 +74,18 @@ class FrequencyResponse(eqx.Module):
         return self.branch.special_points
 
     @property
+    def band(self) -> Band | None:
+        """Of frequency and amplitude, across the curve, where a fit was given."""
+        own = self.branch.band
+        if own is None:
+            return None
+        error, lower, upper = (
+            {"frequency": part["value"], "amplitude": part["response"]}
+            for part in (own.standard_error, own.lower, own.upper)
+        )
+        return Band(error, lower, upper, own.confidence)
+
+    @property
     def result(self) -> RESULTS:
         """Whether the curve was followed to its end."""
         return self.branch.result
@@ -85,7 +94,7 @@ class FrequencyResponse(eqx.Module):
         points = self.branch.points
         response, frequency = np.asarray(points.response), np.asarray(points.frequency)
         top = np.nanargmax(response)
-        drive = number(float(np.asarray(points.amplitude).ravel()[top]))
+        drive = amount(np.asarray(points.amplitude).ravel()[top], DRIVE_UNITS[self.branch.model.excitation])
         peak = f"{amount(response.ravel()[top], 'm')} at {number(frequency.ravel()[top])} Hz"
         return f"largest response {peak} under a drive of {drive}; {self.branch._headline()}"
 
@@ -123,8 +132,8 @@ def frequency_response(
         step: largest step, over the size of the motion and the range of frequency.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
-        fit: with whose errors the curve, not those beside it, is given a band; `model` is its model. None for
-            no band.
+        fit: with whose errors the curves and their special points are given bands; `model` is its model. None
+            for no band.
 
     Returns:
         The response. Where it ends early `result` says so, and the points found so far stand.
@@ -144,7 +153,6 @@ def frequency_response(
     """
     model = as_isolator(model)
     check_float64()
-    errors = None if fit is None else coefficient_errors(fit, model)
     forces, ends = np.asarray(amplitude, dtype=float), np.asarray(frequencies, dtype=float)
     if forces.ndim > 1 or not forces.size or not np.all(np.isfinite(forces) & (forces > 0.0)):
         raise ValueError(
@@ -160,28 +168,20 @@ def frequency_response(
     if any(count < 1 for count in periods):
         raise ValueError(f"Argument `periods` must hold positive counts, but is {tuple(periods)}.")
 
-    def branch_of(isolator: Isolator, other_periods: Sequence[int] = ()) -> Branch:
-        return continue_branch(
-            isolator,
-            parameter="frequency",
-            amplitude=jnp.asarray(forces),
-            start=float(ends[0]),
-            stop=float(ends[-1]),
-            other_periods=other_periods,
-            step=step,
-            most=most,
-            integrator=integrator,
-        )
-
-    def curve(isolator: Isolator) -> Array:
-        points = branch_of(isolator).points
-        return jnp.stack([points.frequency, points.response])
-
-    branch = branch_of(model, periods)
-    names = ("frequency", "amplitude")
-    band = None if errors is None else find_band(errors, names, curve, across=True)
+    branch = continue_branch(
+        model,
+        parameter="frequency",
+        amplitude=jnp.asarray(forces),
+        start=float(ends[0]),
+        stop=float(ends[-1]),
+        other_periods=periods,
+        step=step,
+        most=most,
+        integrator=integrator,
+        fit=fit,
+    )
     others = tuple(FrequencyResponse(one, _receptance(model, one)) for one in branch.others)
-    return FrequencyResponse(branch, _receptance(model, branch), band, others)
+    return FrequencyResponse(branch, _receptance(model, branch), others)
 
 
 def _receptance(model: Isolator, branch: Branch) -> Complex[Array, "*branch point"]:

@@ -1,0 +1,143 @@
+"""Errors of a fit at branches and special points, against how the solutions of two oscillators scale."""
+
+import dataclasses
+from typing import NamedTuple
+
+import diffrax
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.stats import norm
+
+import isojax as ij
+
+TURN = 2.0 * np.pi
+HALF = norm.ppf(0.975)
+SHARE = 0.005
+"""Relative standard error of the only coefficient that is uncertain."""
+
+SUCCESS = ij.RESULTS.promote(diffrax.RESULTS.successful)
+
+
+class Fitted(NamedTuple):
+    """What a band asks of a fit."""
+
+    model: ij.Isolator
+    free: tuple[str, ...]
+    covariance: np.ndarray
+    result: ij.RESULTS
+
+
+def uncertain(model, name):
+    return Fitted(model, (name,), np.array([[(SHARE * float(model[name])) ** 2]]), SUCCESS)
+
+
+LINEAR = ij.Isolator(2.0, (ij.LinearStiffness(50.0), ij.LinearDamping(0.8)))
+DUFFING = ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.LinearDamping(0.2), ij.CubicStiffness(1.0)))
+STIFF = uncertain(DUFFING, "cubic_stiffness.coefficient")
+"""Motion and force of x'' + c x' + x + k x^3 = F sin(w t) go with k^(-1/2) at the same frequency: so the
+standard error of every amplitude is half of SHARE, and that of a frequency at which something happens is
+none where the force is free."""
+
+
+@pytest.fixture(scope="module")
+def branch():
+    return ij.continue_branch(
+        DUFFING,
+        parameter="amplitude",
+        frequency=1.6 / TURN,
+        start=0.05,
+        stop=2.0,
+        other_periods=(),
+        fit=STIFF,
+    )
+
+
+@pytest.mark.slow
+def test_folds_of_a_branch_have_the_error_of_their_scaling(branch):
+    assert [point.kind for point in branch.special_points] == ["fold", "fold"]
+    for point in branch.special_points:
+        wanted = 0.5 * SHARE * float(point.amplitude)
+        assert float(point.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-7)
+        assert float(point.band.standard_error["frequency"]) == 0.0
+        assert float(point.band.upper["value"] - point.value) == pytest.approx(HALF * wanted, rel=1e-7)
+        assert " ± " in str(point)
+        assert " N, " in str(point)
+    moved = dataclasses.replace(DUFFING, excitation="base_acceleration")
+    point = dataclasses.replace(point, family=dataclasses.replace(point.family, model=moved))
+    assert " m/s², " in str(point)
+
+
+@pytest.mark.slow
+def test_the_ends_of_a_branch_band_lie_on_the_scaled_branch(branch):
+    known = np.stack([np.asarray(branch.points.value), np.asarray(branch.points.response)])
+    shift, scale = 0.5 * SHARE * HALF, np.ptp(known, axis=1)[:, None]
+    places = np.arange(known.shape[1])
+    fine = CubicSpline(places, known / scale, axis=1)(np.arange(0.0, places[-1], 0.02))
+    along, here = np.gradient(known / scale, axis=1), known / scale
+    along, here = along / np.hypot(*along), here / np.hypot(*here)
+    # Where the branch runs towards the origin, scaling shifts it along itself.
+    across = np.abs(along[0] * here[1] - along[1] * here[0]) > 0.6
+    sides = []
+    for band in (branch.band.lower, branch.band.upper):
+        ends = np.stack([np.asarray(band["value"]), np.asarray(band["response"])]) / scale
+        scales = np.linspace(1.0 - 2.0 * shift, 1.0 + 2.0 * shift, 401)
+        best = []
+        for place in places[across][::6]:
+            near = fine[:, max(0, 50 * place - 250) : 50 * place + 250]
+            away = scales[:, None, None] * near[None] - ends[:, place][None, :, None]
+            best.append(scales[np.argmin(np.min(np.sum(away**2, axis=1), axis=1))] - 1.0)
+        sides.append(np.array(best))
+    assert len(sides[0]) > 5
+    # Their mean is free of the second order, by which the branch bends within the band.
+    np.testing.assert_allclose(np.mean(np.abs(sides), axis=0), shift, rtol=0.05)
+    assert np.all(sides[0] * sides[1] < 0.0)
+    ax = ij.plot.branch(branch).axes[0]
+    assert ax.patches
+    assert len(ax.containers) == 2
+
+
+@pytest.mark.slow
+def test_cusps_have_the_error_of_their_scaling(branch):
+    window = {"amplitude_range": (0.05, 1.0), "frequency_range": (1.1 / TURN, 1.7 / TURN)}
+    folds = ij.fold_curve(DUFFING, **window, start=branch.special_points[0], step=0.03, fit=STIFF)
+    (cusp,) = folds.cusps
+    wanted = 0.5 * SHARE * float(cusp.amplitude)
+    assert float(cusp.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-6)
+    assert abs(float(cusp.band.standard_error["frequency"])) < 1e-6 * SHARE * float(cusp.frequency)
+    assert " ± " in str(cusp)
+    assert ij.plot.fold_curve(folds).axes[0].containers
+
+
+def test_an_event_of_a_linear_branch_has_the_error_of_its_closed_form():
+    event = ij.BranchEvent("5 cm", lambda orbit: orbit.response - 0.05)
+    branch = ij.continue_branch(
+        LINEAR,
+        parameter="amplitude",
+        frequency=0.7,
+        start=0.5,
+        stop=3.0,
+        other_periods=(),
+        events=(event,),
+        fit=uncertain(LINEAR, "linear_stiffness.coefficient"),
+    )
+    omega = TURN * 0.7
+    spring, damper = 50.0 - 2.0 * omega**2, 0.8 * omega
+    (point,) = branch.special_points
+    force = 0.05 * np.hypot(spring, damper)
+    assert float(point.value) == pytest.approx(force, rel=1e-6)
+    wanted = 0.05**2 * abs(spring) / force * SHARE * 50.0
+    assert float(point.band.standard_error["value"]) == pytest.approx(wanted, rel=1e-6)
+    # The response at a point moves across the line X = F / |Z|: all of the error is in its slope.
+    upper, lower = (
+        np.asarray(end["response"]) / np.asarray(end["value"])
+        for end in (branch.band.upper, branch.band.lower)
+    )
+    shift = HALF * SHARE * 50.0 * abs(spring) / (spring**2 + damper**2) ** 1.5
+    np.testing.assert_allclose(0.5 * np.abs(upper - lower), shift, rtol=0.02)
+
+
+def test_a_branch_asks_for_the_model_of_the_fit():
+    stiffer = DUFFING.replace(cubic_stiffness__coefficient=2.0)
+    with pytest.raises(ValueError, match=r"differs in cubic_stiffness\.coefficient"):
+        ij.continue_branch(stiffer, parameter="amplitude", frequency=0.2, start=0.1, stop=1.0, fit=STIFF)
