@@ -64,6 +64,7 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
     ax.set_xlabel(parameter_label(branch.model, branch.parameter))
     ax.set_ylabel("response, half peak to peak [mm]")
     title = "Periodic response" + (f" at {_level(branch, 0)}" if len(curves) == 1 else "")
+    title += _missing_words([branch, *others, *beside])
     entitle(ax, title, stability_handles(ax, kinds, unstable=unstable))
     return figure
 
@@ -126,7 +127,8 @@ def plot_frequency_response(
     ax.set_ylabel(
         "response, half peak to peak [mm]" if what == "displacement" else "phase after the drive [°]"
     )
-    entitle(ax, "Frequency response", stability_handles(ax, kinds, unstable=unstable, extra=extra))
+    title = "Frequency response" + _missing_words([response.branch, *(one.branch for one in response.others)])
+    entitle(ax, title, stability_handles(ax, kinds, unstable=unstable, extra=extra))
     return figure
 
 
@@ -273,6 +275,11 @@ def _beside_words(branch: Branch) -> str:
     """Say what a branch beside another is, for the legend."""
     how = {"none": "detached", "bifurcation": "from a bifurcation", "unknown": "not reached by the curve"}
     return how[branch.connection] + (f", {branch.periods} drive periods" if branch.periods > 1 else "")
+
+
+def _missing_words(branches: Sequence[Branch]) -> str:
+    """Say below the title what the curves lack of their range."""
+    return "".join(f"\n{words}" for words in dict.fromkeys(one.missing_part for one in branches) if words)
 
 
 def _nearest_point(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:

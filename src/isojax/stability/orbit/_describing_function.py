@@ -24,7 +24,7 @@ _TINY = 1e-9
 """Displacement amplitude that counts as next to rest [m]."""
 
 _LARGER, _MOST_ROUNDS = 1e5, 5
-"""Factor by which the amplitudes grow while all of them need less than the drive, and how often they are tried."""
+"""Factor by which the amplitudes grow while all of them need less than the drive, and rounds at most."""
 
 
 def rest_displacement(model: Isolator) -> Float[Array, ""]:
@@ -161,10 +161,8 @@ def response_amplitudes(
     return jax.vmap(needed)(amplitudes)
 
 
-def answer_scale(
-    model: Isolator, amplitude: Scalar, frequency: Scalar, rest: Scalar
-) -> Float[Array, ""]:
-    """Give a displacement amplitude within three decades of which lies the answer to a drive, to one harmonic.
+def answer_scale(model: Isolator, amplitude: Scalar, frequency: Lanes, rest: Scalar) -> Float[Array, ""]:
+    """Give a displacement amplitude within three decades of which a drive's one-harmonic answer lies.
 
     It is that of the law next to rest, if no larger motion needs as much drive. Friction is stiff next to
     rest, dry friction without bound, and weak beside the spring further out.
@@ -182,7 +180,7 @@ def answer_scale(
 
 
 def _scale_and_needed(
-    model: Isolator, amplitude: Scalar, frequency: Scalar, rest: Scalar
+    model: Isolator, amplitude: Scalar, frequency: Lanes, rest: Scalar
 ) -> tuple[Float[Array, ""], Float[Array, " trial"]]:
     """Give `answer_scale`, and the drive that each amplitude of `_GRID` over it needs."""
 
@@ -219,12 +217,13 @@ def response_start(model: Isolator, amplitude: Scalar, frequency: Scalar) -> Flo
     """
     amplitude, frequency = as_float64(amplitude), as_float64(frequency)
     rest = rest_displacement(model)
-    scale, needed = _scale_and_needed(model, jnp.abs(amplitude), frequency, rest)
+    size = jnp.abs(amplitude)
+    scale, needed = _scale_and_needed(model, size, frequency, rest)
     grid = scale * jnp.asarray(_GRID)
-    rises = (needed[:-1] <= jnp.abs(amplitude)) & (needed[1:] > jnp.abs(amplitude))
-    place = jnp.where(jnp.any(rises), jnp.argmax(rises), jnp.argmin(jnp.abs(needed[:-1] - jnp.abs(amplitude))))
+    rises = (needed[:-1] <= size) & (needed[1:] > size)
+    place = jnp.where(jnp.any(rises), jnp.argmax(rises), jnp.argmin(jnp.abs(needed[:-1] - size)))
     span = needed[place + 1] - needed[place]
-    share = jnp.where(jnp.any(rises), (jnp.abs(amplitude) - needed[place]) / span, 0.0)
+    share = jnp.where(jnp.any(rises), (size - needed[place]) / span, 0.0)
     motion = grid[place] + share * (grid[place + 1] - grid[place])
     drive, internal = imposed_balance(model, motion, frequency, rest)
     # The motion is `rest + a cos(tau)`; the recorded drive passes zero upwards at this tau.
