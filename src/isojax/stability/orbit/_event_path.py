@@ -22,6 +22,9 @@ from ._sine import Sine
 _PHASE_ROUNDING = 1e-12
 """Share of the size of a switch that it may be off by, and share of a step that an instant may be."""
 
+_ON_A_SAMPLE = 1e-6
+"""Share of a step within which a phase counts as that of the next sample."""
+
 _HALVINGS, _NEWTON_STEPS = 6, 3
 """Of a bracket on a cubic, and steps of Newton's method from there; one more, on the motion, follows."""
 
@@ -100,7 +103,7 @@ def follow_events(
         return (walk.phase < end * (1.0 - _PHASE_ROUNDING)) & (walk.events <= places)
 
     def body(walk: _Walk) -> _Walk:
-        number = jnp.floor(jax.lax.stop_gradient(walk.phase) / length + 1e-6) + 1.0
+        number = jnp.floor(jax.lax.stop_gradient(walk.phase) / length + _ON_A_SAMPLE) + 1.0
         target = jnp.minimum(number * length, end)
         share, event, moved, after = _step(model, drive, walk, target - walk.phase)
         phase = jnp.where(event >= 0, walk.phase + share * (target - walk.phase), target)
@@ -116,7 +119,9 @@ def follow_events(
         )
         path = walk.path
         if kept:
-            row = jnp.where(event >= 0, kept, number.astype(int))
+            # An event that falls on a sample is that sample too: the next step goes to the one after it.
+            reached = jnp.floor(jax.lax.stop_gradient(phase) / length + _ON_A_SAMPLE) >= number
+            row = jnp.where(reached, number.astype(int), kept)
             path = path.at[row].set(jnp.stack(moved), mode="drop")
         return _Walk(phase, moved, after, found, walk.events + (event >= 0), path)
 

@@ -1,0 +1,72 @@
+"""Curves of isolators with dry friction against Den Hartog's closed form and the force that breaks loose."""
+
+import math
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import isojax as ij
+from isojax.stability.orbit import Sine, trajectory
+
+MASS, STIFFNESS, FRICTION, FORCE = 2.0, 800.0, 6.0, 40.0
+NATURAL = math.sqrt(STIFFNESS / MASS) / (2.0 * math.pi)
+MODEL = ij.Isolator(MASS, (ij.LinearStiffness(STIFFNESS), ij.elements.CoulombFriction(FRICTION, 1e-3)))
+
+
+def den_hartog(ratio):
+    """Give the amplitude of a motion without stops, Den Hartog 1931, Trans. ASME 53:107."""
+    response = 1.0 / (1.0 - ratio**2)
+    damping = np.sin(np.pi / ratio) / (ratio * (1.0 + np.cos(np.pi / ratio)))
+    return np.sqrt((FORCE / STIFFNESS * response) ** 2 - (FRICTION / STIFFNESS * damping) ** 2)
+
+
+def test_the_response_with_dry_friction_is_whole_and_that_of_den_hartog():
+    response = ij.frequency_response(MODEL, FORCE, (1.2 * NATURAL, 2.0 * NATURAL), periods=())
+    frequency = np.asarray(response.frequency)
+    assert response.result == ij.RESULTS.successful
+    assert frequency[-1] == pytest.approx(2.0 * NATURAL, rel=1e-9)
+    assert frequency.size < 200
+    np.testing.assert_allclose(np.asarray(response.amplitude), den_hartog(frequency / NATURAL), rtol=1e-4)
+
+
+@pytest.fixture(scope="module")
+def branches():
+    ends = {"down": (FORCE, 1.0), "up": (1.0, FORCE), "held": (1.0, 5.0)}
+    model = MODEL.with_elements(ij.LinearDamping(10.0))
+    return {
+        name: ij.continue_branch(
+            model, parameter="amplitude", frequency=0.8 * NATURAL, start=start, stop=stop, other_periods=()
+        )
+        for name, (start, stop) in ends.items()
+    }
+
+
+@pytest.mark.parametrize("way", ["down", "up"])
+def test_a_branch_ends_or_begins_where_friction_lets_the_mass_go(branches, way):
+    branch = branches[way]
+    values = np.sort(np.asarray(branch.points.value))
+    assert branch.result == ij.RESULTS.sticks
+    # The mass is free as soon as the force exceeds the friction.
+    assert FRICTION < values[0] < FRICTION * (1.0 + 2e-3)
+    assert values[-1] == pytest.approx(FORCE, rel=1e-9)
+    assert branch.special_points == ()
+    assert np.all(np.asarray(branch.points.stable))
+
+
+def test_a_branch_says_where_friction_holds_the_mass(branches):
+    assert "dry friction holds the mass beyond" in repr(branches["up"])
+    assert "dry friction holds the mass beyond" in ij.plot.branch(branches["up"]).axes[0].get_title("left")
+    assert branches["held"].points.value.size == 0
+    assert branches["held"].result == ij.RESULTS.sticks
+    assert "dry friction holds the mass over the whole range" in repr(branches["held"])
+
+
+def test_a_reversal_that_falls_on_a_sample_is_in_the_path():
+    # Half a free oscillation from rest at x0, about Fc / k: it reverses at 2 Fc / k - x0.
+    still = Sine(jnp.zeros(()), jnp.zeros(()), jnp.asarray(NATURAL))
+    for start in np.linspace(0.02, 0.05, 8):
+        path = trajectory(
+            MODEL, ij.Integrator(steps_per_period=256), still, (jnp.asarray(start), jnp.zeros(()))
+        )
+        assert float(path[0][128]) == pytest.approx(2.0 * FRICTION / STIFFNESS - start, rel=1e-6)
