@@ -2,12 +2,14 @@
 
 import math
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import isojax as ij
 from isojax.stability.orbit import Sine, trajectory
+from isojax.stability.orbit._event_path import follow_events
 
 MASS, STIFFNESS, FRICTION, FORCE = 2.0, 800.0, 6.0, 40.0
 NATURAL = math.sqrt(STIFFNESS / MASS) / (2.0 * math.pi)
@@ -68,3 +70,30 @@ def test_a_reversal_that_falls_on_a_sample_is_in_the_path():
     still, start = Sine(0.0 * frequency, 0.0 * frequency, frequency), jnp.full(9, 0.03)
     path = trajectory(MODEL, ij.Integrator(steps_per_period=256), still, (start, 0.0 * start))
     np.testing.assert_allclose(path[0][128], 2.0 * FRICTION / STIFFNESS - start, rtol=1e-6)
+
+
+def test_a_reversal_at_the_very_end_passes_on_the_derivative_of_its_instant():
+    # Half a free oscillation later the mass is about to turn: the velocity changes as the force before it
+    # says, or as that after it.
+    start, rates = 0.05, []
+    begin = jnp.asarray(start), jnp.zeros(())
+
+    @jax.jit
+    def reversal(frequency):
+        still = Sine(0.0 * frequency, 0.0 * frequency, frequency)
+        motion = follow_events(MODEL, still, begin, math.pi * 129 / 128, 129, 4)
+        return motion.crossings.phases[0]
+
+    @jax.jit
+    def velocity(frequency):
+        still = Sine(0.0 * frequency, 0.0 * frequency, frequency)
+        return follow_events(MODEL, still, begin, math.pi, 128, 4).end[1]
+
+    frequency = jnp.asarray(NATURAL)
+    for _ in range(4):
+        frequency = frequency * math.pi / reversal(frequency)
+    for shift in np.linspace(-5e-13, 5e-13, 7):
+        rates.append(float(jax.jacfwd(velocity)(frequency * (1.0 + shift))) * -2.0 * NATURAL**2)
+    turn = 2.0 * FRICTION / STIFFNESS - start
+    sides = np.array([-STIFFNESS * turn + sign * FRICTION for sign in (1.0, -1.0)]) / MASS
+    assert np.min(np.abs(np.array(rates)[:, None] - sides), axis=1) == pytest.approx(0.0, abs=1e-3)
