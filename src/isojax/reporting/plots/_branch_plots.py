@@ -265,9 +265,10 @@ def _any_unstable(values: np.ndarray, stable: np.ndarray) -> bool:
 def _level(branch: Branch, place: int) -> str:
     """Give what is held fixed along a branch."""
     unit = drive_unit(branch.model.excitation)
-    held = {"amplitude": (branch.points.amplitude, unit), "frequency": (branch.points.frequency, "Hz")}
+    # Of the family: a branch that found no orbit has no points to read it from.
+    held = {"amplitude": (branch.family.amplitude, unit), "frequency": (branch.family.frequency, "Hz")}
     held.pop(branch.parameter, None)
-    words = [quantity(float(_row(np.asarray(values), place)[0]), own) for values, own in held.values()]
+    words = [quantity(float(np.ravel(values)[place]), own) for values, own in held.values()]
     return ", ".join(words) + (f", period {branch.periods}" if branch.periods > 1 else "")
 
 
