@@ -68,9 +68,15 @@ def is_successful(result: RESULTS) -> bool:
 
 def name_of_result(result: RESULTS) -> str:
     """Give the name of an outcome, such as "not_converged"."""
+    (name,) = names_of_results(result)
+    return name
+
+
+def names_of_results(results: RESULTS) -> list[str]:
+    """Give the names of some outcomes, or of one."""
     # In NumPy: to compare two outcomes as such would compile.
     codes = {int(np.asarray(jax.tree.leaves(item)[0])): name for name, item in _NAMES.items()}
-    return codes[int(np.asarray(jax.tree.leaves(result)[0]))]
+    return [codes[int(code)] for code in np.asarray(jax.tree.leaves(results)[0]).ravel()]
 
 
 def result_named(name: str) -> RESULTS:

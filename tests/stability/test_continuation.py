@@ -133,6 +133,9 @@ def test_too_few_points_are_said_to_be_too_few():
     branch = along_force(DUFFING, 1.05 / (2 * np.pi), start=0.01, stop=1.0, most=20)
     assert branch.result == ij.RESULTS.not_converged
     assert branch.points.value.shape == (20,)
+    words = f"NOT WHOLE: the search stopped at amplitude {float(branch.points.value[-1]):.5g}"
+    assert words in repr(branch)
+    assert words in ij.plot.branch(branch).axes[0].get_title("left")
     assert np.all(np.isfinite(branch.points.value))
 
 

@@ -66,6 +66,7 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
     ax.set_xlabel(parameter_label(branch.model, branch.parameter))
     ax.set_ylabel("response, half peak to peak [mm]")
     title = "Periodic response" + (f" at {_level(branch, 0)}" if len(curves) == 1 else "")
+    title += _missing_words([branch, *others, *beside])
     entitle(ax, title, stability_handles(ax, kinds, unstable=unstable))
     return figure
 
@@ -121,7 +122,8 @@ def plot_frequency_response(
     ax.set_ylabel(
         "response, half peak to peak [mm]" if what == "displacement" else "phase after the drive [°]"
     )
-    entitle(ax, "Frequency response", stability_handles(ax, kinds, unstable=unstable, extra=extra))
+    title = "Frequency response" + _missing_words([response.branch, *(one.branch for one in response.others)])
+    entitle(ax, title, stability_handles(ax, kinds, unstable=unstable, extra=extra))
     return figure
 
 
@@ -268,9 +270,10 @@ def _any_unstable(values: np.ndarray, stable: np.ndarray) -> bool:
 def _level(branch: Branch, place: int) -> str:
     """Give what is held fixed along a branch."""
     unit = drive_unit(branch.model.excitation)
-    held = {"amplitude": (branch.points.amplitude, unit), "frequency": (branch.points.frequency, "Hz")}
+    # Of the family: a branch that found no orbit has no points to read it from.
+    held = {"amplitude": (branch.family.amplitude, unit), "frequency": (branch.family.frequency, "Hz")}
     held.pop(branch.parameter, None)
-    words = [quantity(float(_row(np.asarray(values), place)[0]), own) for values, own in held.values()]
+    words = [quantity(float(np.ravel(values)[place]), own) for values, own in held.values()]
     return ", ".join(words) + (f", period {branch.periods}" if branch.periods > 1 else "")
 
 
@@ -278,6 +281,11 @@ def _beside_words(branch: Branch) -> str:
     """Say what a branch beside another is, for the legend."""
     how = {"none": "detached", "bifurcation": "from a bifurcation", "unknown": "not reached by the curve"}
     return how[branch.connection] + (f", {branch.periods} drive periods" if branch.periods > 1 else "")
+
+
+def _missing_words(branches: Sequence[Branch]) -> str:
+    """Say below the title what the curves lack of their range."""
+    return "".join(f"\n{words}" for words in dict.fromkeys(one.missing_part for one in branches) if words)
 
 
 def _nearest_point(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:

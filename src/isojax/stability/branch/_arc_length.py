@@ -26,9 +26,9 @@ _CLOSES_FROM, _CLOSES_WITHIN = 5, 0.2
 """Points after which a curve may close, and the distance of its first point from a step, over the step, below
 which it does."""
 
-_RAN_OUT, REACHED_BOUND, RETURNED, _STALLED, _NEVER_STARTED, _TURNED = range(6)
+_RAN_OUT, REACHED_BOUND, RETURNED, _STALLED, _NEVER_STARTED, _TURNED, HELD = range(7)
 """Why a curve ends: out of points, on a bound, back at its first point, no step short enough, no first
-point, past its first turn."""
+point, past its first turn, where dry friction holds the mass."""
 
 
 class Departure(NamedTuple):
@@ -94,6 +94,7 @@ def follow(
     departure: Departure,
     free: int,
     stride: Stride,
+    is_held: Callable[[Float[Array, " unknown"]], Bool[Array, ""]] | None = None,
 ) -> Followed:
     """Follow the curve `equations(u) = 0`, one equation fewer than unknowns.
 
@@ -105,6 +106,8 @@ def follow(
         departure: where the curve starts.
         free: count of unknowns without bounds; those after them are shares between 0 and 1.
         stride: steps along it.
+        is_held: whether a point is no orbit of its own because friction holds the mass there; the curve ends
+            just before. Never if omitted.
 
     Returns:
         The curve.
@@ -119,6 +122,9 @@ def follow(
     unbounded = jnp.full(free, jnp.inf)
     lower = jnp.concatenate([-unbounded, jnp.zeros(size - free)])
     upper = jnp.concatenate([unbounded, jnp.ones(size - free)])
+
+    def holds(point: Array) -> Array:
+        return jnp.array(False) if is_held is None else is_held(point)
 
     def predict(base: Array, tangent: Array, length: Array) -> tuple[Array, Array, Array]:
         ahead = base + length * tangent
@@ -164,6 +170,9 @@ def follow(
         past = walk.followed
         predicted, row, landing = predict(walk.base, walk.tangent, shorter)
         stuck = jnp.where(past.found == 0, _NEVER_STARTED, _STALLED)
+        # Where friction is about to hold the mass, motions are so small that Newton may stall before.
+        ahead = walk.base + step * walk.tangent
+        stuck = jnp.where(holds(jnp.where(jnp.arange(size) < free, 0.0, ahead)), HELD, stuck)
         ending = jnp.where((shorter < _SHORTEST_STEP * step) | (past.found == 0), stuck, past.ending)
         return _Walk(
             predicted,
@@ -193,8 +202,9 @@ def follow(
         )
         found = sane & (jnp.max(jnp.abs(change)) < _TOLERANCE)
         straight = starting | (jnp.dot(ahead, walk.tangent) > jnp.cos(2.0 * _ANGLE))
+        sound = jnp.all(jnp.isfinite(ahead)) & ~holds(moved)
         patience = jnp.where(starting, _FIRST_PATIENCE, _PATIENCE)
-        over = ~sane | (walk.tries >= patience) | (found & ~(straight & jnp.all(jnp.isfinite(ahead))))
+        over = ~sane | (walk.tries >= patience) | (found & ~(straight & sound))
         going = walk._replace(here=moved, tries=walk.tries + 1)
         choices = (accept(walk, moved, ahead), refuse(walk), going)
         return jax.tree.map(lambda yes, no, on: jnp.where(over, no, jnp.where(found, yes, on)), *choices)

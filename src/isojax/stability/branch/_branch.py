@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._implicit import frozen, with_derivatives
-from ..._results import RESULTS
+from ..._results import RESULTS, names_of_results
 from ..._show import Row, amount, brief, number, shown
 from ..._types import Scalar
 from ...models import Band, Integrator, Isolator, State
@@ -246,10 +246,33 @@ class Branch(eqx.Module):
             return "bifurcation"
         return "none" if np.all(np.asarray(self.closed)) else "unknown"
 
+    @property
+    def missing_part(self) -> str:
+        """What of the range the branch lacks, and why, in words; "" where it has all of it."""
+        names = names_of_results(self.result)
+        lacking = [name for name in names if name != "successful"]
+        if not lacking:
+            return ""
+        if len(names) > 1:
+            held = lacking.count("sticks")
+            why = f", {held} because dry friction holds the mass" if held else ""
+            return f"NOT WHOLE: {len(lacking)} of {len(names)} curves{why}"
+        values = np.asarray(self.points.value).ravel()
+        held = lacking == ["sticks"]
+        if not values.size:
+            return (
+                "dry friction holds the mass over the whole range" if held else "NO ORBIT FOUND to start from"
+            )
+        if held:
+            span = f"{number(np.nanmin(values))} to {number(np.nanmax(values))}"
+            return f"{self.parameter} {span} only, dry friction holds the mass beyond"
+        return f"NOT WHOLE: the search stopped at {self.parameter} {number(values[-1])}"
+
     def _headline(self) -> str:
         kinds = [point.kind.replace("_", " ") for point in self.special_points]
         special = ", ".join(f"{kinds.count(kind)} × {kind}" for kind in dict.fromkeys(kinds))
-        return f"along {self.parameter}, {self.points._headline()}; {special or 'no bifurcation'}"
+        words = f"along {self.parameter}, {self.points._headline()}; {special or 'no bifurcation'}"
+        return f"{self.missing_part}; {words}" if self.missing_part else words
 
     def _rows(self) -> list[str | Row]:
         points = self.points
@@ -276,7 +299,8 @@ class Branch(eqx.Module):
         span = f"{self.parameter} {number(np.nanmin(value))} to {number(np.nanmax(value))}"
         size = amount(np.nanmax(np.asarray(points.response)), "m")
         held = f"{int(stable.sum())} of {value.size} points stable"
-        return f"{how[self.connection]}{after}: {span}, up to {size}, {held}"
+        words = f"{how[self.connection]}{after}: {span}, up to {size}, {held}"
+        return f"{words}; {self.missing_part}" if self.missing_part else words
 
 
 def half_range(model: Isolator, drive: PeriodicDrive, path: State, turns: float) -> Float[Array, ""]:

@@ -24,7 +24,7 @@ from ...models import (
     coefficient_errors,
 )
 from ..orbit import ShootingMethod, integrator_for, is_odd, refuse_traced, response_start
-from ._arc_length import Departure, Followed, Stride
+from ._arc_length import HELD, REACHED_BOUND, Departure, Followed, Stride
 from ._branch import Branch, BranchEvent
 from ._branch_bands import with_bands
 from ._criticality import BifurcationKind
@@ -34,6 +34,9 @@ from ._tracing import assemble, trace
 
 _SIZED_AT = 33
 """Parameters at which the size of the motion is estimated beforehand."""
+
+_HALVINGS = 24
+"""Of the range between two of them in which a mass breaks loose."""
 
 
 def tracing_steps(model: Isolator, integrator: Integrator | None) -> Integrator:
@@ -102,7 +105,9 @@ def continue_branch(
             no band.
 
     Returns:
-        The branch. Where it ends early `result` says so, and the points found so far stand.
+        The branch. Where it ends early `result` says so, and the points found so far stand. Where dry
+        friction holds the mass there are no orbits: the branch begins where it breaks loose, or ends where it
+        is held, and `result` says that it sticks.
 
     Raises:
         ValueError: if `parameter` is none of the model's, the drive is incomplete or said twice, the range is
@@ -180,7 +185,10 @@ def follow_branches(
     fixed = np.zeros(first.shape)
     fixed[:, -1] = 1.0
     fixed = jnp.asarray(fixed)
-    return scale, trace(family, method, scale, Departure(first, fixed, fixed), stride)
+    followed = trace(family, method, scale, Departure(first, fixed, fixed), stride)
+    # What begins where the mass breaks loose lacks a part of the range, also where it reaches the end.
+    lacking = (first[:, -1] > 0.0) & (followed.ending == REACHED_BOUND)
+    return scale, followed._replace(ending=jnp.where(lacking, HELD, followed.ending))
 
 
 def swept_family(
@@ -242,10 +250,38 @@ def _starts(
             motion = jnp.hypot(state[0], state[1] / omega)
             return state, jnp.concatenate([jnp.stack([motion, motion * omega]), jnp.abs(state[2:])])
 
-        state, sizes = jax.vmap(answer)(jnp.linspace(0.0, 1.0, _SIZED_AT))
+        # The first of them is where the mass breaks loose, if friction holds it at the start of the range.
+        loose = jnp.zeros(()) if begin is not None else _breaks_loose(here)
+        shares = jnp.linspace(0.0, 1.0, _SIZED_AT).at[0].set(loose)
+        state, sizes = jax.vmap(answer)(shares)
         size = jnp.max(jnp.where(jnp.isfinite(sizes), sizes, 0.0), axis=0)
         scale = jnp.where(size > 0.0, size, 1.0)
         first = state[0] if begin is None else begin
-        return jnp.concatenate([first / scale, jnp.zeros(1)]), scale
+        return jnp.concatenate([first / scale, loose[None]]), scale
 
     return jax.vmap(lane)(family.amplitude, family.frequency)
+
+
+def _breaks_loose(family: ParameterFamily) -> Float[Array, ""]:
+    """Give the share from which on dry friction no longer holds the mass.
+
+    0 where it does nowhere, or throughout.
+    """
+    if not family.model.slides:
+        return jnp.zeros(())
+
+    def holds(share: Array) -> Array:
+        return family.is_held(jnp.zeros(()), share[None], jnp.ones(()))
+
+    shares = jnp.linspace(0.0, 1.0, _SIZED_AT)
+    held = jax.vmap(holds)(shares)
+    place = jnp.argmin(held)
+
+    def halve(_: Array | int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = ends
+        middle = 0.5 * (low + high)
+        there = holds(middle)
+        return jnp.where(there, middle, low), jnp.where(there, high, middle)
+
+    _, high = jax.lax.fori_loop(0, _HALVINGS, halve, (shares[place - 1], shares[place]))
+    return jnp.where(held[0] & (place > 0), high, 0.0)

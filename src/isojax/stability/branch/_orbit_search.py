@@ -81,6 +81,8 @@ def _improved(
 
         found = jax.lax.fori_loop(0, steps, improve, state)
         gap = jnp.max(jnp.abs(moved(found) - found) / scale)
+        # Where friction holds the mass it may rest anywhere: those are no orbits.
+        gap = jnp.where(family.is_held(found[1], share[None], speed), jnp.inf, gap)
         return found, gap, turn(found, 0.5 if odd else 1.0)
 
     return jax.vmap(lane)(*starts)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._quick_jit import quick_jit
-from ..orbit import balanced_motion, imposed_balance, rest_displacement
+from ..orbit import answer_scale, balanced_motion, imposed_balance, rest_displacement
 from ._parameter_family import ParameterFamily
 
 PLACES = 12
@@ -19,7 +19,7 @@ _SHARE_COUNT, _SIZE_COUNT = 48, 160
 """Values of the parameter and displacement amplitudes of the tables of the one-harmonic balance."""
 
 _DECADES = (-6.0, 4.0)
-"""Powers of ten of these amplitudes, over the largest linear answer at rest's stiffness."""
+"""Powers of ten of these amplitudes, over the largest `answer_scale`."""
 
 _RADII, _DIRECTIONS = 8, 6
 """Distances from the branch's own motion, and directions, of the states spread at one value."""
@@ -69,6 +69,18 @@ class OneHarmonic(NamedTuple):
     in_phase: Float[np.ndarray, "share size"]
     drive: Float[np.ndarray, " share"]
     frequency: Float[np.ndarray, " share"]
+
+
+@quick_jit
+def _answer_scales(family: ParameterFamily, shares: Float[Array, " share"]) -> Float[Array, " share"]:
+    """Give about how large the answers to the drive are."""
+
+    def one(share: Array) -> Array:
+        setting = family.at(share[None])
+        rest = rest_displacement(setting.model)
+        return answer_scale(setting.model, jnp.abs(setting.amplitude), jnp.asarray(setting.frequency), rest)
+
+    return jax.vmap(one)(shares)
 
 
 @quick_jit
@@ -127,10 +139,8 @@ def one_harmonic(family: ParameterFamily, periods: int = 1) -> OneHarmonic:
         The tables.
     """
     shares = (np.arange(_SHARE_COUNT) + 0.5) / _SHARE_COUNT
-    tiny = 1e-9
-    force, _, drive, _ = _tables(family, jnp.asarray(shares), jnp.full(_SIZE_COUNT, tiny), jnp.asarray(1.0))
-    linear = np.asarray(drive) * tiny / np.asarray(force)[:, 0]
-    sizes = float(np.nanmax(linear)) * np.logspace(*_DECADES, _SIZE_COUNT)
+    largest = float(np.nanmax(np.asarray(_answer_scales(family, jnp.asarray(shares)))))
+    sizes = largest * np.logspace(*_DECADES, _SIZE_COUNT)
     tables = _tables(family, jnp.asarray(shares), jnp.asarray(sizes), jnp.asarray(float(periods)))
     return OneHarmonic(sizes, shares, *(np.asarray(table) for table in tables))
 

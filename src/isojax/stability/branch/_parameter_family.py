@@ -4,13 +4,20 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..._parameters import find_parameter, list_parameters, replace_parameters
 from ..._show import shown
 from ..._types import Lanes
 from ...models import Isolator
-from ..orbit import PeriodicDrive, ShootingMethod, period_map, recorded_sine
+from ..orbit import PeriodicDrive, ShootingMethod, is_held, period_map, recorded_sine
+
+_ALL_BUT_HELD = 1e-3
+"""Excess of the drive over what frees a mass, as a share of its amplitude, up to which the mass counts as
+held: it then moves for some hundredths of the period, and its multipliers go to one with the excess."""
+
+_STILL = 1e-6
+"""Velocity over its size up to which a mass that friction can hold counts as held."""
 
 
 class Setting(NamedTuple):
@@ -94,6 +101,24 @@ class ParameterFamily(eqx.Module):
         for name, value in found.items():
             numbers[find_parameter(self.model, name)] = value
         return Setting(replace_parameters(self.model, numbers), amplitude, frequency)
+
+    def is_held(
+        self, velocity: Float[Array, ""], shares: Float[Array, " parameter"], speed: Float[Array, ""]
+    ) -> Bool[Array, ""]:
+        """Say whether a closed motion is none of its own because dry friction holds the mass throughout.
+
+        Args:
+            velocity: at t = 0.
+            shares: parameters.
+            speed: size of the velocity.
+
+        Returns:
+            Whether it does.
+        """
+        if not self.model.slides:
+            return jnp.array(False)
+        there = self.at(shares)
+        return is_held(there.model, there.drive, _ALL_BUT_HELD) & (jnp.abs(velocity) <= _STILL * speed)
 
     def image(
         self,

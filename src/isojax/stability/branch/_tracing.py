@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..orbit import ShootingMethod
-from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
+from ._arc_length import HELD, REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
 from ._branch import Branch, BranchEvent, BranchPoints, branch_point
 from ._locating import BranchCurves
 from ._parameter_family import ParameterFamily
@@ -40,7 +40,11 @@ def trace(
 
     def lane(amplitude: Array, frequency: Array, scale: Array, departure: Departure) -> Followed:
         here = family.driven(amplitude, frequency)
-        return follow(lambda u: here.open_end(method, scale, u), departure, states, stride)
+
+        def is_held(u: Array) -> Array:
+            return here.is_held(u[1], u[states:], jnp.ones(()))
+
+        return follow(lambda u: here.open_end(method, scale, u), departure, states, stride, is_held)
 
     return jax.vmap(lane)(family.amplitude, family.frequency, scale, departure)
 
@@ -122,7 +126,11 @@ def assemble(
 
     ended = (followed.ending == REACHED_BOUND) | (followed.ending == RETURNED)
     good = RESULTS.promote(diffrax.RESULTS.successful)
-    result = jax.vmap(lambda well: RESULTS.where(well, good, RESULTS.not_converged))(ended)
+
+    def outcome(well: Array, held: Array) -> RESULTS:
+        return RESULTS.where(well, good, RESULTS.where(held, RESULTS.sticks, RESULTS.not_converged))
+
+    result = jax.vmap(outcome)(ended, followed.ending == HELD)
     kept = family.driven(single(family.amplitude), single(family.frequency))
     return Branch(
         family.model,

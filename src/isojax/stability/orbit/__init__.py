@@ -8,6 +8,7 @@ attractor and derivatives build on this one.
 """
 
 from ._axis import ascending as ascending
+from ._describing_function import answer_scale as answer_scale
 from ._describing_function import balanced_motion as balanced_motion
 from ._describing_function import imposed_balance as imposed_balance
 from ._describing_function import overtone_response as overtone_response

@@ -22,7 +22,13 @@ _IMPOSED_CYCLES = 3
 """Cycles of imposed motion after which internal states count as settled."""
 
 _GRID = np.logspace(-3.0, 3.0, 600)
-"""Displacement amplitudes tried for one drive, over that of the linear answer."""
+"""Displacement amplitudes tried for one drive, over `answer_scale`."""
+
+_TINY = 1e-9
+"""Displacement amplitude that counts as next to rest [m]."""
+
+_LARGER, _MOST_ROUNDS = 1e5, 5
+"""Factor by which the amplitudes grow while all of them need less than the drive, and rounds at most."""
 
 
 def rest_displacement(model: Isolator) -> Float[Array, ""]:
@@ -279,6 +285,47 @@ def response_amplitudes(
     return jax.vmap(needed)(amplitudes)
 
 
+def answer_scale(model: Isolator, amplitude: Scalar, frequency: Lanes, rest: Scalar) -> Float[Array, ""]:
+    """Give a displacement amplitude within three decades of which a drive's one-harmonic answer lies.
+
+    It is that of the law next to rest, if no larger motion needs as much drive. Friction is stiff next to
+    rest, dry friction without bound, and weak beside the spring further out.
+
+    Args:
+        model: the isolator.
+        amplitude: F0 [N, or m/s^2 for base excitation], positive.
+        frequency: [Hz].
+        rest: centre of the motion [m].
+
+    Returns:
+        The amplitude [m].
+    """
+    return _scale_and_needed(model, amplitude, frequency, rest)[0]
+
+
+def _scale_and_needed(
+    model: Isolator, amplitude: Scalar, frequency: Lanes, rest: Scalar
+) -> tuple[Float[Array, ""], Float[Array, " trial"]]:
+    """Give `answer_scale`, and the drive that each amplitude of `_GRID` over it needs."""
+
+    def needed(scale: Array) -> Array:
+        return response_amplitudes(model, frequency, scale * jnp.asarray(_GRID), rest)
+
+    def too_small(trial: tuple[Array, Array, Array]) -> Array:
+        return (trial[2] < _MOST_ROUNDS) & jnp.all(trial[1] <= amplitude)
+
+    def enlarge(trial: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        scale = _LARGER * trial[0]
+        return scale, needed(scale), trial[2] + 1
+
+    stiffness = response_amplitudes(model, frequency, jnp.array([_TINY]), rest)[0] / _TINY
+    # The first round enlarges too, so that what is needed is compiled once.
+    first = amplitude / stiffness / _LARGER
+    nothing = jnp.zeros(_GRID.size)
+    scale, last, _ = jax.lax.while_loop(too_small, enlarge, (first, nothing, jnp.asarray(0)))
+    return scale, last
+
+
 def response_start(model: Isolator, amplitude: Scalar, frequency: Scalar) -> Float[Array, " state"]:
     """Give the one-harmonic answer to a drive: the state at its phase zero.
 
@@ -294,14 +341,13 @@ def response_start(model: Isolator, amplitude: Scalar, frequency: Scalar) -> Flo
     """
     amplitude, frequency = as_float64(amplitude), as_float64(frequency)
     rest = rest_displacement(model)
-    tiny = 1e-9
-    stiffness = response_amplitudes(model, frequency, jnp.array([tiny]), rest)[0] / tiny
-    grid = jnp.abs(amplitude) / stiffness * jnp.asarray(_GRID)
-    needed = response_amplitudes(model, frequency, grid, rest)
-    rises = (needed[:-1] <= jnp.abs(amplitude)) & (needed[1:] > jnp.abs(amplitude))
-    place = jnp.where(jnp.any(rises), jnp.argmax(rises), jnp.argmin(jnp.abs(needed[:-1] - amplitude)))
+    size = jnp.abs(amplitude)
+    scale, needed = _scale_and_needed(model, size, frequency, rest)
+    grid = scale * jnp.asarray(_GRID)
+    rises = (needed[:-1] <= size) & (needed[1:] > size)
+    place = jnp.where(jnp.any(rises), jnp.argmax(rises), jnp.argmin(jnp.abs(needed[:-1] - size)))
     span = needed[place + 1] - needed[place]
-    share = jnp.where(jnp.any(rises), (jnp.abs(amplitude) - needed[place]) / span, 0.0)
+    share = jnp.where(jnp.any(rises), (size - needed[place]) / span, 0.0)
     motion = grid[place] + share * (grid[place + 1] - grid[place])
     balanced = balanced_motion(model, motion, frequency, rest)
     drive, internal, _ = balanced

@@ -22,6 +22,9 @@ from ._sine import PeriodicDrive
 _PHASE_ROUNDING = 1e-12
 """Share of the size of a switch that it may be off by, and share of a step that an instant may be."""
 
+_ON_A_SAMPLE = 1e-6
+"""Share of a step within which a phase counts as that of the next sample."""
+
 _HALVINGS, _NEWTON_STEPS = 6, 3
 """Of a bracket on a cubic, and steps of Newton's method from there; one more, on the motion, follows."""
 
@@ -52,6 +55,7 @@ class _Walk(NamedTuple):
     sides: Float[Array, " switch"]
     crossings: Crossings
     events: Int[Array, ""]
+    at_event: Bool[Array, ""]
     path: Float[Array, "time state"]
 
 
@@ -94,16 +98,21 @@ def follow_events(
         jnp.array(True),
     )
     path = jnp.zeros((kept, len(state)))
-    walk = _Walk(begin, state, sides, crossings, jnp.asarray(0), path.at[:1].set(jnp.stack(state)))
+    path = path.at[:1].set(jnp.stack(state))
+    walk = _Walk(begin, state, sides, crossings, jnp.asarray(0), jnp.array(False), path)
 
     def unfinished(walk: _Walk) -> Array:
-        return (walk.phase < end * (1.0 - _PHASE_ROUNDING)) & (walk.events <= places)
+        # From an event at the end a step of no length leads there, with the derivative of its instant.
+        before = (walk.phase < end * (1.0 - _PHASE_ROUNDING)) | walk.at_event
+        return before & (walk.events <= places)
 
     def body(walk: _Walk) -> _Walk:
-        number = jnp.floor(jax.lax.stop_gradient(walk.phase) / length + 1e-6) + 1.0
+        number = jnp.floor(jax.lax.stop_gradient(walk.phase) / length + _ON_A_SAMPLE) + 1.0
         target = jnp.minimum(number * length, end)
-        share, event, moved, after = _step(model, drive, walk, target - walk.phase)
-        phase = jnp.where(event >= 0, walk.phase + share * (target - walk.phase), target)
+        ahead = target - walk.phase
+        ahead = ahead - jax.lax.stop_gradient(jnp.minimum(ahead, 0.0))
+        share, event, moved, after = _step(model, drive, walk, ahead)
+        phase = jnp.where(event >= 0, walk.phase + share * ahead, target)
         here = (jnp.arange(places) == walk.events) & (event >= 0)
         later = (jnp.arange(places + 1) > walk.events)[:, None] & (event >= 0)
         old, old_sides = walk.crossings, walk.crossings.sides
@@ -116,9 +125,11 @@ def follow_events(
         )
         path = walk.path
         if kept:
-            row = jnp.where(event >= 0, kept, number.astype(int))
+            # An event that falls on a sample is that sample too: the next step goes to the one after it.
+            reached = jnp.floor(jax.lax.stop_gradient(phase) / length + _ON_A_SAMPLE) >= number
+            row = jnp.where(reached, number.astype(int), kept)
             path = path.at[row].set(jnp.stack(moved), mode="drop")
-        return _Walk(phase, moved, after, found, walk.events + (event >= 0), path)
+        return _Walk(phase, moved, after, found, walk.events + (event >= 0), event >= 0, path)
 
     last = jax.lax.while_loop(unfinished, body, walk)
     blank = jnp.where(last.crossings.complete, 1.0, jnp.nan)

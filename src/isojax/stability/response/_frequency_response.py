@@ -93,9 +93,13 @@ class FrequencyResponse(eqx.Module):
     def _headline(self) -> str:
         points = self.branch.points
         response, frequency = np.asarray(points.response), np.asarray(points.frequency)
+        if not np.isfinite(response).any():
+            return self.branch._headline()
         top = np.nanargmax(response)
         drive = amount(np.asarray(points.amplitude).ravel()[top], DRIVE_UNITS[self.branch.model.excitation])
         peak = f"{amount(response.ravel()[top], 'm')} at {number(frequency.ravel()[top])} Hz"
+        if self.branch.missing_part:
+            return f"{self.branch._headline()}; largest response so far {peak} under a drive of {drive}"
         return f"largest response {peak} under a drive of {drive}; {self.branch._headline()}"
 
     def _rows(self) -> list[str]:
