@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import isojax as ij
-from isojax.stability.orbit import Sine, trajectory
+from isojax.stability.orbit import recorded_sine, trajectory
 from isojax.stability.orbit._event_path import follow_events
 
 MASS, STIFFNESS, FRICTION, FORCE = 2.0, 800.0, 6.0, 40.0
@@ -67,7 +67,7 @@ def test_a_reversal_that_falls_on_a_sample_is_in_the_path():
     # Half a free oscillation from rest at x0, about Fc / k: it reverses at 2 Fc / k - x0, here all but on
     # the middle sample, a little before it and a little after.
     frequency = NATURAL * (1.0 + jnp.linspace(-5e-9, 5e-9, 9))
-    still, start = Sine(0.0 * frequency, 0.0 * frequency, frequency), jnp.full(9, 0.03)
+    still, start = recorded_sine(MODEL, 0.0 * frequency, frequency), jnp.full(9, 0.03)
     path = trajectory(MODEL, ij.Integrator(steps_per_period=256), still, (start, 0.0 * start))
     np.testing.assert_allclose(path[0][128], 2.0 * FRICTION / STIFFNESS - start, rtol=1e-6)
 
@@ -80,13 +80,13 @@ def test_a_reversal_at_the_very_end_passes_on_the_derivative_of_its_instant():
 
     @jax.jit
     def reversal(frequency):
-        still = Sine(0.0 * frequency, 0.0 * frequency, frequency)
+        still = recorded_sine(MODEL, 0.0 * frequency, frequency)
         motion = follow_events(MODEL, still, begin, math.pi * 129 / 128, 129, 4)
         return motion.crossings.phases[0]
 
     @jax.jit
     def velocity(frequency):
-        still = Sine(0.0 * frequency, 0.0 * frequency, frequency)
+        still = recorded_sine(MODEL, 0.0 * frequency, frequency)
         return follow_events(MODEL, still, begin, math.pi, 128, 4).end[1]
 
     frequency = jnp.asarray(NATURAL)

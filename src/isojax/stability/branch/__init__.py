@@ -19,7 +19,6 @@ from ._branch import BranchEvent as BranchEvent
 from ._branch import BranchPoints as BranchPoints
 from ._branch import Searched as Searched
 from ._branch import SpecialPoint as SpecialPoint
-from ._branch import half_range as half_range
 from ._branch_switching import switch_branch as switch_branch
 from ._codimension_two import fold_curve as fold_curve
 from ._codimension_two import neimark_sacker_curve as neimark_sacker_curve

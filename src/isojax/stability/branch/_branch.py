@@ -14,10 +14,10 @@ from ..._implicit import frozen, with_derivatives
 from ..._results import RESULTS, names_of_results
 from ..._show import Row, amount, brief, number, shown
 from ..._types import Scalar
-from ...models import Band, Integrator, Isolator, State
+from ...models import Band, Integrator, Isolator
 from ..orbit import (
-    PeriodicDrive,
     ShootingMethod,
+    half_range,
     modulus,
     multipliers,
     pair_angle,
@@ -30,8 +30,7 @@ from ._parameter_family import ParameterFamily
 
 @shown
 class BranchPoints(eqx.Module):
-    """Points along a branch, in the order in which they were found; NaN past the end of the shorter branches
-    of a batch.
+    """Points along a branch, in the order found; NaN past the end of the shorter branches of a batch.
 
     Attributes:
         value: of the parameter [its SI unit].
@@ -301,30 +300,6 @@ class Branch(eqx.Module):
         held = f"{int(stable.sum())} of {value.size} points stable"
         words = f"{how[self.connection]}{after}: {span}, up to {size}, {held}"
         return f"{words}; {self.missing_part}" if self.missing_part else words
-
-
-def half_range(model: Isolator, drive: PeriodicDrive, path: State, turns: float) -> Float[Array, ""]:
-    """Give half the peak-to-peak displacement, each peak by a parabola through its sample [m].
-
-    Args:
-        model: the isolator.
-        drive: the drive that acts.
-        path: states at equidistant instants of the motion, time first.
-        turns: drive periods that the path lasts.
-
-    Returns:
-        The amplitude.
-    """
-    samples = path[0].shape[0]
-
-    def peak(sign: float) -> Array:
-        place = jnp.argmax(sign * path[0])
-        state = tuple(along[place] for along in path)
-        phase = 2.0 * math.pi * turns * place / (samples - 1)
-        bend = model.acceleration(state, drive.at(drive.waves(phase)))
-        return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
-
-    return 0.5 * (peak(1.0) - peak(-1.0))
 
 
 def branch_point(

@@ -10,8 +10,8 @@ model, in pure JAX).
 """
 
 from ._batched_newton import states_at_zero as states_at_zero
+from ._chance import IN_DOUBT as IN_DOUBT
 from ._found_again import found_again as found_again
-from ._map import IN_DOUBT as IN_DOUBT
 from ._map import StabilityMap as StabilityMap
 from ._map import stability_map as stability_map
 from ._map_method import Lane as Lane

@@ -8,7 +8,7 @@ of the map. Draws of the coefficients then cost a product of matrices each.
 """
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -47,6 +47,10 @@ _SHARE_OF_DOUBT = 1.0 / (2.0**1.5 * np.pi)
 
 DRAWS = 512
 """Draws of the coefficients: quasi-random, so that their chances scatter by less than 0.01."""
+
+
+IN_DOUBT = 0.05
+"""A chance is in doubt if it is further than this from zero and one."""
 
 
 class Chances(NamedTuple):
@@ -324,3 +328,17 @@ def _standard_errors(maps: list["StabilityMap"], inner: slice) -> dict[str, np.n
         slopes = (values[1::2] - values[2::2]) / (2.0 * _REACH)
         errors[name] = np.where(alike, np.linalg.norm(slopes, axis=0), np.nan)
     return errors
+
+
+def chance_lines(stable: Any, coexisting: Any, error: float | None) -> list[str]:
+    """Say how many cells are likely stable and how many hold several orbits; nothing without chances."""
+    if stable is None or coexisting is None:
+        return []
+    words = []
+    for name, chance in (("no unstable orbit", stable), ("several orbits", coexisting)):
+        known = np.asarray(chance)[np.isfinite(chance)]
+        likely, doubtful = np.sum(known > 0.5), np.sum((known > IN_DOUBT) & (known < 1.0 - IN_DOUBT))
+        words.append(f"{name} likely in {likely} cells, in doubt in {doubtful}")
+    off = np.nan if error is None else error
+    said = f"; a chance near a half is off by at most {off:.2g}" if np.isfinite(off) else ""
+    return [f"  chances, of all orbits in a cell: {', '.join(words)}{said}"]

@@ -36,7 +36,7 @@ from ._batched_newton import (
     Found,
     states_at_zero,
 )
-from ._chance import find_chances, quasi_draws
+from ._chance import chance_lines, find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._empty_cells import Cells, fill_empty, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
@@ -57,9 +57,6 @@ _INSTEAD = (
 
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
-
-IN_DOUBT = 0.05
-"""A chance is in doubt if it is further than this from zero and one."""
 
 
 @shown
@@ -174,23 +171,8 @@ class StabilityMap(eqx.Module):
             f"  {'F0':>10} +{'-' * columns.size}",
             f"  {'f [Hz]':>10}  {band[0]:.4g} to {band[-1]:.4g}",
             legend,
-            *self._chance_lines(),
+            *chance_lines(self.probability_stable, self.probability_coexisting, self.chance_error),
         ]
-
-    def _chance_lines(self) -> list[str]:
-        if self.probability_stable is None or self.probability_coexisting is None:
-            return []
-        words = []
-        for name, chance in (
-            ("no unstable orbit", self.probability_stable),
-            ("several orbits", self.probability_coexisting),
-        ):
-            known = np.asarray(chance)[np.isfinite(chance)]
-            likely, doubtful = np.sum(known > 0.5), np.sum((known > IN_DOUBT) & (known < 1.0 - IN_DOUBT))
-            words.append(f"{name} likely in {likely} cells, in doubt in {doubtful}")
-        off = np.nan if self.chance_error is None else self.chance_error
-        off = f"; a chance near a half is off by at most {off:.2g}" if np.isfinite(off) else ""
-        return [f"  chances, of all orbits in a cell: {', '.join(words)}{off}"]
 
 
 def stability_map(

@@ -22,6 +22,7 @@ from ._floquet import modulus as modulus
 from ._floquet import multipliers as multipliers
 from ._floquet import pair_angle as pair_angle
 from ._floquet import stable_words as stable_words
+from ._half_range import half_range as half_range
 from ._harmonic_balance import HarmonicBalance as HarmonicBalance
 from ._harmonic_balance import harmonic_balance as harmonic_balance
 from ._held import is_held as is_held

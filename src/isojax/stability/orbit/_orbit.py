@@ -21,6 +21,7 @@ from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import response_start
 from ._floquet import Floquet, multipliers, stable_words
+from ._half_range import half_range
 from ._harmonic_balance import harmonic_balance
 from ._held import is_held
 from ._period_map import trajectory
@@ -71,16 +72,7 @@ class Orbit(AbstractStatePath):
     def amplitude(self) -> Float[Array, ""]:
         """Half the peak-to-peak displacement [m], each peak by a parabola through its sample."""
         drive = recorded_sine(self.model, self.excitation.amplitude, self.excitation.frequency)
-        phase = drive.angular_frequency * self.time
-
-        def peak(sign: float) -> Array:
-            place = jnp.argmax(sign * self.displacement)
-            state = tuple(self.states[place])
-            at = drive.at(drive.waves(phase[place]))
-            bend = self.model.acceleration(state, at)
-            return state[0] - 0.5 * state[1] ** 2 / jnp.where(bend == 0.0, 1.0, bend)
-
-        return 0.5 * (peak(1.0) - peak(-1.0))
+        return half_range(self.model, drive, tuple(self.states.T), float(self.periods))
 
     @property
     def harmonics(self) -> Array:

@@ -13,10 +13,11 @@ from ..._show import amount, number, shown
 from ..._types import Scalar, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
-from ..branch import half_range, tracing_steps
+from ..branch import tracing_steps
 from ..orbit import (
     Orbit,
     find_periodic_orbit,
+    half_range,
     period_map,
     recorded_sine,
     refuse_traced,
