@@ -266,4 +266,5 @@ def test_a_held_drive_is_scored_with_its_share_where_one_step_spans_a_sample(sim
     found = fit(truth, campaign)
     (score,) = score_test(found.estimate, Search(scales(campaign)), (InputHold(0.0, 0.0),)).scores
     assert score.strength == pytest.approx(1.0, abs=0.05)
-    assert score.error < 0.02
+    # Of the noise alone: what the declared course leaves enlarges this error as it does those of a fit.
+    assert score.error / found.estimate.inflation**0.5 < 0.02

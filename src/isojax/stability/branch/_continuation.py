@@ -35,7 +35,7 @@ from ._tracing import assemble, trace
 _SIZED_AT = 33
 """Parameters at which the size of the motion is estimated beforehand."""
 
-_HALVINGS = 24
+_LOOSE_HALVINGS = 24
 """Of the range between two of them in which a mass breaks loose."""
 
 
@@ -283,5 +283,5 @@ def _breaks_loose(family: ParameterFamily) -> Float[Array, ""]:
         there = holds(middle)
         return jnp.where(there, middle, low), jnp.where(there, high, middle)
 
-    _, high = jax.lax.fori_loop(0, _HALVINGS, halve, (shares[place - 1], shares[place]))
+    _, high = jax.lax.fori_loop(0, _LOOSE_HALVINGS, halve, (shares[place - 1], shares[place]))
     return jnp.where(held[0] & (place > 0), high, 0.0)
