@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...stability import FoldCurve, StabilityMap
-from ...stability.map import IN_DOUBT
+from ...stability.map import chance_words
 from ..plots import drive_unit, quantity
 from ._map_files import result_codes
 
@@ -55,7 +55,7 @@ def map_summary(
             ("error", f"{smap.error:.1e} in |µ|, from a sample of cells; {steps} steps a period{missed}")
         )
     if smap.probability_stable is not None:
-        lines.append(("chances", _chance_words(smap)))
+        lines.append(("chances", chance_words(smap)))
     if folds is not None:
         lines.append(("folds", _fold_curve_words(folds, unit)))
     elif several.any():
@@ -96,21 +96,6 @@ def _coexisting_words(smap: StabilityMap, several: np.ndarray, sought: bool) -> 
         return "nowhere; each cell holds at most one orbit"
     most = int(np.max(np.asarray(smap.count)))
     return f"{_cells_holding(several)} several orbits, up to {most}{_where(smap, several)}"
-
-
-def _chance_words(smap: StabilityMap) -> str:
-    words = []
-    for name, chance in (
-        ("stable", smap.probability_stable),
-        ("several orbits", smap.probability_coexisting),
-    ):
-        values = np.asarray(chance)
-        sure = int(np.sum(values >= 1.0 - IN_DOUBT))
-        doubtful = int(np.sum((values > IN_DOUBT) & (values < 1.0 - IN_DOUBT)))
-        words.append(f"{name}: at least 95 % in {sure} cells, uncertain in {doubtful}")
-    if smap.chance_error is not None and np.isfinite(smap.chance_error):
-        words.append(f"a chance near a half is off by at most about {smap.chance_error:.2g}")
-    return "; ".join(words)
 
 
 def _scope(smap: StabilityMap) -> str:

@@ -10,7 +10,7 @@ model, in pure JAX).
 """
 
 from ._batched_newton import states_at_zero as states_at_zero
-from ._chance import IN_DOUBT as IN_DOUBT
+from ._chance import chance_words as chance_words
 from ._found_again import found_again as found_again
 from ._map import StabilityMap as StabilityMap
 from ._map import stability_map as stability_map

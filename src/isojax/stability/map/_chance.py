@@ -8,7 +8,7 @@ of the map. Draws of the coefficients then cost a product of matrices each.
 """
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -49,8 +49,8 @@ DRAWS = 512
 """Draws of the coefficients: quasi-random, so that their chances scatter by less than 0.01."""
 
 
-IN_DOUBT = 0.05
-"""A chance is in doubt if it is further than this from zero and one."""
+_IN_DOUBT = 0.05
+"""Chance below which, or below which of the contrary, a cell counts as sure."""
 
 
 class Chances(NamedTuple):
@@ -330,15 +330,19 @@ def _standard_errors(maps: list["StabilityMap"], inner: slice) -> dict[str, np.n
     return errors
 
 
-def chance_lines(stable: Any, coexisting: Any, error: float | None) -> list[str]:
-    """Say how many cells are likely stable and how many hold several orbits; nothing without chances."""
-    if stable is None or coexisting is None:
-        return []
-    words = []
-    for name, chance in (("no unstable orbit", stable), ("several orbits", coexisting)):
-        known = np.asarray(chance)[np.isfinite(chance)]
-        likely, doubtful = np.sum(known > 0.5), np.sum((known > IN_DOUBT) & (known < 1.0 - IN_DOUBT))
-        words.append(f"{name} likely in {likely} cells, in doubt in {doubtful}")
-    off = np.nan if error is None else error
-    said = f"; a chance near a half is off by at most {off:.2g}" if np.isfinite(off) else ""
-    return [f"  chances, of all orbits in a cell: {', '.join(words)}{said}"]
+def chance_words(smap: "StabilityMap") -> str:
+    """Say in how many cells the chances are sure and in how many in doubt; "" without chances."""
+    if smap.probability_stable is None:
+        return ""
+    words, error = [], smap.chance_error
+    for name, chance in (
+        ("stable", smap.probability_stable),
+        ("several orbits", smap.probability_coexisting),
+    ):
+        values = np.asarray(chance)
+        sure = int(np.sum(values >= 1.0 - _IN_DOUBT))
+        doubtful = int(np.sum((values > _IN_DOUBT) & (values < 1.0 - _IN_DOUBT)))
+        words.append(f"{name}: at least 95 % in {sure} cells, uncertain in {doubtful}")
+    if error is not None and np.isfinite(error):
+        words.append(f"a chance near a half is off by at most about {error:.2g}")
+    return "; ".join(words)

@@ -36,7 +36,7 @@ from ._batched_newton import (
     Found,
     states_at_zero,
 )
-from ._chance import chance_lines, find_chances, quasi_draws
+from ._chance import chance_words, find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._empty_cells import Cells, fill_empty, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
@@ -160,6 +160,7 @@ class StabilityMap(eqx.Module):
         rows = np.unique(np.linspace(0, forces.size - 1, min(_ROWS, forces.size)).round().astype(int))
         columns = np.unique(np.linspace(0, band.size - 1, min(_COLUMNS, band.size)).round().astype(int))
         drawn = [f"  {forces[row]:>10.4g} |{''.join(marks[row, columns])}" for row in rows[::-1]]
+        chances = chance_words(self)
         sought = np.ndim(self.spectral_radius) > count.ndim
         legend = (
             "  . one stable orbit, x one unstable orbit, 2 to 9 coexisting orbits, ? none found"
@@ -171,7 +172,7 @@ class StabilityMap(eqx.Module):
             f"  {'F0':>10} +{'-' * columns.size}",
             f"  {'f [Hz]':>10}  {band[0]:.4g} to {band[-1]:.4g}",
             legend,
-            *chance_lines(self.probability_stable, self.probability_coexisting, self.chance_error),
+            *([f"  with all orbits of a cell, {chances}"] if chances else []),
         ]
 
 
