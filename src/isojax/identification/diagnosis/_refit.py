@@ -67,7 +67,7 @@ def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
     if best is None:
         return fitted._replace(result=RESULTS.not_finite)
     _, model, nuisances = best
-    found = estimate(fitted.simulator, model, places, _rough(search, fitted), nuisances)
+    found = estimate(fitted.simulator, model, places, rough(search, fitted), nuisances)
     if found.result in (RESULTS.successful, RESULTS.outdone) or not found.excess < fitted.excess:
         return found
     # Beside a fold the initial states that followed the steps may lie on the other branch: the measured ones
@@ -89,7 +89,7 @@ def refit_from(fitted: Estimate, model: Isolator, search: Search, far: bool = Fa
     Returns:
         The refit.
     """
-    places, search = _free_places(fitted, model), _rough(search, fitted)
+    places, search = _free_places(fitted, model), rough(search, fitted)
     if far and fitted.problem.heads:
         model = fit_by_multiple_shooting(fitted, model, places, search)
     # The scatter of a stiffness that the fitted model lacks is still to be found.
@@ -103,7 +103,7 @@ def refit_from(fitted: Estimate, model: Isolator, search: Search, far: bool = Fa
     return estimate(fitted.simulator, model, places, search, nuisances)
 
 
-def _rough(search: Search, fitted: Estimate) -> Search:
+def rough(search: Search, fitted: Estimate) -> Search:
     """Give the search of a refit that is only ranked: with many samples smaller steps separate nothing."""
     return search._replace(tolerance=ROUGH * least_difference(fitted, search.rules))
 

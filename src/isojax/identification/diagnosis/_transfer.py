@@ -9,6 +9,7 @@ from scipy import stats
 from ..._results import RESULTS
 from .._rules import Rules
 from ..fitting import Estimate, Problem, Search, Simulator, Spread, best_nuisances, estimate, one_hot
+from ._refit import rough
 
 UNKNOWN = 1e-12
 """Share of its information below which a combination of coefficients counts as unknown."""
@@ -102,12 +103,12 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
     Source: Gelman, Hwang & Vehtari 2014, Stat. Comput. 24:997 (log predictive density of unseen data).
     """
     seen, unseen = _split(fitted, extended, search.rules)
-    predictions = []
+    predictions, quick = [], rough(search, fitted)
     for found in (fitted, extended):
         search.progress("carry-over: refit on a part of the data")
         nuisances = found.point.nuisances
         simulator = Simulator(seen, like=found.simulator)
-        part = estimate(simulator, found.model, found.places, search, nuisances.afresh())
+        part = estimate(simulator, found.model, found.places, quick, nuisances.afresh())
         if part.result == RESULTS.not_finite:
             return 0.0
         predictions.append(_predict(part, unseen, nuisances.spread))

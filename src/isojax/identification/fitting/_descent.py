@@ -36,6 +36,9 @@ PACE = 5
 """Accepted steps over which the pace of a search is taken, where another model is ahead of it. Refused ones
 do not count: what comes after them may gain more than what went before."""
 
+UNPROMISING = 3
+"""Points in a row whose linear step would not reach another model, after which a search is given up."""
+
 SHRINKS = 3
 """Refusals that a trial which diverged counts for: it lies far outside, not just a little too far."""
 
@@ -163,7 +166,7 @@ def descend(
     best: Point | None = None
     state: Any = None
     result: Any = RESULTS.not_converged
-    evaluations, refused, decrement = 0, 0, float("inf")
+    evaluations, refused, unpromising, decrement = 0, 0, 0, float("inf")
     levels: list[float] = []
     while evaluations < search.max_steps:
         current, slopes = physical(trial)
@@ -206,7 +209,10 @@ def descend(
         if rival is not None:
             behind = best.chi2 - rival.chi2
             pace = _gain(levels, PACE) / PACE
-            if behind > rival.tie and pace * search.max_steps < behind:
+            if point.is_finite:
+                promised = point.chi2 - float(np.sum(residual[:-1] ** 2))
+                unpromising = unpromising + 1 if promised - rival.chi2 > rival.tie else 0
+            if behind > rival.tie and (pace * search.max_steps < behind or unpromising == UNPROMISING):
                 result = RESULTS.outdone
                 break
         if refused == MOST_REFUSALS or (idle and is_least):

@@ -90,7 +90,7 @@ class PathMotion(NamedTuple):
         acted_rate: its rate.
         sensed: reading after the sensor chain, before what signals of the record add to it.
         stages: displacement, velocity, reading and, where it moves, acceleration of the base at start, middle
-            and end of each step, which internal states follow.
+            and end of each step, which internal states follow; one step a sample, or several.
         channels: signals of the record.
     """
 
@@ -100,7 +100,7 @@ class PathMotion(NamedTuple):
     acted: Float[Array, "time lanes"]
     acted_rate: Float[Array, "time lanes"]
     sensed: Float[Array, "time lanes"]
-    stages: tuple[Float[Array, "time 3 lanes"], ...]
+    stages: tuple[Float[Array, "step 3 lanes"], ...]
     channels: dict[str, Float[Array, "time lanes"]]
 
 
@@ -129,12 +129,16 @@ def input_columns(
         family: the effects, of one kind and at zero strength.
         motion: the motion, with the channels that the kind follows.
         start: its internal states at the first step, members first.
-        step: duration of a step [s].
+        step: time between samples [s].
 
     Returns:
         The changes, by effect input.
     """
-    internal = internal_state_path(family.elements, motion.stages, start, step)[1] if start else ()
+    internal: State = ()
+    if start:
+        steps = motion.stages[0].shape[0] // motion.x.shape[0]
+        path = internal_state_path(family.elements, motion.stages, start, step / steps)[1]
+        internal = tuple(values[::steps] for values in path)
     return _input_columns(family.elements, motion._replace(stages=()), internal)
 
 

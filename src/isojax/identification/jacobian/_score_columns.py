@@ -20,7 +20,7 @@ from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters, own_parameters
 from ...models import Isolator, State
-from ._batch import Batch, Prepared, workers
+from ._batch import Batch, Prepared, average_around, workers
 from ._effect_inputs import input_columns
 from ._families import ElementFamily, find_families, in_turn, stack_states
 from ._information import find_stepping, share_lanes
@@ -105,12 +105,13 @@ def score_information(
 
     def one(part: int) -> np.ndarray:
         batch = prepared.batches[part].following(unknowns.model)
+        time = -(-batch.drive.shape[0] // prepared.sampling.node)
         scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
         states = share_lanes(unknowns.states, part, parts)
         scales = share_lanes(unknowns.state_scales[:size], part, parts)
         lanes = scale.shape[0]
         # A table of all columns along all lanes may not fit the memory: a few lanes at a time.
-        blocks = -(-lanes // max(1, int(_ENTRIES / (batch.drive.shape[0] * max(columns, _LEAST_COLUMNS)))))
+        blocks = -(-lanes // max(1, int(_ENTRIES / (time * max(columns, _LEAST_COLUMNS)))))
         width = -(-lanes // blocks)
         done = []
         for first in range(0, lanes, width):
@@ -137,23 +138,25 @@ def _block(
     scales: State,
 ) -> Float[np.ndarray, "lanes column column"]:
     """Work out the columns of a few lanes, and multiply them out."""
-    model, size = layout.model, 2 + layout.model.internal_states
+    model, size, node = layout.model, 2 + layout.model.internal_states, prepared.sampling.node
+    stepping, own = find_stepping(prepared), batch.following(model)
+    begin = Lanes(model, scale, states[:size])
+    error = (batch.measured - stepping.readings(begin, own, prepared.sampling)) * batch.weight
+    batch = batch.thinned(node)
     own = batch.following(model)
-    sampling = prepared.sampling
+    sampling = prepared.sampling._replace(time=node * prepared.sampling.time)
     quantity, step = sampling.quantity, sampling.time
-    path, ringing = find_stepping(prepared).path(Lanes(model, scale, states[:size]), own, sampling)
-    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, quantity)
+    path, ringing = stepping.path(begin, own, sampling)
+    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, quantity, node)
     lanes, time = scale.shape[0], batch.measured.shape[0]
     table = np.empty((lanes, columns, time))
-    weight = np.asarray(batch.weight)
-    error = (np.asarray(batch.measured) - np.asarray(slopes.reading)) * weight
-    table[:, -1] = error.T
+    table[:, -1] = np.asarray(average_around(error, node) * batch.weight).T
 
     exact = None
     if ringing is not None:
         exact = transitions_along(model, layout.moving, scale, path, own.acting, quantity, step)
     group = _Group(slopes.states, exact, batch.weight, step)
-    for source in _sources(layout, prepared, batch, slopes, exact, states[size:], columns, part):
+    for source in _sources(layout, step, batch, slopes, exact, states[size:], columns, part):
         group.add(*source)
         if group.is_full:
             group.solve(table)
@@ -167,12 +170,15 @@ def _block(
         return np.moveaxis(np.asarray(_weigh(rows, batch.weight, sampling.whitening)), -1, 0)
     # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
-        return table @ np.swapaxes(table, 1, 2)
+        products = table @ np.swapaxes(table, 1, 2)
+    # Of the residual that is what the averages leave out, too.
+    products[:, -1, -1] = np.asarray(jnp.sum(error**2, axis=0))
+    return products
 
 
 def _sources(
     layout: _Layout,
-    prepared: Prepared,
+    step: float,
     batch: Batch,
     slopes: Slopes,
     exact: Transitions | None,
@@ -206,7 +212,6 @@ def _sources(
         # A model without a spring has no stiffness to scale, whatever a probe would bring.
         unit = 0.0 if slopes.scale is None else STIFFNESS_SCALE_UNIT
         yield scaled - 1, *own(unit, change, -1)
-    step = prepared.sampling.time
     starts = stack_states(layout.families, layout.probes, internal)
     inputs = {name: ready(1.0, change) for name, change in slopes.inputs.items()}
     ends = np.cumsum([0, *(family.elements.internal_states for family in layout.families)])

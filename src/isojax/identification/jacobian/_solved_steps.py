@@ -17,7 +17,7 @@ def _solve_lanes(
     start: Lanes, values: tuple[Array, ...], batch: Batch, sampling: Sampling, observed: int = 1
 ) -> tuple[State, Array]:
     """Solve each lane with steps of its own; give its states, `observed` a sample, and its readings."""
-    quantity, sample_time, integrator, jumps, _ = sampling
+    quantity, sample_time, integrator, jumps, *_ = sampling
 
     def lane(scale: Array, state: State, record: Instant) -> tuple[State, Array]:
         current = scaled_model(start.model, values, scale)

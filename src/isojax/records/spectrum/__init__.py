@@ -12,6 +12,7 @@ from ._dwell_end import Rest as Rest
 from ._dwell_end import dwell_rest as dwell_rest
 from ._dwell_end import dwell_window as dwell_window
 from ._excited_band import ExcitedBand as ExcitedBand
+from ._excited_band import driven_range as driven_range
 from ._excited_band import excited_band as excited_band
 from ._excited_band import power_spectrum as power_spectrum
 from ._excited_band import ringing_frequency as ringing_frequency

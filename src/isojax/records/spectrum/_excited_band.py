@@ -32,6 +32,9 @@ _HIGHEST_SIGNAL = 0.8
 _FIRST_POWER = 1e-3
 """Share of the drive's power that lies below its lowest excited frequency."""
 
+_LAST_POWER = 1e-2
+"""Share of it above the highest: a force channel has noise at every frequency."""
+
 
 @shown
 @dataclass(frozen=True)
@@ -132,14 +135,33 @@ def _find_band(record: Record) -> ExcitedBand:
     floor = float(np.quantile(output[frequency > 0.0], _NOISE_QUANTILE))
     above = frequency[output > _SIGNAL_TO_NOISE * max(floor, 1e-300)]
     highest = min(_HEADROOM * float(above[-1]) if above.size else nyquist, _HIGHEST_SIGNAL * nyquist)
-    if record.dwells:
-        lowest = 0.5 * min(dwell.frequency for dwell in record.dwells)
-    elif record.rings_down:
-        lowest = ringing_frequency(record.output, record.rate) / 3.0
-    else:
-        driven = record.output if not np.any(record.input) else record.input
-        frequency, power = power_spectrum(driven, record.rate)
-        share = np.cumsum(power) / np.sum(power)
-        lowest = 0.5 * float(frequency[np.searchsorted(share, _FIRST_POWER)])
+    first = driven_range(record)[0]
+    lowest = first / 3.0 if record.rings_down else 0.5 * first
     lowest = min(max(lowest, slowest), 0.5 * nyquist)
     return ExcitedBand(lowest, max(highest, 1.5 * lowest))
+
+
+def driven_range(record: Record) -> tuple[float, float]:
+    """Gives the lowest and the highest frequency of a record's drive, or at which a released mass rings [Hz].
+
+    Args:
+        record: The record.
+
+    Returns:
+        Both; all but a thousandth of the drive's power lies above the first, all but a hundredth below the second.
+    """
+    return record.once("driven range", lambda: _find_range(record))
+
+
+def _find_range(record: Record) -> tuple[float, float]:
+    if record.dwells:
+        excited = [dwell.frequency for dwell in record.dwells]
+        return min(excited), max(excited)
+    if record.rings_down:
+        ringing = ringing_frequency(record.output, record.rate)
+        return ringing, ringing
+    moving = record.output if not np.any(record.input) else record.input
+    frequency, power = power_spectrum(moving, record.rate)
+    share = np.cumsum(power) / np.sum(power)
+    first, last = np.searchsorted(share, [_FIRST_POWER, 1.0 - _LAST_POWER])
+    return float(frequency[first]), float(frequency[last])
