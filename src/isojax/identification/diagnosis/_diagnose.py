@@ -121,10 +121,10 @@ def diagnose_with(
         search,
         is_good(fit, search.rules),
     )
-    return _weigh_refits(case, refit_candidates(case))
+    return weigh_refits(case, refit_candidates(case))
 
 
-def _weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
+def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     """Weigh the refits, and word the verdict."""
     fitted, rules, test = case.fitted, case.rules, case.test
     inflation = smallest_inflation(by_evidence(refits, rules))
