@@ -326,6 +326,30 @@ PROBES = (
     ids=["spring", "memory", "four steps a sample", "friction", "stop", "base excitation"],
 )
 def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
+    exact, found = _both_ways(model)
+    for lane in range(2):
+        assert _deviation(found[lane], exact[lane]) < 3e-4
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))),
+        Isolator(800.0, (*SPRING, CoulombFriction(8.0, 2e-3))),
+    ],
+    ids=["memory", "friction"],
+)
+def test_columns_at_every_third_sample_are_almost_those_of_the_exact_derivatives(model):
+    # 31 nodes in a cycle of the strong tone, 21 in one of the weak; what lies between is lost, never invented.
+    exact, found = _both_ways(model, node=3)
+    for lane in range(2):
+        assert _deviation(found[lane], exact[lane]) < 0.2
+        share = np.diag(found[lane]) / np.diag(exact[lane])
+        assert np.all(share < 1.005) and np.median(share) > 0.95
+
+
+def _both_ways(model, node=1):
+    """Information with probes among the columns: by exact derivatives, and by one linear solve."""
     probes = tuple(probe for probe in PROBES if model.element(probe.name) is None)
     full = model.with_elements(*probes)
     amplitude = 120.0 if model.excitation == "force" else 0.15
@@ -344,7 +368,6 @@ def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
     exact = information(moved, prepared)
     first = len(places) + (model.element("linear_stiffness") is not None)
     keep = np.r_[0 : first + own, first + states]
+    prepared = prepared._replace(sampling=prepared.sampling._replace(node=node))
     found = score_information(moved, len(model.elements), prepared)
-    for lane in range(2):
-        reference = exact[lane][np.ix_(keep, keep)]
-        assert _deviation(found[lane], reference) < 3e-4
+    return [one[np.ix_(keep, keep)] for one in exact], found

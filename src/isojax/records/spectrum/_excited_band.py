@@ -142,13 +142,13 @@ def _find_band(record: Record) -> ExcitedBand:
 
 
 def driven_range(record: Record) -> tuple[float, float]:
-    """Gives the lowest and the highest frequency of a record's drive, or at which a released mass rings [Hz].
+    """Gives the lowest and the highest frequency of a record's drive, or of a released mass's motion [Hz].
 
     Args:
         record: The record.
 
     Returns:
-        Both; all but a thousandth of the drive's power lies above the first, all but a hundredth below the second.
+        Both; a thousandth of the drive's power lies below the first, a hundredth above the second.
     """
     return record.once("driven range", lambda: _find_range(record))
 
@@ -157,11 +157,10 @@ def _find_range(record: Record) -> tuple[float, float]:
     if record.dwells:
         excited = [dwell.frequency for dwell in record.dwells]
         return min(excited), max(excited)
-    if record.rings_down:
-        ringing = ringing_frequency(record.output, record.rate)
-        return ringing, ringing
     moving = record.output if not np.any(record.input) else record.input
     frequency, power = power_spectrum(moving, record.rate)
     share = np.cumsum(power) / np.sum(power)
-    first, last = np.searchsorted(share, [_FIRST_POWER, 1.0 - _LAST_POWER])
-    return float(frequency[first]), float(frequency[last])
+    first, last = frequency[np.searchsorted(share, [_FIRST_POWER, 1.0 - _LAST_POWER])]
+    # A release or a blow excites all frequencies from zero on.
+    lowest = ringing_frequency(record.output, record.rate) if record.rings_down else first
+    return float(lowest), float(last)
