@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from isojax import rig
+from isojax._results import RESULTS
 from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
 from isojax.identification import (
     Extension,
@@ -23,7 +24,7 @@ from isojax.identification.diagnosis import findings_in
 from isojax.identification.diagnosis._imitations import find_simpler_pair, find_superfluous
 from isojax.identification.diagnosis._refit import Refit, refit_candidate
 from isojax.identification.diagnosis._score import absent_effects, score_test
-from isojax.identification.fitting import Search
+from isojax.identification.fitting import Rival, Search, _descent
 from isojax.models import Integrator, Isolator
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
@@ -103,6 +104,27 @@ def test_a_superfluous_finding_is_dropped_where_the_search_without_it_finds_noth
     assert [one.effect for one in findings_in(final.model, extensions)] == ["cubic_stiffness"]
     assert final.stats.chi2 == pytest.approx(second.after.stats.chi2, abs=10.0)
     assert float(final.model["coulomb_friction.force_level"]) == pytest.approx(4.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_refit_that_does_not_promise_to_catch_up_is_given_up_and_one_that_does_is_not(thin, monkeypatch):
+    found = fit(START, thin, integrator=Integrator())
+    search = Search(scales(thin), max_steps=40)
+    test = score_test(found.estimate, search, absent_effects(found.model, search.scales))
+    place = next(index for index, score in enumerate(test.scores) if score.element.name == "bouc_wen")
+
+    def refitted(rival):
+        return refit_candidate(test, place, search._replace(rival=rival))
+
+    alone = refitted(None)
+    assert alone.result == RESULTS.successful
+    near = refitted(Rival(alone.chi2, 10.0))
+    assert near.result == RESULTS.successful
+    assert near.chi2 == pytest.approx(alone.chi2, abs=1.0)
+    far = refitted(Rival(0.5 * alone.chi2, 10.0))
+    assert far.result == RESULTS.outdone
+    monkeypatch.setattr(_descent, "UNPROMISING", search.max_steps)
+    assert far.steps < min(alone.steps, refitted(Rival(0.5 * alone.chi2, 10.0)).steps)
 
 
 def _outdone(campaign, law, rival):

@@ -41,8 +41,8 @@ class Rival(NamedTuple):
 
     Attributes:
         chi2: what it reaches.
-        tie: difference of chi2 up to which two models are indistinguishable. A search that is further behind,
-            and at its pace would not catch up within all its evaluations, is given up.
+        tie: difference of chi2 up to which two models are indistinguishable. A search that is further behind
+            is given up where its pace, or its linear steps, do not promise to catch up.
     """
 
     chi2: float
