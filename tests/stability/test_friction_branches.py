@@ -16,11 +16,11 @@ NATURAL = math.sqrt(STIFFNESS / MASS) / (2.0 * math.pi)
 MODEL = ij.Isolator(MASS, (ij.LinearStiffness(STIFFNESS), ij.elements.CoulombFriction(FRICTION, 1e-3)))
 
 
-def den_hartog(ratio):
+def den_hartog(ratio, force=FORCE):
     """Give the amplitude of a motion without stops, Den Hartog 1931, Trans. ASME 53:107."""
     response = 1.0 / (1.0 - ratio**2)
     damping = np.sin(np.pi / ratio) / (ratio * (1.0 + np.cos(np.pi / ratio)))
-    return np.sqrt((FORCE / STIFFNESS * response) ** 2 - (FRICTION / STIFFNESS * damping) ** 2)
+    return np.sqrt((force / STIFFNESS * response) ** 2 - (FRICTION / STIFFNESS * damping) ** 2)
 
 
 def test_the_response_with_dry_friction_is_whole_and_that_of_den_hartog():
@@ -30,6 +30,18 @@ def test_the_response_with_dry_friction_is_whole_and_that_of_den_hartog():
     assert frequency[-1] == pytest.approx(2.0 * NATURAL, rel=1e-9)
     assert frequency.size < 200
     np.testing.assert_allclose(np.asarray(response.amplitude), den_hartog(frequency / NATURAL), rtol=1e-4)
+
+
+@pytest.mark.slow
+def test_bristles_far_shorter_than_the_motion_are_followed_as_dry_friction():
+    bristles = ij.Isolator(MASS, (ij.LinearStiffness(STIFFNESS), ij.DahlFriction(FRICTION, 5e-5)))
+    ends = {"start": FORCE, "stop": 35.0}
+    branch = ij.continue_branch(
+        bristles, parameter="amplitude", frequency=1.5 * NATURAL, **ends, other_periods=(), step=0.2
+    )
+    assert branch.result == ij.RESULTS.successful
+    wanted = den_hartog(1.5, np.asarray(branch.points.amplitude))
+    np.testing.assert_allclose(np.asarray(branch.points.response), wanted, rtol=5e-3)
 
 
 @pytest.fixture(scope="module")

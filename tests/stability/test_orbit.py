@@ -17,6 +17,10 @@ from isojax._results import RESULTS, is_successful
 FORCE, FREQUENCY = 150.0, 4.3
 
 
+FAST = 3e-6
+"""Presliding of a friction a few hundred times shorter than the motion [m]."""
+
+
 def y_law(**changes):
     """The paper's y model for SciPy, with other coefficients or further effects."""
     return polynomial(**{**Y_DIRECTION, **changes})
@@ -248,21 +252,52 @@ def with_memory(rates):
     [
         (ij.MaxwellBranch(2e5, 0.03), lambda v, z, forth, out: v - z / 0.03),
         (ij.DahlFriction(2e5 * 3e-4, 3e-4), lambda v, z, forth, out: v - forth * v * z / 3e-4),
+        (ij.DahlFriction(2e5 * FAST, FAST), lambda v, z, forth, out: v - forth * v * z / FAST),
         (
             ij.BoucWen(2e5, 900.0, -300.0, 1.0),
             lambda v, z, forth, out: v - (900.0 * forth * out - 300.0) * v * out * z,
         ),
     ],
-    ids=["maxwell", "dahl", "bouc_wen"],
+    ids=["maxwell", "dahl", "fast dahl", "bouc_wen"],
 )
 def test_orbits_with_memory_are_those_of_scipy(element, rates, y_orbit):
     model = y_orbit.model.with_elements(element)
     orbit = find_periodic_orbit(model, y_orbit.excitation)
-    scale = np.array([1.0, 1.0, 3e-4 if isinstance(element, ij.DahlFriction) else 1.0])
+    scale = np.array([1.0, 1.0, element.presliding if isinstance(element, ij.DahlFriction) else 1.0])
     reference = shoot(with_memory(rates), FORCE, FREQUENCY, np.asarray(orbit.y0) * scale)
     np.testing.assert_allclose(np.asarray(orbit.y0) * scale, reference.y0, rtol=1e-7, atol=1e-12)
     ours = np.sort_complex(orbit.floquet.multipliers)
     np.testing.assert_allclose(ours, np.sort_complex(reference.multipliers), atol=1e-7)
+    if element.name == "dahl_friction" and element.presliding == FAST:
+        cell = ij.stability_map(model, [FORCE], [FREQUENCY])
+        roots = np.sort_complex(np.asarray(cell.multipliers)[0, 0])
+        np.testing.assert_allclose(roots, np.sort_complex(reference.multipliers), atol=cell.error + 1e-7)
+
+
+def test_steps_that_a_fast_state_makes_unstable_are_refused_by_a_map(y_orbit):
+    model = y_orbit.model.with_elements(ij.DahlFriction(1.0, FAST))
+    with pytest.raises(ValueError, match=r"`integrator` must take at least .* too fast for fewer"):
+        ij.stability_map(model, [FORCE], [FREQUENCY], integrator=ij.Integrator())
+
+
+@pytest.mark.slow
+def test_a_state_too_fast_for_any_steps_says_so(y_orbit):
+    model = y_orbit.model.with_elements(ij.DahlFriction(1.0, 1e-9))
+    orbit = find_periodic_orbit(model, y_orbit.excitation)
+    assert orbit.result == RESULTS.stiff
+    assert np.all(np.isnan(orbit.y0))
+    assert "dry friction" in str(orbit)
+
+
+@pytest.mark.slow
+def test_a_drive_far_below_resonance_moves_a_linear_isolator_by_its_closed_form():
+    # 1200 times below resonance fixed steps of the drive's period are too long for the free vibration.
+    omega = 2.0 * np.pi * 5e-3
+    orbit = find_periodic_orbit(
+        ij.Isolator(800.0, (ij.LinearStiffness(1e6), ij.LinearDamping(4e3))), Harmonic(100.0, 5e-3)
+    )
+    moved = 100.0 / abs(1e6 - 800.0 * omega**2 + 4e3j * omega)
+    assert float(orbit.amplitude) == pytest.approx(moved, rel=1e-9)
 
 
 @pytest.mark.slow
