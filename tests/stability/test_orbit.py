@@ -17,10 +17,6 @@ from isojax._results import RESULTS, is_successful
 FORCE, FREQUENCY = 150.0, 4.3
 
 
-FAST = 3e-6
-"""Presliding of a friction a few hundred times shorter than the motion [m]."""
-
-
 def y_law(**changes):
     """The paper's y model for SciPy, with other coefficients or further effects."""
     return polynomial(**{**Y_DIRECTION, **changes})
@@ -252,13 +248,12 @@ def with_memory(rates):
     [
         (ij.MaxwellBranch(2e5, 0.03), lambda v, z, forth, out: v - z / 0.03),
         (ij.DahlFriction(2e5 * 3e-4, 3e-4), lambda v, z, forth, out: v - forth * v * z / 3e-4),
-        (ij.DahlFriction(2e5 * FAST, FAST), lambda v, z, forth, out: v - forth * v * z / FAST),
         (
             ij.BoucWen(2e5, 900.0, -300.0, 1.0),
             lambda v, z, forth, out: v - (900.0 * forth * out - 300.0) * v * out * z,
         ),
     ],
-    ids=["maxwell", "dahl", "fast dahl", "bouc_wen"],
+    ids=["maxwell", "dahl", "bouc_wen"],
 )
 def test_orbits_with_memory_are_those_of_scipy(element, rates, y_orbit):
     model = y_orbit.model.with_elements(element)
@@ -268,25 +263,6 @@ def test_orbits_with_memory_are_those_of_scipy(element, rates, y_orbit):
     np.testing.assert_allclose(np.asarray(orbit.y0) * scale, reference.y0, rtol=1e-7, atol=1e-12)
     ours = np.sort_complex(orbit.floquet.multipliers)
     np.testing.assert_allclose(ours, np.sort_complex(reference.multipliers), atol=1e-7)
-    if element.name == "dahl_friction" and element.presliding == FAST:
-        cell = ij.stability_map(model, [FORCE], [FREQUENCY])
-        roots = np.sort_complex(np.asarray(cell.multipliers)[0, 0])
-        np.testing.assert_allclose(roots, np.sort_complex(reference.multipliers), atol=cell.error + 1e-7)
-
-
-def test_steps_that_a_fast_state_makes_unstable_are_refused_by_a_map(y_orbit):
-    model = y_orbit.model.with_elements(ij.DahlFriction(1.0, FAST))
-    with pytest.raises(ValueError, match=r"`integrator` must take at least .* too fast for fewer"):
-        ij.stability_map(model, [FORCE], [FREQUENCY], integrator=ij.Integrator())
-
-
-@pytest.mark.slow
-def test_a_state_too_fast_for_any_steps_says_so(y_orbit):
-    model = y_orbit.model.with_elements(ij.DahlFriction(1.0, 1e-9))
-    orbit = find_periodic_orbit(model, y_orbit.excitation)
-    assert orbit.result == RESULTS.stiff
-    assert np.all(np.isnan(orbit.y0))
-    assert "dry friction" in str(orbit)
 
 
 @pytest.mark.slow
