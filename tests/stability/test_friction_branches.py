@@ -54,7 +54,7 @@ def after_a_period(force, begin):
 
 
 @pytest.mark.slow
-def test_an_orbit_and_a_cell_with_bristles_far_shorter_than_the_motion_are_those_of_scipy():
+def test_an_orbit_with_bristles_far_shorter_than_the_motion_is_that_of_scipy():
     model = with_bristles()
     orbit = ij.find_periodic_orbit(model, ij.Harmonic(FORCE, FAST))
     begin = np.asarray(orbit.y0)
@@ -65,10 +65,7 @@ def test_an_orbit_and_a_cell_with_bristles_far_shorter_than_the_motion_are_those
         ends = [after_a_period(FORCE, begin + sign * shift) for sign in (1.0, -1.0)]
         columns.append((ends[0] - ends[1])[:2] / (2.0 * shift.max()))
     wanted = np.sort_complex(np.linalg.eigvals(np.array(columns).T))
-    cell = ij.stability_map(model, [FORCE], [FAST])
-    for roots in map(np.asarray, (orbit.floquet.multipliers, cell.multipliers[0, 0])):
-        largest = roots[np.argsort(np.abs(roots))[1:]]
-        np.testing.assert_allclose(np.sort_complex(largest), wanted, atol=1e-4)
+    np.testing.assert_allclose(np.sort_complex(orbit.floquet.multipliers[:2]), wanted, atol=1e-4)
     with pytest.raises(ValueError, match=r"`integrator` must take at least .* too fast for fewer"):
         ij.stability_map(model, [FORCE], [FAST], integrator=ij.Integrator())
 
