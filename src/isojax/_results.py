@@ -27,6 +27,11 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "Dry friction holds the mass for the whole period: it may rest anywhere within the friction, so that "
         "no orbit is isolated and there are no multipliers. Raise the drive."
     )
+    stiff = (
+        "A state of the model follows the motion within less than the shortest step. Use the law that it "
+        "tends to, such as dry friction for bristles that bend within a thousandth of the motion, or give "
+        "more steps in `Integrator`."
+    )
     no_further_orbit = "The cell holds no further orbit; others have more."
     not_finite = (
         "The simulated response left every bound (it is not finite). Try a smaller step, or a start whose "

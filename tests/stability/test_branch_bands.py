@@ -100,13 +100,28 @@ def test_the_ends_of_a_branch_band_lie_on_the_scaled_branch(branch):
 @pytest.mark.slow
 def test_cusps_have_the_error_of_their_scaling(branch):
     window = {"amplitude_range": (0.05, 1.0), "frequency_range": (1.1 / TURN, 1.7 / TURN)}
-    folds = ij.fold_curve(DUFFING, **window, start=branch.special_points[0], step=0.03, fit=STIFF)
+    folds = ij.fold_curve(DUFFING, **window, start=branch.special_points[0], step=0.1, fit=STIFF)
     (cusp,) = folds.cusps
     wanted = 0.5 * SHARE * float(cusp.amplitude)
     assert float(cusp.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-6)
     assert abs(float(cusp.band.standard_error["frequency"])) < 1e-6 * SHARE * float(cusp.frequency)
     assert " ± " in str(cusp)
     assert ij.plot.fold_curve(folds).axes[0].containers
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [0.05, 0.1])
+def test_the_one_cusp_is_found_whatever_the_step(branch, step):
+    window = {"amplitude_range": (0.05, 1.0), "frequency_range": (1.1 / TURN, 1.7 / TURN)}
+    folds = ij.fold_curve(DUFFING, **window, start=branch.special_points[0], step=step)
+    (cusp,) = folds.special_points
+    # Of one harmonic: w^2 - 1 = sqrt(3) c w and F^2 = 32 (w^2 - 1)^3 / 81.
+    rate = 0.1 * np.sqrt(3.0) + np.sqrt(0.03 + 1.0)
+    assert TURN * float(cusp.frequency) == pytest.approx(rate, rel=2e-3)
+    assert float(cusp.amplitude) == pytest.approx(np.sqrt(32.0 * (rate**2 - 1.0) ** 3 / 81.0), rel=0.01)
+    # And where the curve turns back in both.
+    assert float(cusp.amplitude) <= float(np.min(folds.amplitude)) * (1.0 + 1e-9)
+    assert float(cusp.frequency) <= float(np.min(folds.frequency)) * (1.0 + 1e-9)
 
 
 def test_an_event_of_a_linear_branch_has_the_error_of_its_closed_form():

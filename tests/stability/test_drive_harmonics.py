@@ -49,6 +49,22 @@ def test_harmonics_of_the_drive_superpose_in_a_linear_isolator(amplitude):
     np.testing.assert_allclose(balance.coefficients[0], wanted, atol=1e-9 * abs(wanted[1]))
 
 
+def test_harmonics_without_their_fundamental_are_refused_or_superpose_beside_next_to_none():
+    model = LINEAR.with_elements(DriveHarmonics(1e11, 0.7, 3.0))
+    _, _, found = orbit_of(model, ij.Harmonic(1e-9, 4.0), ij.Integrator(steps_per_period=1024))
+    wanted = superposed(((1e11, 0.7, 3),), 1e-9, 4.0, 0.0, 8)
+    np.testing.assert_allclose(found[:8], wanted, atol=1e-9 * abs(wanted[3]))
+    none = ij.Harmonic(0.0, 4.0)
+    ends = {"amplitude": 0.0, "start": 3.0, "stop": 5.0}
+    for call in (
+        lambda: ij.find_periodic_orbit(model, none),
+        lambda: ij.harmonic_balance(model, none),
+        lambda: ij.continue_branch(model, parameter="frequency", **ends),
+    ):
+        with pytest.raises(ValueError, match="an amplitude other than 0 where harmonics are added"):
+            call()
+
+
 def flow(start, share, amplitude=0.3, frequency=0.2):
     """State and monodromy of the Duffing oscillator after a drive period, by SciPy."""
     rate = 2.0 * np.pi * frequency

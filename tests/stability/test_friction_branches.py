@@ -6,9 +6,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import isojax as ij
-from isojax.stability.orbit import recorded_sine, trajectory
+from isojax.stability.orbit import integrator_that_follows, recorded_sine, trajectory
 from isojax.stability.orbit._event_path import follow_events
 
 MASS, STIFFNESS, FRICTION, FORCE = 2.0, 800.0, 6.0, 40.0
@@ -30,6 +31,69 @@ def test_the_response_with_dry_friction_is_whole_and_that_of_den_hartog():
     assert frequency[-1] == pytest.approx(2.0 * NATURAL, rel=1e-9)
     assert frequency.size < 200
     np.testing.assert_allclose(np.asarray(response.amplitude), den_hartog(frequency / NATURAL), rtol=1e-4)
+
+
+PRESLIDING, FAST = 2e-4, 1.5 * NATURAL
+"""Of bristles two hundred times shorter than the motion [m]; frequency of its drive [Hz]."""
+
+
+def with_bristles(presliding=PRESLIDING):
+    return ij.Isolator(MASS, (ij.LinearStiffness(STIFFNESS), ij.DahlFriction(FRICTION, presliding)))
+
+
+def after_a_period(force, begin):
+    """Give the state a period later by SciPy."""
+
+    def rates(t, y):
+        x, v, z = y
+        drive = force * np.sin(2.0 * np.pi * FAST * t)
+        return v, (drive - STIFFNESS * x - FRICTION * z) / MASS, (v - abs(v) * z) / PRESLIDING
+
+    tight = {"method": "LSODA", "rtol": 1e-10, "atol": 1e-12}
+    return solve_ivp(rates, (0.0, 1.0 / FAST), begin, **tight).y[:, -1]
+
+
+@pytest.mark.slow
+def test_an_orbit_with_bristles_far_shorter_than_the_motion_is_that_of_scipy():
+    model = with_bristles()
+    orbit = ij.find_periodic_orbit(model, ij.Harmonic(FORCE, FAST))
+    begin = np.asarray(orbit.y0)
+    np.testing.assert_allclose(after_a_period(FORCE, begin), begin, rtol=1e-6, atol=1e-8)
+    # The third multiplier is exp(-thousands): the bristles forget where they were.
+    columns = []
+    for shift in 1e-5 * np.diag([1.0, 20.0, 0.0])[:2]:
+        ends = [after_a_period(FORCE, begin + sign * shift) for sign in (1.0, -1.0)]
+        columns.append((ends[0] - ends[1])[:2] / (2.0 * shift.max()))
+    wanted = np.sort_complex(np.linalg.eigvals(np.array(columns).T))
+    np.testing.assert_allclose(np.sort_complex(orbit.floquet.multipliers[:2]), wanted, atol=1e-4)
+    with pytest.raises(ValueError, match=r"`integrator` must take at least .* too fast for fewer"):
+        ij.stability_map(model, [FORCE], [FAST], integrator=ij.Integrator())
+
+
+@pytest.mark.parametrize(("presliding", "steps", "stiff"), [(2e-4, 2048, False), (2e-7, 8192, True)])
+def test_steps_follow_the_rate_of_bristles_in_closed_form(presliding, steps, stiff):
+    # z' = (v - |v| z) / presliding: the rate is at most omega X / presliding, a step half of its inverse.
+    size = 0.04
+    found = integrator_that_follows(
+        with_bristles(presliding), ij.Integrator(), np.array([size]), np.array([FAST])
+    )
+    needed = 2.0 * math.pi * size / presliding / 0.5
+    assert found[0].steps_a_period(with_bristles()) == 2 * steps
+    assert found[1] == stiff == (needed > 2 * steps)
+    assert stiff or needed > steps
+
+
+@pytest.mark.slow
+def test_a_branch_with_bristles_far_shorter_than_the_motion_is_whole_and_returns_under_scipy():
+    ends = {"start": FORCE, "stop": 35.0}
+    branch = ij.continue_branch(
+        with_bristles(), parameter="amplitude", frequency=FAST, **ends, other_periods=(), step=0.2
+    )
+    assert branch.result == ij.RESULTS.successful
+    for place in (0, -1):
+        begin = np.asarray(branch.points.y0[place])
+        end = after_a_period(float(branch.points.amplitude[place]), begin)
+        np.testing.assert_allclose(end, begin, atol=1e-4 * np.max(np.abs(begin)), rtol=1e-4)
 
 
 @pytest.fixture(scope="module")

@@ -258,11 +258,22 @@ def with_memory(rates):
 def test_orbits_with_memory_are_those_of_scipy(element, rates, y_orbit):
     model = y_orbit.model.with_elements(element)
     orbit = find_periodic_orbit(model, y_orbit.excitation)
-    scale = np.array([1.0, 1.0, 3e-4 if isinstance(element, ij.DahlFriction) else 1.0])
+    scale = np.array([1.0, 1.0, element.presliding if isinstance(element, ij.DahlFriction) else 1.0])
     reference = shoot(with_memory(rates), FORCE, FREQUENCY, np.asarray(orbit.y0) * scale)
     np.testing.assert_allclose(np.asarray(orbit.y0) * scale, reference.y0, rtol=1e-7, atol=1e-12)
     ours = np.sort_complex(orbit.floquet.multipliers)
     np.testing.assert_allclose(ours, np.sort_complex(reference.multipliers), atol=1e-7)
+
+
+@pytest.mark.slow
+def test_a_drive_far_below_resonance_moves_a_linear_isolator_by_its_closed_form():
+    # 1200 times below resonance fixed steps of the drive's period are too long for the free vibration.
+    omega = 2.0 * np.pi * 5e-3
+    orbit = find_periodic_orbit(
+        ij.Isolator(800.0, (ij.LinearStiffness(1e6), ij.LinearDamping(4e3))), Harmonic(100.0, 5e-3)
+    )
+    moved = 100.0 / abs(1e6 - 800.0 * omega**2 + 4e3j * omega)
+    assert float(orbit.amplitude) == pytest.approx(moved, rel=1e-9)
 
 
 @pytest.mark.slow

@@ -26,9 +26,9 @@ _CLOSES_FROM, _CLOSES_WITHIN = 5, 0.2
 """Points after which a curve may close, and the distance of its first point from a step, over the step, below
 which it does."""
 
-_RAN_OUT, REACHED_BOUND, RETURNED, _STALLED, _NEVER_STARTED, _TURNED, HELD = range(7)
+_RAN_OUT, REACHED_BOUND, RETURNED, STALLED, NEVER_STARTED, _TURNED, HELD, STIFF = range(8)
 """Why a curve ends: out of points, on a bound, back at its first point, no step short enough, no first
-point, past its first turn, where dry friction holds the mass."""
+point, past its first turn, where dry friction holds the mass, where a state is too fast for any steps."""
 
 
 class Departure(NamedTuple):
@@ -169,7 +169,7 @@ def follow(
         shorter = 0.5 * jnp.minimum(walk.step, jnp.linalg.norm(walk.predicted - walk.base))
         past = walk.followed
         predicted, row, landing = predict(walk.base, walk.tangent, shorter)
-        stuck = jnp.where(past.found == 0, _NEVER_STARTED, _STALLED)
+        stuck = jnp.where(past.found == 0, NEVER_STARTED, STALLED)
         # Where friction is about to hold the mass, motions are so small that Newton may stall before.
         ahead = walk.base + step * walk.tangent
         stuck = jnp.where(holds(jnp.where(jnp.arange(size) < free, 0.0, ahead)), HELD, stuck)

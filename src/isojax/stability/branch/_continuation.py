@@ -8,7 +8,7 @@ from typing import get_args
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen
 from ..._parameters import list_parameters
@@ -23,8 +23,16 @@ from ...models import (
     as_isolator,
     coefficient_errors,
 )
-from ..orbit import ShootingMethod, integrator_for, is_odd, refuse_traced, response_start
-from ._arc_length import HELD, REACHED_BOUND, Departure, Followed, Stride
+from ..orbit import (
+    ShootingMethod,
+    integrator_for,
+    integrator_that_follows,
+    is_odd,
+    need_fundamental,
+    refuse_traced,
+    response_start,
+)
+from ._arc_length import HELD, NEVER_STARTED, REACHED_BOUND, STALLED, STIFF, Departure, Followed, Stride
 from ._branch import Branch, BranchEvent
 from ._branch_bands import with_bands
 from ._criticality import BifurcationKind
@@ -156,12 +164,39 @@ def continue_branch(
     begin = None if start_state is None else jnp.stack([as_float64(value) for value in start_state])
     method, stride = ShootingMethod(integrator, periods, half), Stride(step, most)
     scale, followed = follow_branches(frozen(family), method, frozen(begin), stride)
+    if _stalled(followed).any():
+        finer, stiff = _finer(frozen(family), integrator, scale)
+        if finer.steps_per_period > integrator.steps_per_period:
+            method = ShootingMethod(finer, periods, half)
+            scale, followed = follow_branches(frozen(family), method, frozen(begin), stride)
+        if stiff:
+            followed = followed._replace(ending=jnp.where(_stalled(followed), STIFF, followed.ending))
     branch = assemble(family, method, scale, followed, batched, step, tuple(events))
     if other_periods:
         search = BranchSearch(tuple(other_periods), stride, tuple(events))
         found, searched = find_other_branches(family, method, scale, followed, search)
         branch = dataclasses.replace(branch, others=found, searched=searched)
     return branch if errors is None else with_bands(branch, errors)
+
+
+def _stalled(followed: Followed) -> Bool[Array, " branch"]:
+    """Say which branches end where no step was short enough, or did not start."""
+    return (followed.ending == STALLED) | (followed.ending == NEVER_STARTED)
+
+
+def _finer(
+    family: ParameterFamily, integrator: Integrator, scale: Float[Array, "branch state"]
+) -> tuple[Integrator, bool]:
+    """Give the integrator with steps that follow the states all over a range, and whether these are stiff."""
+    stiff = False
+    for share in (0.0, 1.0):
+        there = family.at(jnp.asarray([share]))
+        frequencies = np.broadcast_to(np.asarray(there.frequency), scale.shape[:1])
+        integrator, more = integrator_that_follows(
+            there.model, integrator, np.asarray(scale[:, 0]), frequencies
+        )
+        stiff = stiff or more
+    return integrator, stiff
 
 
 def follow_branches(
@@ -215,6 +250,8 @@ def swept_family(
         if (value is None) != (name == parameter):
             wanted = "omitted where it is the parameter" if name == parameter else "given"
             raise ValueError(f"Argument `{name}` must be {wanted}, but is {value}.")
+    if parameter != "amplitude":
+        need_fundamental(frozen(model), frozen(as_float64(held["amplitude"])))
     start, stop = as_float64(start), as_float64(stop)
     ends = [float(frozen(end)) for end in (start, stop)]
     if not all(map(math.isfinite, ends)) or ends[0] == ends[1]:

@@ -85,7 +85,7 @@ def null_direction(matrix: Array) -> Array:
         matrix: real or complex.
 
     Returns:
-        The vector; its sign, or phase, is arbitrary.
+        The vector; its largest component is positive, so that all who ask for it get the same.
 
     Source: Govaerts 2000, Numerical Methods for Bifurcations of Dynamical Equilibria, ch. 3.
     """
@@ -96,7 +96,8 @@ def null_direction(matrix: Array) -> Array:
     bordered = jnp.concatenate([bordered, jnp.concatenate([column, jnp.zeros(1)])[:, None]], axis=1)
     wanted = jnp.zeros(size + 1, bordered.dtype).at[-1].set(1.0)
     vector = jnp.linalg.solve(bordered, wanted)[:size]
-    return vector / jnp.sqrt(jnp.sum(jnp.abs(vector) ** 2))
+    phase = frozen(jnp.sign(vector[jnp.argmax(jnp.abs(vector))]))
+    return vector / (phase * jnp.sqrt(jnp.sum(jnp.abs(vector) ** 2)))
 
 
 def critical_direction(

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..orbit import ShootingMethod
-from ._arc_length import HELD, REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
+from ._arc_length import HELD, REACHED_BOUND, RETURNED, STIFF, Departure, Followed, Stride, follow
 from ._branch import Branch, BranchEvent, BranchPoints, branch_point
 from ._locating import BranchCurves
 from ._parameter_family import ParameterFamily
@@ -127,10 +127,11 @@ def assemble(
     ended = (followed.ending == REACHED_BOUND) | (followed.ending == RETURNED)
     good = RESULTS.promote(diffrax.RESULTS.successful)
 
-    def outcome(well: Array, held: Array) -> RESULTS:
-        return RESULTS.where(well, good, RESULTS.where(held, RESULTS.sticks, RESULTS.not_converged))
+    def outcome(well: Array, ending: Array) -> RESULTS:
+        lost = RESULTS.where(ending == STIFF, RESULTS.stiff, RESULTS.not_converged)
+        return RESULTS.where(well, good, RESULTS.where(ending == HELD, RESULTS.sticks, lost))
 
-    result = jax.vmap(outcome)(ended, followed.ending == HELD)
+    result = jax.vmap(outcome)(ended, followed.ending)
     kept = family.driven(single(family.amplitude), single(family.frequency))
     return Branch(
         family.model,

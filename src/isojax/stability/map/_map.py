@@ -45,6 +45,7 @@ from ._single_orbits import SingleOrbits
 from ._sought import MapRun, Sought, seek
 from ._starts import Candidates, joined
 from ._surface import MapWindow
+from ._window_steps import check_steps, window_integrator
 
 _READING_SHARE = 0.2
 """Of the error that a map may have, where its orbits are read off: there steps cost little."""
@@ -246,6 +247,8 @@ def stability_map(
     if chunk < 1:
         raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
     window = MapWindow(forces, band, reach)
+    if integrator is not None:
+        check_steps(model, integrator, window)
     folder = None if checkpoint is None else Path(checkpoint)
     run = MapRun(coexisting, integrator, chunk, folder, progress, devices)
     smap, _ = solve_map(model, window, run)
@@ -291,7 +294,12 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         The map, and the surface from which its orbits came.
     """
     half, (forces, band, _) = is_odd(model), window
-    integrator = integrator_for(model, None) if run.integrator is None else run.integrator
+    integrator, least = run.integrator, fewest_steps(model)
+    if integrator is None:
+        usual = integrator_for(model, None)
+        integrator = window_integrator(model, usual, window)
+        if integrator.steps_per_period > usual.steps_per_period:
+            least = integrator.steps_per_period
     sought = seek(model, integrator, half, window, integrator.map_error, run)
     goal = _READING_SHARE * integrator.map_error
     if run.integrator is None and sought.reading_error > goal:
@@ -301,7 +309,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     if run.integrator is None and isinstance(first.solver, CellSolver):
         # Nothing is read off: each orbit is integrated for itself, and steps cost.
         steps = steps_needed(first.solver, first.candidates, window)
-        integrator = integrator.with_steps(max(steps, fewest_steps(model)))
+        integrator = integrator.with_steps(max(steps, least))
         sought = sought.with_steps(integrator.steps_a_period(model))
     if run.progress is not None:
         run.progress("orbits over displacement and frequency found")

@@ -15,7 +15,7 @@ from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
-from ..orbit import integrator_for, response_amplitudes, rest_displacement
+from ..orbit import integrator_for, integrator_over, response_amplitudes, rest_displacement
 from ._map_method import MapMethod
 from ._nodes import closed_nodes, node_responses, node_starts
 from ._shared_kinks import AROUND, SharedKinks, shared_kinks
@@ -140,8 +140,16 @@ def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Arr
     return rest, response_amplitudes(model, frequencies, amplitudes, rest)
 
 
-def _displacements(model: Isolator, window: MapWindow) -> tuple[float, float, float]:
-    """Give rest and the displacement amplitudes, least and largest, that the forces of a window can hold."""
+def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, float]:
+    """Give rest and the displacement amplitudes that the forces of a window can hold.
+
+    Args:
+        model: the isolator.
+        window: of the map.
+
+    Returns:
+        The displacement at rest, the least amplitude and the largest [m].
+    """
     least, most, frequencies = (
         float(window.amplitudes.min()),
         float(window.amplitudes.max()),
@@ -179,7 +187,7 @@ def find_surface(
     Returns:
         The surface.
     """
-    rest, low, high = _displacements(model, window)
+    rest, low, high = displacements(model, window)
     ends = math.log(low), math.log(high)
     start, kinks = _start_grid(model, integrator, half, rest, ends, window.frequencies)
     steps = jnp.asarray(integrator.steps_a_period(model))
@@ -226,9 +234,10 @@ def _start_grid(
 ) -> tuple[_Grid, SharedKinks]:
     """Find orbits that are not split, without their invariants, and the kinks that most of them pass."""
     logarithms, band = _axes(ends, frequencies, 0)
+    usual = integrator_over(model, integrator_for(model, None), np.exp(ends), frequencies)
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
     # Starts need no more steps where the map takes more, and what is compiled for one grid serves the next.
-    steps = min(integrator.steps_per_period, integrator_for(model, None).steps_per_period)
+    steps = min(integrator.steps_per_period, usual.steps_per_period)
     coarse = integrator.with_steps(2 * (steps // 4 + 2))
     starts = node_starts(model, coarse, half, rest, amplitude, frequency)
     shape = len(band), len(logarithms)

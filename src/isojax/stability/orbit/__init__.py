@@ -2,9 +2,9 @@
 
 In: an isolator, a harmonic drive. Out: `Orbit` with its state at t = 0 and its Floquet multipliers, or a
 harmonic balance. Read _describing_function (the start), _event_path (steps that end where a law jumps or
-bends), _period_map (fixed steps), _kink_crossings and _split_period_map (the motion split there), _shooting
-(the closed motion), _floquet, _orbit; _harmonic_balance stands beside them. The rooms branch, map, response,
-attractor and derivatives build on this one.
+bends), _period_map (fixed steps), _fast_states (how many), _kink_crossings and _split_period_map (the motion
+split there), _shooting (the closed motion), _floquet, _orbit; _harmonic_balance stands beside them. The rooms
+branch, map, response, attractor and derivatives build on this one.
 """
 
 from ._axis import ascending as ascending
@@ -16,6 +16,9 @@ from ._describing_function import response_amplitudes as response_amplitudes
 from ._describing_function import response_start as response_start
 from ._describing_function import rest_displacement as rest_displacement
 from ._event_path import follow_events as follow_events
+from ._fast_states import answer_sizes as answer_sizes
+from ._fast_states import integrator_over as integrator_over
+from ._fast_states import integrator_that_follows as integrator_that_follows
 from ._floquet import Floquet as Floquet
 from ._floquet import margin_beside_folds as margin_beside_folds
 from ._floquet import modulus as modulus
@@ -43,6 +46,7 @@ from ._sine import Sine as Sine
 from ._sine import fewest_steps as fewest_steps
 from ._sine import highest_order as highest_order
 from ._sine import integrator_for as integrator_for
+from ._sine import need_fundamental as need_fundamental
 from ._sine import recorded_sine as recorded_sine
 from ._sine import with_overtones as with_overtones
 from ._smoothness import has_continuous_slopes as has_continuous_slopes

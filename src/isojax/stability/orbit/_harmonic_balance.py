@@ -19,7 +19,7 @@ from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import imposed_internal, response_start, rest_displacement
-from ._sine import highest_order, recorded_sine
+from ._sine import highest_order, need_fundamental, recorded_sine
 
 
 @shown
@@ -157,6 +157,7 @@ def harmonic_balance(
     frequency = frozen(excitation.frequency)
     if not isinstance(frequency, Tracer) and not 0.0 < float(frequency) < math.inf:
         raise ValueError(f"Argument `excitation` must have a positive frequency, but it is {frequency} Hz.")
+    need_fundamental(frozen(model), frozen(excitation.amplitude))
     begin = None if start is None else jnp.stack([as_float64(value) for value in start])
     return _balance(model, excitation, begin, harmonics, samples, solver, tolerance)
 

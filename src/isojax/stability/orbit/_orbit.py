@@ -20,6 +20,7 @@ from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ._describing_function import response_start
+from ._fast_states import answer_sizes, integrator_that_follows
 from ._floquet import Floquet, multipliers, stable_words
 from ._half_range import half_range
 from ._harmonic_balance import harmonic_balance
@@ -27,7 +28,7 @@ from ._held import is_held
 from ._period_map import trajectory
 from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
-from ._sine import highest_order, integrator_for, recorded_sine
+from ._sine import highest_order, integrator_for, need_fundamental, recorded_sine
 from ._split_period_map import event_places
 from ._state_path import AbstractStatePath
 from ._symmetry import is_odd
@@ -129,7 +130,8 @@ def find_periodic_orbit(
 
     Raises:
         ValueError: if the frequency is not positive, `start` has the wrong length, `periods` is no positive
-            count, or `symmetric` is asked of a model that is not odd.
+            count, `symmetric` is asked of a model that is not odd, or the drive has harmonics but no
+            amplitude.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Aprille & Trick 1972, Proc. IEEE 60:108 (shooting); Nayfeh & Balachandran 1995, ch. 3 and 5.
@@ -154,6 +156,7 @@ def find_periodic_orbit(
     frequency = drive.frequency
     if not isinstance(frequency, Tracer) and not 0.0 < float(frequency) < math.inf:
         raise ValueError(f"Argument `excitation` must have a positive frequency, but it is {frequency} Hz.")
+    need_fundamental(still, drive.amplitude)
     odd = periods == 1 and (symmetric or (symmetric is None and start is None))
     # Of a model that is being traced nothing can be said; whoever asks for symmetric orbits then knows.
     traced = any(isinstance(entry.value, Tracer) for entry in list_parameters(still))
@@ -162,27 +165,51 @@ def find_periodic_orbit(
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
     begin = None if start is None else frozen(jnp.stack([as_float64(value) for value in start]))
     method = ShootingMethod(integrator, periods, half)
+    solution, stiff = _solve(still, drive, method, solver, begin), False
+    if not isinstance(solution.found, Tracer) and not (solution.found & solution.accurate):
+        motion = answer_sizes(still, jnp.atleast_1d(drive.amplitude), jnp.atleast_1d(frequency))
+        finer, stiff = integrator_that_follows(
+            still, integrator, np.asarray(motion), np.atleast_1d(np.asarray(frequency))
+        )
+        if finer.steps_per_period > integrator.steps_per_period:
+            method = ShootingMethod(finer, periods, half)
+            solution = _solve(still, drive, method, solver, begin)
+    return _orbit(model, excitation, method, solution, jnp.asarray(stiff))
+
+
+def _solve(
+    model: Isolator,
+    drive: Harmonic,
+    method: ShootingMethod,
+    solver: optx.AbstractRootFinder,
+    begin: Float[Array, " state"] | None,
+) -> ShootingSolution:
+    """Search with room for all events, and from another start where the first leads nowhere."""
     places, most = event_places(model, method.turns), event_places(model, _EVENT_ROOM * method.turns)
-    solution = _solve(still, drive, method, solver, begin, places)
+    solution = _shoot(model, drive, method, solver, begin, places)
 
     def all_split() -> Bool[Array, ""]:
         return solution.split.complete
 
     while not isinstance(all_split(), Tracer) and not all_split() and places < most:
         places *= 2
-        solution = _solve(still, drive, method, solver, begin, places)
+        solution = _shoot(model, drive, method, solver, begin, places)
     if begin is None and not isinstance(solution.found, Tracer) and not solution.found:
-        order = highest_order(still)
+        order = highest_order(model)
         balance = harmonic_balance(
-            still, drive, harmonics=max(7, 2 * order), samples=max(128, 16 * order), integrator=integrator
+            model,
+            drive,
+            harmonics=max(7, 2 * order),
+            samples=max(128, 16 * order),
+            integrator=method.integrator,
         )
         if is_successful(balance.result):
-            solution = _solve(still, drive, method, solver, balance.y0, places)
-    return _orbit(model, excitation, method, solution)
+            solution = _shoot(model, drive, method, solver, balance.y0, places)
+    return solution
 
 
 @quick_jit
-def _solve(
+def _shoot(
     model: Isolator,
     excitation: Harmonic,
     method: ShootingMethod,
@@ -198,7 +225,11 @@ def _solve(
 
 @quick_jit
 def _orbit(
-    model: Isolator, excitation: Harmonic, method: ShootingMethod, solution: ShootingSolution
+    model: Isolator,
+    excitation: Harmonic,
+    method: ShootingMethod,
+    solution: ShootingSolution,
+    stiff: Bool[Array, ""],
 ) -> Orbit:
     found = solution.found & jnp.all(jnp.isfinite(solution.matrix))
     blank = jnp.where(found, 1.0, jnp.nan)
@@ -221,6 +252,7 @@ def _orbit(
     finite = jnp.all(jnp.isfinite(path))
     good = RESULTS.promote(diffrax.RESULTS.successful)
     failed = RESULTS.where(finite, RESULTS.not_converged, RESULTS.not_finite)
+    failed = RESULTS.where(stiff, RESULTS.stiff, failed)
     failed = RESULTS.where(is_held(model, drive), RESULTS.sticks, failed)
     accurate = RESULTS.where(solution.accurate, good, RESULTS.not_accurate)
     result = RESULTS.where(found, accurate, failed)

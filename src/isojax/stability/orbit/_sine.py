@@ -172,6 +172,24 @@ def _overtones(model: Isolator, size: Lanes, phase: Lanes) -> tuple[Overtone, ..
     return tuple(found)
 
 
+def need_fundamental(model: Isolator, amplitude: Lanes | float) -> None:
+    """Refuse a drive of nothing whose harmonics are shares of it.
+
+    Args:
+        model: the isolator, whose elements say which harmonics there are.
+        amplitude: of the recorded drive; one that is traced passes unseen.
+
+    Raises:
+        ValueError: if it is zero and there are harmonics.
+    """
+    if model.harmonics and not isinstance(amplitude, Tracer) and not np.all(np.asarray(amplitude)):
+        raise ValueError(
+            "The drive must have an amplitude other than 0 where harmonics are added to it, because they are "
+            "shares of it; for harmonics alone give a small amplitude and large shares, such as 1e-9 N and "
+            "1e11 for 100 N."
+        )
+
+
 def highest_order(model: Isolator) -> int:
     """Give the largest multiple of its frequency that a drive of a model has.
 
