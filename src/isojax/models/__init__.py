@@ -4,7 +4,8 @@ In: a mass, elements and a drive. Out: an `Isolator`, its simulated motion and r
 Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at one time), then `_rk4.py` and
 `_integrator.py` (the step), `_scan.py` (many records), `_solve.py` (diffrax) and `_simulate.py` (one drive).
 `_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file;
-`_coefficient_errors.py` carries the covariance of a fit into answers, and `_band.py` into curves;
+`_coefficient_errors.py` carries the covariance of a fit into answers, `_credible_set.py` draws from it, and
+`_band.py` both into curves;
 `_conditions.py` and `_fit_at.py` give the isolator and a fit at a chamber pressure or temperature.
 """
 
@@ -18,6 +19,9 @@ from ._coefficient_errors import CoefficientErrors as CoefficientErrors
 from ._coefficient_errors import EndsEstimated as EndsEstimated
 from ._coefficient_errors import Estimated as Estimated
 from ._coefficient_errors import coefficient_errors as coefficient_errors
+from ._credible_set import CredibleSet as CredibleSet
+from ._credible_set import credible_set as credible_set
+from ._credible_set import existence as existence
 from ._event_step import Ringing as Ringing
 from ._event_step import Step as Step
 from ._event_step import add_ringing as add_ringing

@@ -5,11 +5,12 @@ from collections.abc import Callable, Mapping
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 from scipy.special import ndtri
 
 from .._show import Row, brief, shown
 from ._coefficient_errors import CoefficientErrors
+from ._credible_set import credible_set
 from ._isolator import Isolator
 
 CONFIDENCE = 0.95
@@ -21,7 +22,10 @@ HALF_WIDTH = -float(ndtri(0.5 * (1.0 - CONFIDENCE)))
 
 @shown
 class Band(eqx.Module):
-    """The band around a curve, point by point: the error of the coefficients, to first order.
+    """The band around a curve, point by point: the error of the coefficients.
+
+    It is that of the delta method. Where draws were taken beside it and the two differ by more than a tenth
+    of the interval, the band is curved there, and its ends are quantiles of the draws.
 
     A curve that may fold back, in the plane of frequency and amplitude, moves across itself: the ends of the
     band then lie on either side of each point, and both coordinates have one.
@@ -31,15 +35,26 @@ class Band(eqx.Module):
         lower: one end of the interval.
         upper: the other end.
         confidence: chance that an interval is meant to hold the truth.
+        curved: of each quantity, where the band is curved; None where no draws were taken.
     """
 
     standard_error: Mapping[str, Float[Array, "..."]]
     lower: Mapping[str, Float[Array, "..."]]
     upper: Mapping[str, Float[Array, "..."]]
     confidence: float = eqx.field(static=True)
+    curved: Mapping[str, Bool[Array, "..."]] | None = None
+
+    @property
+    def curved_part(self) -> str:
+        """How many of its points are curved, in words; "" where none is."""
+        if self.curved is None:
+            return ""
+        bent = np.any([np.asarray(one) for one in self.curved.values()], axis=0)
+        return f"curved at {np.count_nonzero(bent)} of {bent.size} points" if bent.any() else ""
 
     def _headline(self) -> str:
-        return f"{self.confidence:.0%} of {', '.join(self.standard_error)}"
+        bent = f", {self.curved_part}" if self.curved_part else ""
+        return f"{self.confidence:.0%} of {', '.join(self.standard_error)}{bent}"
 
     def _rows(self) -> list[Row]:
         return [
@@ -53,6 +68,7 @@ def find_band(
     curve: Callable[[Isolator], Float[Array, "quantity ..."]],
     *,
     across: bool = False,
+    drawn: Float[np.ndarray, "draw quantity ..."] | None = None,
 ) -> Band:
     """Carry the error of a fit into a curve of its model.
 
@@ -61,12 +77,13 @@ def find_band(
         names: of the quantities of the curve.
         curve: gives these quantities for an isolator, differentiable by `jax.jacfwd`.
         across: whether there are two quantities, and each point moves across the curve through them.
+        drawn: the quantities at coefficients drawn from their distribution, NaN where they do not exist.
 
     Returns:
         The band.
     """
     values, change = (np.asarray(one) for one in errors.carry(curve))
-    return band_around(names, values, change, across=across)
+    return band_around(names, values, change, across=across, drawn=drawn)
 
 
 def band_around(
@@ -75,6 +92,7 @@ def band_around(
     change: Float[np.ndarray, "quantity ... step"],
     *,
     across: bool = False,
+    drawn: Float[np.ndarray, "draw quantity ..."] | None = None,
 ) -> Band:
     """Give the band around a curve from its change by each independent step of a covariance.
 
@@ -83,17 +101,27 @@ def band_around(
         values: of the curve.
         change: by each step of one standard deviation.
         across: whether there are two quantities, and each point moves across the curve through them.
+        drawn: the quantities at coefficients drawn from their distribution, NaN where they do not exist.
 
     Returns:
         The band.
     """
     sizes = np.linalg.norm(change, axis=-1)
-    sides = HALF_WIDTH * (_across(values, change) if across else sizes)
+    curved = None
+    if across:
+        sides = HALF_WIDTH * _across(values, change)
+        lower, upper = values - sides, values + sides
+    elif drawn is None:
+        lower, upper = values - HALF_WIDTH * sizes, values + HALF_WIDTH * sizes
+    else:
+        known = credible_set(values, sizes, drawn, CONFIDENCE)
+        sizes, (lower, upper), curved = known.standard_error, known.interval, known.curved
 
     def named(numbers: np.ndarray) -> dict[str, Array]:
         return {name: jnp.asarray(one) for name, one in zip(names, numbers, strict=True)}
 
-    return Band(named(sizes), named(values - sides), named(values + sides), CONFIDENCE)
+    bent = None if curved is None else named(curved)
+    return Band(named(sizes), named(lower), named(upper), CONFIDENCE, bent)
 
 
 def _across(values: np.ndarray, change: np.ndarray) -> np.ndarray:

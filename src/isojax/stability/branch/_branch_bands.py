@@ -4,20 +4,29 @@ import dataclasses
 from collections.abc import Callable
 from typing import get_args
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._implicit import frozen
+from ..._quick_jit import quick_jit
 from ..._results import is_successful
-from ...models import CoefficientErrors, Isolator, find_band
+from ...models import CoefficientErrors, Isolator, band_around, existence, find_band
 from ..orbit import ShootingMethod
 from ._bifurcation_curves import CodimensionTwoPoint
 from ._branch import Branch, SpecialPoint
 from ._criticality import BifurcationKind
 from ._curve_special_points import find_codimension_two_again
+from ._moved_point import moved_guess
 from ._special_points import find_bifurcation_again, find_event_again
 from ._tracing import branch_points, room_for
+
+_NAMES = ("value", "amplitude", "frequency")
+"""Of a special point."""
+
+_DRAWS, _SEED = 1000, 0
+"""Draws of the coefficients: those of `uncertainty`, where nothing else is asked for."""
 
 
 def with_bands(branch: Branch, errors: CoefficientErrors) -> Branch:
@@ -94,16 +103,72 @@ def _curve(branch: Branch) -> Callable[[Isolator], Float[Array, "quantity ..."]]
 def _point_with_band(branch: Branch, point: SpecialPoint, errors: CoefficientErrors) -> SpecialPoint:
     if not is_successful(point.result):
         return point
-    kind = next((name for name in get_args(BifurcationKind) if name == point.kind), None)
+    kind = _kind_of(point)
+    if kind is None:
+        event = next(event for event in branch.events if event.name == point.kind)
+        scale = jnp.atleast_2d(branch.scale)[point.branch]
 
-    def moved(isolator: Isolator) -> Array:
+        def moved(isolator: Isolator) -> Array:
+            family = dataclasses.replace(point.family, model=isolator)
+            return _place(find_event_again(point, event, family, scale))
+
+        # An event is only differentiated, not sought anew: no draws of it.
+        return dataclasses.replace(point, band=find_band(errors, _NAMES, moved))
+
+    def found(isolator: Isolator) -> Array:
         family = dataclasses.replace(point.family, model=isolator)
-        if kind is None:
-            event = next(event for event in branch.events if event.name == point.kind)
-            found = find_event_again(point, event, family, jnp.atleast_2d(branch.scale)[point.branch])
-        else:
-            found = find_bifurcation_again(point, kind, family)
-        return jnp.stack([found.value, found.amplitude, found.frequency])
+        return _place(find_bifurcation_again(point, kind, family))
 
-    band = find_band(errors, ("value", "amplitude", "frequency"), moved)
-    return dataclasses.replace(point, band=band)
+    drawn = _drawn(point, kind, errors)
+    share, error = (float(one) for one in existence(drawn[:, 0]))
+    band = find_band(errors, _NAMES, found, drawn=drawn)
+    return dataclasses.replace(point, band=band, probability=share, probability_error=error)
+
+
+def with_probability(point: SpecialPoint, errors: CoefficientErrors) -> SpecialPoint:
+    """Give a bifurcation that the fitted model lacks its probability, and its band where it exists.
+
+    Args:
+        point: at a model that has it.
+        errors: of the fitted coefficients.
+
+    Returns:
+        The same point.
+    """
+    kind = _kind_of(point)
+    assert kind is not None
+    drawn = _drawn(point, kind, errors)
+    share, error = (float(one) for one in existence(drawn[:, 0]))
+    nothing = np.full((len(_NAMES), errors.steps), np.nan)
+    band = band_around(_NAMES, nothing[:, 0], nothing, drawn=drawn)
+    return dataclasses.replace(point, band=band, probability=share, probability_error=error)
+
+
+def _kind_of(point: SpecialPoint) -> BifurcationKind | None:
+    return next((name for name in get_args(BifurcationKind) if name == point.kind), None)
+
+
+def _place(point: SpecialPoint) -> Float[Array, " quantity"]:
+    return jnp.stack([point.value, point.amplitude, point.frequency])
+
+
+def _drawn(
+    point: SpecialPoint, kind: BifurcationKind, errors: CoefficientErrors
+) -> Float[np.ndarray, "draw quantity"]:
+    """Give a bifurcation at coefficients drawn from their distribution; NaN where it does not exist."""
+    models = jax.vmap(errors.moved)(jnp.asarray(errors.draw(_DRAWS, _SEED)))
+    return np.asarray(_found_at(frozen(point), kind, models))
+
+
+@quick_jit
+def _found_at(point: SpecialPoint, kind: BifurcationKind, models: Isolator) -> Float[Array, "draw quantity"]:
+    """Give a bifurcation of a batch of isolators, by the steps of the branch: a band asks for no more."""
+
+    def one(model: Isolator) -> Array:
+        family = dataclasses.replace(point.family, model=model)
+        shares = moved_guess(point, kind, family).shares
+        there = family.at(shares)
+        known = jnp.where(jnp.isfinite(shares[0]), 1.0, jnp.nan)
+        return jnp.stack([family.values(shares)[0], there.amplitude * known, there.frequency * known])
+
+    return jax.vmap(one)(models)

@@ -26,10 +26,11 @@ from ...models import (
 from ..orbit import ShootingMethod, integrator_for, is_odd, refuse_traced, response_start
 from ._arc_length import HELD, REACHED_BOUND, Departure, Followed, Stride
 from ._branch import Branch, BranchEvent
-from ._branch_bands import with_bands
+from ._branch_bands import with_bands, with_probability
 from ._criticality import BifurcationKind
 from ._other_branches import BranchSearch, find_other_branches
 from ._parameter_family import ParameterFamily
+from ._possible_points import find_possible_points
 from ._tracing import assemble, trace
 
 _SIZED_AT = 33
@@ -161,7 +162,17 @@ def continue_branch(
         search = BranchSearch(tuple(other_periods), stride, tuple(events))
         found, searched = find_other_branches(family, method, scale, followed, search)
         branch = dataclasses.replace(branch, others=found, searched=searched)
-    return branch if errors is None else with_bands(branch, errors)
+    if errors is None:
+        return branch
+
+    def again(isolator: Isolator) -> Branch:
+        other = dataclasses.replace(frozen(family), model=isolator)
+        return assemble(other, method, *follow_branches(other, method, begin, stride), batched, step)
+
+    possible = find_possible_points(frozen(branch), errors, again)
+    branch = with_bands(branch, errors)
+    possible = tuple(with_probability(point, errors) for point in possible)
+    return dataclasses.replace(branch, possible_points=possible)
 
 
 def follow_branches(

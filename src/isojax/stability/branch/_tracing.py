@@ -10,7 +10,8 @@ from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..orbit import ShootingMethod
 from ._arc_length import HELD, REACHED_BOUND, RETURNED, Departure, Followed, Stride, follow
-from ._branch import Branch, BranchEvent, BranchPoints, branch_point
+from ._branch import Branch, BranchEvent, BranchPoints
+from ._branch_point import branch_point
 from ._locating import BranchCurves
 from ._parameter_family import ParameterFamily
 from ._special_points import find_special_points
