@@ -46,7 +46,7 @@ _ASIDE = 2e-3
 """Distance along the known branch at which the sense of its test function's change is read."""
 
 
-class _Place(NamedTuple):
+class Place(NamedTuple):
     """A point of a branch: scaled state and share, unit tangent, test function, and whether it was found."""
 
     unknown: Float[Array, " unknown"]
@@ -73,32 +73,33 @@ def moved_guess(point: SpecialPoint, kind: BifurcationKind, family: ParameterFam
     path = trajectory(setting.model, method.integrator, setting.drive, tuple(point.y0), turns=method.turns)
     scale = state_scale(path)
     origin = jnp.concatenate([point.y0 / scale, shares])
-    place = functools.partial(_corrected, method=method, scale=scale, test=TEST_OF[kind])
+    place = functools.partial(corrected, method=method, scale=scale, test=TEST_OF[kind])
     _, slope = value_and_jacobian(lambda u: known.open_end(method, scale, u), origin)
     # Null vector of the slope: the way along the branch.
     across = jnp.linalg.svd(slope)[2][-1]
-    ahead, behind = (place(known, origin + side * _ASIDE * across, across) for side in (1.0, -1.0))
-    sense = jnp.sign(ahead.test - behind.test)
+    aside = jax.vmap(lambda side: place(known, origin + side * _ASIDE * across, across).test)
+    behind, ahead = aside(jnp.array([-1.0, 1.0]))
+    sense = jnp.sign(ahead - behind)
 
-    def nearer(stage: Array | int, here: Array) -> Array:
-        share = (stage + 1.0) / _STAGES
+    def nearer(here: Array, share: Array) -> tuple[Array, Place]:
         between = jax.tree.map(
             lambda old, new: old + share * (new - old) if eqx.is_inexact_array(old) else new, known, family
         )
-        return place(between, here, across).unknown
+        found = place(between, here, across)
+        return found.unknown, found
 
-    moved = place(family, jax.lax.fori_loop(0, _STAGES, nearer, origin), across)
+    _, stages = jax.lax.scan(nearer, origin, jnp.arange(1.0, _STAGES + 1.0) / _STAGES)
+    moved = jax.tree.map(lambda own: own[-1], stages)
     there = functools.partial(place, family)
-    before, after = (_walk(there, moved, side) for side in (-1.0, 1.0))
     line = jax.tree.map(
-        lambda back, here, on: jnp.concatenate([back[::-1], here[None], on]), before, moved, after
+        lambda here, ways: jnp.concatenate([ways[0, ::-1], here[None], ways[1]]), moved, _walk(there, moved)
     )
     found = _zero(there, line, sense)
     states = scale.shape[0]
     return PointGuess(found[:states] * scale, found[states:])
 
 
-def _corrected(
+def corrected(
     family: ParameterFamily,
     guess: Float[Array, " unknown"],
     normal: Float[Array, " unknown"],
@@ -106,8 +107,20 @@ def _corrected(
     method: ShootingMethod,
     scale: Float[Array, " state"],
     test: int,
-) -> _Place:
-    """Give the point of a branch in the plane through a guess, its tangent on the side of the normal."""
+) -> Place:
+    """Give the point of a branch in the plane through a guess, its tangent on the side of the normal.
+
+    Args:
+        family: isolators and drives.
+        guess: scaled state and share.
+        normal: of the plane.
+        method: how the orbits are closed.
+        scale: size of each state.
+        test: which of `critical_values` is read.
+
+    Returns:
+        The point.
+    """
     states = scale.shape[0]
 
     def newton(_: Array | int, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
@@ -124,23 +137,26 @@ def _corrected(
     ahead = jnp.linalg.solve(jnp.concatenate([slope, normal[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
     ahead = ahead / jnp.linalg.norm(ahead)
     value = critical_values(slope[:, :states] + jnp.eye(states), ahead)[test]
-    return _Place(found, ahead, value, last < _FOUND_WITHIN)
+    return Place(found, ahead, value, last < _FOUND_WITHIN)
 
 
-def _walk(place: Callable[[Array, Array], _Place], start: _Place, side: float) -> _Place:
-    """Follow a branch from a point, forward or back; tangents point forward."""
+def _walk(place: Callable[[Array, Array], Place], start: Place) -> Place:
+    """Follow a branch from a point, back and forward, which is the first axis; tangents point forward."""
 
-    def step(here: _Place, length: Array) -> tuple[_Place, _Place]:
-        found = place(here.unknown + side * length * here.tangent, here.tangent)
-        straight = jnp.dot(found.tangent, here.tangent) > _STRAIGHT
-        found = found._replace(sound=found.sound & here.sound & straight)
-        return found, found
+    def way(side: Array) -> Place:
+        def step(here: Place, length: Array) -> tuple[Place, Place]:
+            found = place(here.unknown + side * length * here.tangent, here.tangent)
+            straight = jnp.dot(found.tangent, here.tangent) > _STRAIGHT
+            found = found._replace(sound=found.sound & here.sound & straight)
+            return found, found
 
-    return jax.lax.scan(step, start, jnp.asarray(_STEPS))[1]
+        return jax.lax.scan(step, start, jnp.asarray(_STEPS))[1]
+
+    return jax.vmap(way)(jnp.array([-1.0, 1.0]))
 
 
 def _zero(
-    place: Callable[[Array, Array], _Place], line: _Place, sense: Float[Array, ""]
+    place: Callable[[Array, Array], Place], line: Place, sense: Float[Array, ""]
 ) -> Float[Array, " unknown"]:
     """Give where the test function passes zero in a sense, nearest to the middle of a line; NaN if nowhere.
 
@@ -164,7 +180,7 @@ def _zero(
     start = jax.tree.map(lambda own: own[best + 1], line)
     rate = slope[best] + 2.0 * bend[best] * shift[best]
 
-    def secant(_: Array | int, carry: tuple[_Place, Array, Array]) -> tuple[_Place, Array, Array]:
+    def secant(_: Array | int, carry: tuple[Place, Array, Array]) -> tuple[Place, Array, Array]:
         old, length, rate = carry
         new = place(old.unknown + length * old.tangent, old.tangent)
         change = (new.test - old.test) / jnp.where(length == 0.0, 1.0, length)

@@ -24,6 +24,7 @@ from ._branch_point import moved_across
 from ._criticality import BifurcationKind
 from ._locating import critical_values
 from ._parameter_family import ParameterFamily
+from ._tracing import lanes_of
 
 _FARTHEST = 3.5
 """Standard deviations up to which the nearest coefficients with a bifurcation are sought: beyond, fewer than
@@ -65,8 +66,9 @@ def find_possible_points(
     reached).
     """
     method = ShootingMethod(branch.integrator, branch.periods, branch.symmetric)
-    curves = _Curves.of(branch)
-    tests = np.asarray(_tests(branch.family, method, *curves))
+    family, *lanes = lanes_of(branch)
+    curves = _Curves(*lanes)
+    tests = np.asarray(_tests(family, method, *curves))
     found: list[SpecialPoint] = []
     dips = _dips(tests)
     for first in range(0, len(dips), _AT_ONCE):
@@ -86,16 +88,6 @@ class _Curves(NamedTuple):
     scale: Float[Array, "branch state"]
     unknowns: Float[Array, "branch point unknown"]
     tangents: Float[Array, "branch point unknown"]
-
-    @classmethod
-    def of(cls, branch: Branch) -> "_Curves":
-        """Read them off a branch."""
-        points, single = branch.points, branch.points.value.ndim == 1
-        shares = branch.family.shares(points.value)
-        lanes = [branch.scale, points.y0, shares, points.tangent]
-        scale, states, shares, tangents = (one[None] if single else one for one in lanes)
-        unknowns = jnp.concatenate([states / scale[:, None], shares[..., None]], axis=-1)
-        return cls(scale, unknowns, tangents)
 
     def at(self, dips: list[_Dip]) -> "_Curves":
         """Give single points as branches of one point."""
@@ -126,8 +118,7 @@ def _tests(
 
         return jax.vmap(point)(unknown, tangent)
 
-    drives = jnp.atleast_1d(family.amplitude), jnp.atleast_1d(family.frequency)
-    return jax.vmap(lane)(*drives, scale, unknowns, tangents)
+    return jax.vmap(lane)(family.amplitude, family.frequency, scale, unknowns, tangents)
 
 
 def _dips(tests: Float[np.ndarray, "branch point test"]) -> list[_Dip]:
@@ -194,7 +185,8 @@ def _own(branch: Branch, kind: str, lane: int) -> list[SpecialPoint]:
 
 def _distance(branch: Branch, dip: _Dip, point: SpecialPoint) -> float:
     """Give how far a bifurcation lies from a dip, in scaled states and shares."""
-    curves = _Curves.of(branch)
+    _, *lanes = lanes_of(branch)
+    curves = _Curves(*lanes)
     shares = branch.family.shares(point.value[None])
     there = jnp.concatenate([point.y0 / curves.scale[dip.lane], shares])
     return float(jnp.linalg.norm(there - curves.unknowns[dip.lane, dip.place]))
