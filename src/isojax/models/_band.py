@@ -121,7 +121,8 @@ def band_around(
     if drawn is None:
         return _named(names, sizes, values - HALF_WIDTH * sizes, values + HALF_WIDTH * sizes, None)
     known = credible_set(values, sizes, drawn, CONFIDENCE)
-    return _named(names, known.standard_error, *known.interval, known.curved)
+    lower, upper = known.interval
+    return _named(names, known.standard_error, lower, upper, known.curved)
 
 
 def find_band_across(
@@ -175,7 +176,7 @@ def band_across(
         sure = np.isfinite(known.interval).all(axis=0)
         ends = np.where(sure, known.interval, ends)
         curved = np.broadcast_to(known.curved, values.shape)
-    lower, upper = (values + one * normal * extent for one in ends)
+    lower, upper = (values + end * normal * extent for end in ends)
     return _named(names, np.linalg.norm(change, axis=-1), lower, upper, curved)
 
 

@@ -74,7 +74,7 @@ def credible_set(
         share_error,
         np.where(curved & np.isfinite(ends).all(axis=0), _spread(drawn), error),
         np.where(curved, ends, straight),
-        curved,
+        np.asarray(curved),
     )
 
 
@@ -89,8 +89,8 @@ def existence(
     Returns:
         Both. The error is never less than what one draw makes.
     """
-    share = np.mean(np.isfinite(drawn), axis=0)
-    return share, np.sqrt(np.maximum(share * (1.0 - share), 1.0 / len(drawn)) / len(drawn))
+    share = np.asarray(np.mean(np.isfinite(drawn), axis=0))
+    return share, np.asarray(np.sqrt(np.maximum(share * (1.0 - share), 1.0 / len(drawn)) / len(drawn)))
 
 
 def _quantiles(
@@ -110,4 +110,4 @@ def _spread(drawn: Float[np.ndarray, "draw ..."]) -> Float[np.ndarray, "..."]:
     held = np.maximum(np.sum(there, axis=0), 1)
     known = np.where(there, drawn, 0.0)
     away = np.where(there, known - np.sum(known, axis=0) / held, 0.0)
-    return np.sqrt(np.sum(away**2, axis=0) / held)
+    return np.asarray(np.sqrt(np.sum(away**2, axis=0) / held))

@@ -157,8 +157,9 @@ class SpecialPoint(eqx.Module):
             doubt = f"; exists with probability {number(self.probability)}"
         return f"{self.kind.replace('_', ' ')} at {drive}{after}{torus}{doubt}"
 
-    def _in_doubt(self) -> str:
-        """Say how probable a bifurcation is that the fitted model lacks, and where it lies if it exists."""
+    @property
+    def in_doubt(self) -> str:
+        """How probable a bifurcation is that the fitted model lacks, and where it lies if it exists."""
         kind, name = self.kind.replace("_", " "), self.family.names[0]
         chance = f"{kind}: probability {number(self.probability)}"
         if self.band is None or not np.isfinite(float(self.band.lower["value"])):
@@ -297,7 +298,7 @@ class Branch(eqx.Module):
 
     def _lines(self) -> list[str]:
         lines = [f"  {point._headline()}" for point in self.special_points]
-        lines += [f"  possible {point._in_doubt()}" for point in self.possible_points]
+        lines += [f"  possible {point.in_doubt}" for point in self.possible_points]
         if self.searched is None:
             return lines
         beside = [f"  beside it {other._in_words()}" for other in self.others]

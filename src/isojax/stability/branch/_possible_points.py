@@ -6,6 +6,7 @@ the nearest coefficients at which it vanishes follow. There the branch is follow
 the start from which `find_again` finds the bifurcation for every draw that has it.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -137,11 +138,13 @@ def _with_slopes(
     """Give the test functions at their extrema, and their changes by each independent step."""
     filled = [dips[place % len(dips)] for place in range(_AT_ONCE)]
     some, lanes = curves.at(filled), np.array([dip.lane for dip in filled])
-    drives = [jnp.atleast_1d(one)[lanes] for one in (branch.family.amplitude, branch.family.frequency)]
+    amplitude, frequency = (
+        jnp.atleast_1d(one)[lanes] for one in (branch.family.amplitude, branch.family.frequency)
+    )
+    there = branch.family.driven(amplitude, frequency)
 
     def tests(model: Isolator) -> Array:
-        family = ParameterFamily(model, *drives, branch.family.start, branch.family.stop, branch.family.names)
-        found = _tests(family, method, *some)[:, 0]
+        found = _tests(dataclasses.replace(there, model=model), method, *some)[:, 0]
         return jnp.stack([found[place, dip.test] for place, dip in enumerate(filled)])
 
     values, slopes = errors.carry(tests)
