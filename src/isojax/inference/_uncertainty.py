@@ -174,7 +174,8 @@ def uncertainty(
             "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
         )
     # The delta method knows one law.
-    known = credible_set(value, error if len(fits) == 1 else np.nan * error, drawn, confidence)
+    straight = error if len(fits) == 1 else np.full_like(error, np.nan)
+    known = credible_set(value, straight, drawn, confidence)
     return UncertainQuantity(
         value,
         known.standard_error,

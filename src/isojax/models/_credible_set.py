@@ -62,7 +62,7 @@ def credible_set(
     # "None" is left out of the set where the numbers alone can reach the confidence.
     alone = share > confidence
     content = np.where(alone, confidence / np.where(alone, share, 1.0), confidence)
-    tail = np.maximum(0.5 * (1.0 - content), 0.5 / count)
+    tail = np.asarray(np.maximum(0.5 * (1.0 - content), 0.5 / count))
     spread = -ndtri(tail) * error
     straight = np.stack([value - spread, value + spread])
     ends = _quantiles(drawn, tail)

@@ -30,7 +30,7 @@ from ._criticality import BifurcationKind
 from ._curve_special_points import find_codimension_two_again
 from ._moved_point import corrected, moved_guess
 from ._parameter_family import ParameterFamily
-from ._special_points import find_bifurcation_again, find_event_again
+from ._special_points import bifurcation_moving, find_event_again
 from ._tracing import branch_points, lanes_of
 
 _NAMES = ("value", "amplitude", "frequency")
@@ -153,7 +153,7 @@ def _point_with_band(branch: Branch, point: SpecialPoint, errors: CoefficientErr
 
     def found(isolator: Isolator) -> Array:
         family = dataclasses.replace(point.family, model=isolator)
-        return _place(find_bifurcation_again(point, kind, family))
+        return _place(bifurcation_moving(point, kind, family))
 
     drawn = _drawn(point, kind, errors)
     share, error = (float(one) for one in existence(drawn[:, 0]))

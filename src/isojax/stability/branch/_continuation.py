@@ -102,8 +102,9 @@ def continue_branch(
         integrator: solver and steps; 256 a period if omitted.
         events: numbers of the orbits whose zeros are to be located too; they are among the special points,
             by their names. Passing the same events again uses what was compiled for them.
-        fit: with whose errors branches and special points are given bands; `model` is its model. None for
-            no band.
+        fit: with whose errors branches and special points are given bands, and these their probability;
+            bifurcations that `model`, which is its model, lacks are then sought within them: see
+            `possible_points` of the result. None for neither.
 
     Returns:
         The branch. Where it ends early `result` says so, and the points found so far stand. Where dry

@@ -124,6 +124,21 @@ def find_bifurcation_again(
     return special_point(family, point.method, kind, point.branch, guess)
 
 
+def bifurcation_moving(point: SpecialPoint, kind: BifurcationKind, family: ParameterFamily) -> SpecialPoint:
+    """Give a bifurcation of a branch with its derivatives by the isolators and drives.
+
+    Args:
+        point: the known point; no number of it is traced.
+        kind: which bifurcation it is.
+        family: the same isolators and drives; their derivatives reach the point.
+
+    Returns:
+        The point.
+    """
+    guess = PointGuess(point.y0, point.family.shares(point.value[None]))
+    return special_point(family, point.method, kind, point.branch, guess)
+
+
 def find_event_again(
     point: SpecialPoint, event: BranchEvent, family: ParameterFamily, scale: Float[Array, " state"]
 ) -> SpecialPoint:
