@@ -132,7 +132,7 @@ def test_what_exists_above_zero_alone_has_the_probability_of_the_normal_law(wide
     content = 0.95 if exists < 0.95 else 0.95 / exists
     tails = [0.5 * (1.0 - content), 0.5 * (1.0 + content)]
     np.testing.assert_allclose(found.interval, truncnorm.ppf(tails, -z, np.inf, z), atol=0.06)
-    assert f"exists with probability {exists:.1f}" in str(found)
+    assert f"exists with probability {float(found.probability):.3g}" in str(found)
 
 
 def test_too_few_draws_with_a_value_state_no_interval(wide):
