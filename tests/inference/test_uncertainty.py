@@ -85,16 +85,19 @@ def test_bounds_hold_and_draws_that_fail_are_counted(wide):
     # A normal law of mean and standard deviation one, cut at zero.
     np.testing.assert_allclose(drawn.interval, truncnorm.ppf([0.025, 0.975], -1.0, np.inf, 1.0), atol=0.05)
     assert drawn.curved
-    found = ij.uncertainty(wide, lambda m: jnp.where(m[STIFFNESS] > seen * 1.05, jnp.nan, m[STIFFNESS]))
-    assert found.failed == pytest.approx(norm.sf(0.5), abs=0.05)
-    # A third of the draws may lie anywhere: the lower end is known no more than the upper one.
-    assert np.isnan(found.interval).all()
-    assert float(found.standard_error) == pytest.approx(0.1 * seen, rel=1e-9)
+    found = ij.uncertainty(
+        wide, lambda m: jnp.where(m[STIFFNESS] > seen * 1.05, jnp.nan, m[STIFFNESS]), draws=20_000
+    )
+    assert found.failed == pytest.approx(norm.sf(0.5), abs=0.02)
+    # A third of the draws has none: beside "none" stands the interval of the others, a normal law cut above.
+    wanted = truncnorm.ppf([0.025, 0.975], -np.inf, 0.5, seen, 0.1 * seen)
+    np.testing.assert_allclose(found.interval, wanted, rtol=0.01)
+    assert found.may_not_exist
     assert "the quantity is not finite" in str(found)
 
 
-def test_a_draw_that_fails_may_lie_anywhere(wide):
-    """A hundredth of the draws fails: the quantiles of the rest are those of 1.5 and 98.5 % of it."""
+def test_a_draw_without_a_value_counts_as_outside_the_interval(wide):
+    """A hundredth of the draws has none, all of them low: 95 % of all draws are 96 % of the rest."""
     centre = float(wide.model[STIFFNESS])
 
     def quantity(model):
@@ -102,9 +105,42 @@ def test_a_draw_that_fails_may_lie_anywhere(wide):
         return jnp.where(value < np.exp(norm.ppf(0.01, 8.0, 0.8)), jnp.nan, value)
 
     found = ij.uncertainty(wide, quantity, draws=20_000)
-    # All that failed lie low. Taken as low they change nothing there; taken as high they raise the upper end.
-    expected = np.exp(norm.ppf([0.025, 0.985], 8.0, 0.8))
+    # Of the 99 % that are left 95 % are held, and 2 % at either end are not.
+    expected = np.exp(norm.ppf([0.03, 0.98], 8.0, 0.8))
     np.testing.assert_allclose(found.interval, expected, rtol=0.05)
+    inside = (found.draws >= found.interval[0]) & (found.draws <= found.interval[1])
+    assert np.mean(inside) == pytest.approx(0.95, abs=1e-3)
+    assert not found.may_not_exist
+
+
+@pytest.mark.parametrize("z", [-1.0, 0.3, 1.2, 1.75])
+def test_what_exists_above_zero_alone_has_the_probability_of_the_normal_law(wide, z):
+    """z standard deviations above zero at the fit, or below it: then the fit itself has no value."""
+    centre = float(wide.model[STIFFNESS])
+
+    def quantity(model):
+        above = z + 10.0 * (model[STIFFNESS] / centre - 1.0)
+        return jnp.where(above > 0.0, above, jnp.nan)
+
+    found = ij.uncertainty(wide, quantity, draws=20_000)
+    exists = norm.cdf(z)
+    assert found.probability_error == pytest.approx(np.sqrt(exists * (1.0 - exists) / 20_000), rel=0.05)
+    assert found.probability == pytest.approx(exists, abs=4.0 * float(found.probability_error))
+    assert bool(np.isnan(found.value)) == (z < 0.0)
+    assert bool(found.may_not_exist) == (exists < 0.95)
+    # Alone the interval holds 95 % of all draws, else 95 % of those that exist.
+    content = 0.95 if exists < 0.95 else 0.95 / exists
+    tails = [0.5 * (1.0 - content), 0.5 * (1.0 + content)]
+    np.testing.assert_allclose(found.interval, truncnorm.ppf(tails, -z, np.inf, z), atol=0.12)
+    assert f"exists with probability {float(found.probability):.3g}" in str(found)
+
+
+def test_too_few_draws_with_a_value_state_no_interval(wide):
+    seen = float(wide.model[STIFFNESS])
+    found = ij.uncertainty(wide, lambda m: jnp.where(m[STIFFNESS] > seen * 1.22, 1.0, jnp.nan))
+    assert 0.0 < found.probability < 0.04
+    assert np.isnan(found.interval).all()
+    assert "too few draws for an interval" in str(found)
 
 
 def test_draws_without_a_fold_have_failed_with_the_reason(wide):
@@ -176,7 +212,7 @@ def test_what_cannot_be_carried_is_refused(wide, unchecked):
         ij.uncertainty(wide, "k1")
     with pytest.raises(ValueError, match=r"must give a number or an array, .* one of type dict"):
         ij.uncertainty(wide, lambda model: {"mass": model.mass})
-    with pytest.raises(ValueError, match="finite real numbers"):
+    with pytest.raises(ValueError, match="must give real numbers"):
         ij.uncertainty(wide, lambda model: 1j * model[STIFFNESS])
     with pytest.raises(ValueError, match="`confidence` must lie between 0 and 1"):
         ij.uncertainty(wide, lambda model: model[STIFFNESS], confidence=95.0)

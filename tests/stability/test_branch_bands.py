@@ -156,3 +156,81 @@ def test_a_branch_asks_for_the_model_of_the_fit():
     stiffer = DUFFING.replace(cubic_stiffness__coefficient=2.0)
     with pytest.raises(ValueError, match=r"differs in cubic_stiffness\.coefficient"):
         ij.continue_branch(stiffer, parameter="amplitude", frequency=0.2, start=0.1, stop=1.0, fit=STIFF)
+
+
+OMEGA = 1.1
+TURNING = (OMEGA**2 - 1.0) / (np.sqrt(3.0) * OMEGA)
+"""Damping from which on x'' + c x' + x + x^3 = F sin(OMEGA t) does not fold along F, by one harmonic: the
+square of the force, `4 y / 3 ((y - d)^2 + (c OMEGA)^2)` with y = 3 a^2 / 4 and d = OMEGA^2 - 1, rises
+throughout."""
+
+
+def lightly_damped(share, error=0.03):
+    """A hardening spring with so much of the damping from which on it does not fold, and its fit."""
+    model = DUFFING.replace(linear_damping__coefficient=share * TURNING)
+    covariance = np.array([[(error * TURNING) ** 2]])
+    return Fitted(model, ("linear_damping.coefficient",), covariance, SUCCESS)
+
+
+def force_at_folds(damping):
+    """Of the one-harmonic solution, in the order of the branch."""
+    d, loss = OMEGA**2 - 1.0, (damping * OMEGA) ** 2
+    y = (2.0 * d + np.array([[-1.0], [1.0]]) * np.sqrt(d**2 - 3.0 * loss)) / 3.0
+    return np.sqrt(4.0 * y / 3.0 * ((y - d) ** 2 + loss))
+
+
+def along_force(fit):
+    return ij.continue_branch(
+        fit.model,
+        parameter="amplitude",
+        frequency=OMEGA / TURN,
+        start=0.01,
+        stop=0.2,
+        other_periods=(),
+        step=0.008,  # as many points as the branch above has room for, so that nothing is compiled anew
+        fit=fit,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_a_fold_beside_its_cusp_has_the_probability_and_the_force_of_the_closed_form(share):
+    branch = along_force(lightly_damped(share))
+    own, points = branch.special_points, (*branch.special_points, *branch.possible_points)
+    assert len(own) == (2 if share < 1.0 else 0)
+    assert [point.kind for point in points] == ["fold", "fold"]
+    z = (1.0 - share) / 0.03
+    folding = share * TURNING + 0.03 * TURNING * norm.ppf(np.linspace(0.0, norm.cdf(z), 4003)[1:-1])
+    for point, forces in zip(points, force_at_folds(folding), strict=True):
+        # One harmonic puts the cusp within a thousandth, 0.03 standard errors.
+        assert point.probability == pytest.approx(norm.cdf(z), abs=4.0 * point.probability_error + 0.012)
+        ends = np.array([float(end["amplitude"]) for end in (point.band.lower, point.band.upper)])
+        np.testing.assert_allclose(ends, np.quantile(forces, [0.025, 0.975]), rtol=5e-3)
+        assert bool(point.band.curved["amplitude"])
+    words = str(branch)
+    assert ("no bifurcation of its own" in words) == (share > 1.0)
+    assert ("possible fold: probability 0.2" in words) == (share > 1.0)
+    assert ("exists with probability 0.7" in words) == (share < 1.0)
+
+
+@pytest.mark.slow
+def test_a_fold_is_found_again_on_its_own_branch_or_nowhere():
+    """Newton's method alone went to folds of other motions, or missed one whose pair had moved apart."""
+    first, second = along_force(lightly_damped(0.98)).special_points
+    for share in (0.7, 0.95):
+        found = [float(ij.find_again(point, _damped(share)).amplitude) for point in (first, second)]
+        np.testing.assert_allclose(found, force_at_folds(share * TURNING)[:, 0], rtol=5e-3)
+    for share in (1.01, 1.3):
+        assert np.isnan(float(ij.find_again(first, _damped(share)).amplitude))
+
+
+def _damped(share):
+    return DUFFING.replace(linear_damping__coefficient=share * TURNING)
+
+
+@pytest.mark.slow
+def test_a_fold_that_no_model_within_the_errors_has_is_not_possible():
+    branch = along_force(lightly_damped(1.2))
+    assert not branch.special_points
+    assert not branch.possible_points
+    assert "no bifurcation" in str(branch)

@@ -5,17 +5,20 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
-from scipy.special import ndtri
+from jaxtyping import Array, Bool, Float
 
 from .._progress import silent
 from .._show import Row, brief, shown
 from .._types import check_float64
-from ..models import CoefficientErrors, EndsEstimated, Estimated, Isolator, coefficient_errors
+from ..models import (
+    CoefficientErrors,
+    EndsEstimated,
+    Estimated,
+    Isolator,
+    coefficient_errors,
+    credible_set,
+)
 from ._evaluate import NOT_FINITE, evaluate
-
-_BEND = 0.1
-"""Share of an interval by which delta method and draws may differ."""
 
 
 @shown
@@ -23,19 +26,22 @@ class UncertainQuantity(NamedTuple):
     """A quantity of a fitted model with its error.
 
     Attributes:
-        value: at the fitted coefficients, in the quantity's own shape.
+        value: at the fitted coefficients, in the quantity's own shape; NaN where it does not exist there.
         standard_error: by the delta method; where `curved`, and the interval is known, standard deviation of
-            the draws.
-        interval: lower and upper end, first axis; where `curved`, quantiles of the draws. A draw that failed
-            may lie anywhere, so it counts as below the lower end and as above the upper one; an end is NaN
-            where that leaves it unknown.
-        confidence: chance that the interval is meant to hold the truth.
+            the draws that have the quantity.
+        interval: lower and upper end, first axis; where `curved`, quantiles of the draws. Where
+            `may_not_exist`, that of the values it has where it exists; elsewhere draws without it count as
+            lying outside. NaN where too few draws have it.
+        confidence: chance that the interval, or "none" where `may_not_exist`, is meant to hold the truth.
         curved: where the quantity bends so much within the error of the coefficients that an end of the
             interval by the delta method differs from that by draws by more than a tenth of its width.
-        draws: the quantity at coefficients drawn from their normal distribution, draw first.
+        draws: the quantity at coefficients drawn from their normal distribution, draw first; NaN where it
+            does not exist.
         failed: share of the draws that gave no finite number.
         reason: why most of them failed; "" where none did.
         weights: of the fits that the answer rests on, in their order.
+        probability: that the quantity exists, by the share of the draws that have it.
+        probability_error: standard error of that share, by the count of draws.
     """
 
     value: Float[np.ndarray, "..."]
@@ -45,32 +51,54 @@ class UncertainQuantity(NamedTuple):
     curved: np.ndarray
     draws: Float[np.ndarray, "draw ..."]
     failed: float
-    reason: str = ""
-    weights: tuple[float, ...] = (1.0,)
+    reason: str
+    weights: tuple[float, ...]
+    probability: Float[np.ndarray, "..."]
+    probability_error: Float[np.ndarray, "..."]
+
+    @property
+    def may_not_exist(self) -> Bool[np.ndarray, "..."]:
+        """Where "none" is among the answers that the confidence asks for, beside the interval."""
+        return np.asarray(self.probability <= self.confidence)
 
     def _headline(self) -> str:
         bent = (
             f", curved in {np.count_nonzero(self.curved)} of {self.curved.size}" if self.curved.any() else ""
         )
-        lost = f", {self.failed:.0%} of the draws failed" if self.failed else ""
+        lost = f", {self.failed:.0%} of the draws have no value" if self.failed else ""
         shares = ", ".join(f"{weight:.0%}" for weight in self.weights)
         several = f", of {len(self.weights)} fits weighed {shares}" if len(self.weights) > 1 else ""
         return f"{self.confidence:.0%} interval, {len(self.draws)} draws{several}{bent}{lost}"
 
     def _lines(self) -> list[str]:
-        return [f"Draws failed: {self.reason}"] if self.failed else []
+        return [f"Draws without a value: {self.reason}"] if self.failed else []
 
     def _rows(self) -> list[Row]:
-        flat = [np.ravel(one) for one in (self.value, self.standard_error, *self.interval)]
-        return [
-            # Where the draws are not symmetric a standard error would mislead beside their interval.
-            Row(
-                f"[{place}]", f"{value:.6g}" + ("" if bent else f" ± {error:.2g}"), f"{low:.6g} to {high:.6g}"
-            )
-            for place, (value, error, low, high, bent) in enumerate(
-                zip(*flat, np.ravel(self.curved), strict=True)
-            )
+        flat = [
+            np.ravel(one)
+            for one in (self.value, self.standard_error, *self.interval, self.curved, self.probability)
         ]
+        return [
+            Row(
+                f"[{place}]",
+                # Where the draws are not symmetric a standard error would mislead beside their interval.
+                f"{value:.6g}" + ("" if bent else f" ± {error:.2g}") if np.isfinite(value) else "none",
+                self._in_words(low, high, share),
+            )
+            for place, (value, error, low, high, bent, share) in enumerate(zip(*flat, strict=True))
+        ]
+
+    def _in_words(self, low: float, high: float, probability: float) -> str:
+        """Say where the quantity lies, and how probable it is where that is in doubt."""
+        span = f"{low:.6g} to {high:.6g}"
+        if probability == 1.0:
+            return span
+        chance = f"exists with probability {probability:.3g}"
+        if probability > self.confidence:
+            return f"{span}; {chance}"
+        if not np.isfinite(low):
+            return f"{chance}: too few draws for an interval"
+        return f"{chance}; where it does, {self.confidence:.0%} lie in {span}"
 
 
 def uncertainty(
@@ -88,11 +116,14 @@ def uncertainty(
     distribution, those outside the bounds of a coefficient drawn again, show where a first derivative is not
     enough; there their quantiles are the interval.
 
+    A quantity may not exist, as a fold does not past its cusp: where it is NaN. The share of the draws that
+    have it is then the probability that it exists, and the interval is stated beside it.
+
     Args:
         fit: a fit, a saved one, or what ends with one: an extension, a closed loop.
         quantity: function of an isolator that gives real numbers: one, or an array. It must be differentiable
             by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one; `find_again`
-            lets it go through folds and orbits. A draw where it raises has failed.
+            lets it go through folds and orbits. A draw where it raises counts as one without it.
         confidence: chance that the interval is to hold the truth.
         draws: how many; at least 100.
         seed: of the draws.
@@ -103,8 +134,8 @@ def uncertainty(
 
     Raises:
         ValueError: if a fit failed, fits are not to the same records, the data do not determine a
-            coefficient, the quantity is complex or not finite at the fitted coefficients, or `confidence` or
-            `draws` is out of range.
+            coefficient, the quantity is complex or finite nowhere near the fitted coefficients, or
+            `confidence` or `draws` is out of range.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Seber & Wild 1989, Nonlinear Regression, sec. 5.1 (delta method); JCGM 101:2008 (draws); Hoeting
@@ -138,27 +169,25 @@ def uncertainty(
     value, error, _, _ = parts[0]
     drawn = np.concatenate([part[2] for part in parts])
     finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
-    if not finite.any():
+    if not np.isfinite(drawn).any():
         raise ValueError(
             "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
         )
-    half = 0.5 * (1.0 - confidence)
-    spread = -float(ndtri(half)) * error
-    straight = np.stack([value - spread, value + spread])
-    ends = np.stack([_quantile(drawn, half), _quantile(drawn, 1.0 - half)])
-    curved = ~(np.max(np.abs(ends - straight), axis=0) <= _BEND * 2.0 * spread)
     # The delta method knows one law.
-    curved = np.asarray(curved | (len(fits) > 1))
+    straight = error if len(fits) == 1 else np.full_like(error, np.nan)
+    known = credible_set(value, straight, drawn, confidence)
     return UncertainQuantity(
         value,
-        np.where(curved & np.isfinite(ends).all(axis=0), np.std(drawn[finite], axis=0), error),
-        np.where(curved, ends, straight),
+        known.standard_error,
+        known.interval,
         confidence,
-        curved,
+        known.curved,
         drawn,
         float(1.0 - finite.mean()),
         "" if finite.all() else next((part[3] for part in parts if part[3]), NOT_FINITE),
         tuple(weights.tolist()),
+        known.probability,
+        known.probability_error,
     )
 
 
@@ -175,21 +204,11 @@ def _carried(
         return 1.0 * jnp.asarray(quantity(errors.moved(steps)))  # a count that fails is NaN as well
 
     value, change = errors.carry(quantity)
-    if jnp.iscomplexobj(value) or not np.all(np.isfinite(value)):
-        raise ValueError(
-            "Argument `quantity` must give finite real numbers at the fitted coefficients, but gave "
-            f"{brief(value)}."
-        )
+    if jnp.iscomplexobj(value):
+        raise ValueError(f"Argument `quantity` must give real numbers, but gave {brief(value)}.")
     error = np.asarray(np.linalg.norm(np.asarray(change), axis=-1))
     drawn, raised = evaluate(at, errors.draw(draws, seed), progress)
     return np.asarray(value, dtype=float), error, np.asarray(drawn, dtype=float), raised
-
-
-def _quantile(drawn: Float[np.ndarray, "draw ..."], chance: float) -> Float[np.ndarray, "..."]:
-    """Give a quantile of draws, those that failed taken to lie beyond it; NaN where it is one of these."""
-    lost, method = (-np.inf, "lower") if chance < 0.5 else (np.inf, "higher")
-    found = np.quantile(np.where(np.isfinite(drawn), drawn, lost), chance, axis=0, method=method)
-    return np.where(np.isfinite(found), found, np.nan)
 
 
 def _evidence(fits: list[Any]) -> Float[np.ndarray, " fit"]:

@@ -4,7 +4,8 @@ In: a mass, elements and a drive. Out: an `Isolator`, its simulated motion and r
 Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at one time), then `_rk4.py` and
 `_integrator.py` (the step), `_scan.py` (many records), `_solve.py` (diffrax) and `_simulate.py` (one drive).
 `_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file;
-`_coefficient_errors.py` carries the covariance of a fit into answers, and `_band.py` into curves;
+`_coefficient_errors.py` carries the covariance of a fit into answers, `_credible_set.py` draws from it, and
+`_band.py` both into curves, with `_second_order.py` (draws of a curve) and `_shifted_curve.py`;
 `_conditions.py` and `_fit_at.py` give the isolator and a fit at a chamber pressure or temperature.
 """
 
@@ -12,12 +13,18 @@ from ._as_isolator import Modelled as Modelled
 from ._as_isolator import as_isolator as as_isolator
 from ._band import HALF_WIDTH as HALF_WIDTH
 from ._band import Band as Band
+from ._band import CurveBeside as CurveBeside
+from ._band import band_across as band_across
 from ._band import band_around as band_around
 from ._band import find_band as find_band
+from ._band import find_band_across as find_band_across
 from ._coefficient_errors import CoefficientErrors as CoefficientErrors
 from ._coefficient_errors import EndsEstimated as EndsEstimated
 from ._coefficient_errors import Estimated as Estimated
 from ._coefficient_errors import coefficient_errors as coefficient_errors
+from ._credible_set import CredibleSet as CredibleSet
+from ._credible_set import credible_set as credible_set
+from ._credible_set import existence as existence
 from ._event_step import Ringing as Ringing
 from ._event_step import Step as Step
 from ._event_step import add_ringing as add_ringing
@@ -41,6 +48,7 @@ from ._scan import advance as advance
 from ._scan import advance_record as advance_record
 from ._scan import read_record as read_record
 from ._scan import scan_records as scan_records
+from ._second_order import expansion_nodes as expansion_nodes
 from ._simulate import Simulation as Simulation
 from ._simulate import simulate as simulate
 from ._sliding import freeing_accelerations as freeing_accelerations

@@ -59,7 +59,7 @@ def plot_branch(branch: Branch, *, others: Sequence[Branch] = (), ax: Axes | Non
         unstable |= _any_unstable(y, stable)
         label = _beside_words(one) if any(one is other for other in beside) else _level(one, place)
         draw_curve(ax, x, MILLIMETRES * y, stable, colour, label if len(curves) > 1 else "")
-        _draw_branch_band(ax, one, place, colour)
+        draw_branch_band(ax, one, place, colour)
     for one in (branch, *others, *beside):
         marked = [_placed(one, point) for point in one.special_points]
         kinds |= set(draw_special_points(ax, marked, ("value", None)))
@@ -110,7 +110,7 @@ def plot_frequency_response(
             words = _beside_words(one.branch) + (f", {words}" if drives > 1 else "")
         draw_curve(ax, x, y, stable, colour, words)
         if what == "displacement":
-            _draw_branch_band(ax, one.branch, place, colour)
+            draw_branch_band(ax, one.branch, place, colour)
         for point in one.special_points:
             if point.branch == place:
                 nearest = _nearest_point(one.branch, place, point)
@@ -245,8 +245,15 @@ def _draw_backbone(ax: Axes, backbone: BackboneCurve) -> list[Line2D]:
     ]
 
 
-def _draw_branch_band(ax: Axes, branch: Branch, place: int, colour: str) -> None:
-    """Draw how far a branch may be off, where a fit was given."""
+def draw_branch_band(ax: Axes, branch: Branch, place: int, colour: str) -> None:
+    """Draw how far a branch may be off, where a fit was given.
+
+    Args:
+        ax: axes to draw on.
+        branch: one or a batch.
+        place: which of a batch.
+        colour: of its curve.
+    """
     if branch.band is not None:
         lower, upper = (
             (_row(np.asarray(end["value"]), place), MILLIMETRES * _row(np.asarray(end["response"]), place))
@@ -284,8 +291,12 @@ def _beside_words(branch: Branch) -> str:
 
 
 def _missing_words(branches: Sequence[Branch]) -> str:
-    """Say below the title what the curves lack of their range."""
-    return "".join(f"\n{words}" for words in dict.fromkeys(one.missing_part for one in branches) if words)
+    """Say below the title what the curves lack of their range, and what of them is in doubt."""
+    words = [one.missing_part for one in branches]
+    bent = [one.band.curved_part for one in branches if one.band is not None]
+    words += [f"band {one}, by draws there" for one in bent if one]
+    words += [f"possible {point.in_doubt}" for one in branches for point in one.possible_points]
+    return "".join(f"\n{one}" for one in dict.fromkeys(words) if one)
 
 
 def _nearest_point(branch: Branch, place: int, point: SpecialPoint) -> tuple[int, float]:

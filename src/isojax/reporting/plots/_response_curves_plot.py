@@ -5,15 +5,22 @@ from jaxtyping import Int
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...stability import StabilityMap
-from ._branch_plots import threads
+from ...models import EndsEstimated, Estimated
+from ...stability import StabilityMap, frequency_response
+from ._branch_plots import draw_branch_band, threads
 from ._stability_style import MILLIMETRES, draw_curve, drive_unit, level_colours, quantity, stability_handles
 from ._style import axes_for, entitle
 
 _CURVES = 5
 
 
-def plot_response_curves(smap: StabilityMap, *, curves: int = _CURVES, ax: Axes | None = None) -> Figure:
+def plot_response_curves(
+    smap: StabilityMap,
+    *,
+    curves: int = _CURVES,
+    fit: Estimated | EndsEstimated | None = None,
+    ax: Axes | None = None,
+) -> Figure:
     """Draw the response over frequency, solid where stable and dashed where unstable.
 
     The drive amplitudes are rows of the map at equal steps, the largest among them; where orbits coexist,
@@ -22,13 +29,16 @@ def plot_response_curves(smap: StabilityMap, *, curves: int = _CURVES, ax: Axes 
     Args:
         smap: the map.
         curves: how many rows, if the map has as many.
+        fit: with whose errors each curve is given its band, which takes some seconds: the response is
+            followed for it from the lowest frequency on. The model of the map is its model. None for no band.
         ax: axes to draw on.
 
     Returns:
         The figure.
 
     Raises:
-        ValueError: if `curves` is no positive count.
+        ValueError: if `curves` is no positive count, or `fit` failed, leaves a coefficient undetermined or is
+            of another model.
     """
     if curves < 1:
         raise ValueError(f"Argument `curves` must be a positive count, but is {curves}.")
@@ -39,12 +49,18 @@ def plot_response_curves(smap: StabilityMap, *, curves: int = _CURVES, ax: Axes 
     stable = np.asarray(smap.stable).reshape(shape)
     unit, unstable = drive_unit(smap.model.excitation), False
     rows = _rows(np.asarray(smap.count), curves)
-    for row, colour in zip(rows, level_colours(len(rows)), strict=True):
+    colours = level_colours(len(rows))
+    for row, colour in zip(rows, colours, strict=True):
         label = quantity(amplitudes[row], unit)
         for x, y, held in threads(frequency, response[:, row], stable[:, row]):
             draw_curve(ax, x, y, held, colour, label)
             unstable |= bool(np.any(np.isfinite(y) & ~held))
             label = ""
+    if fit is not None:
+        ends = frequency[0], frequency[-1]
+        followed = frequency_response(smap.model, amplitudes[rows], ends, periods=(), fit=fit)
+        for place, colour in enumerate(colours):
+            draw_branch_band(ax, followed.branch, place, colour)
     ax.set_ylim(bottom=0.0)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("response, half peak to peak [mm]")

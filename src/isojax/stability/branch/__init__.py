@@ -1,13 +1,14 @@
 """Branches of periodic orbits along one parameter, and curves of their bifurcations over two.
 
 In: an isolator, the parameter and its range. Out: `Branch` with its `SpecialPoint`s, curves of folds,
-period doublings and Neimark-Sacker bifurcations, nearest folds. Read _parameter_family, _arc_length (how a
-curve is followed), _branch, _continuation with _tracing; then _other_branches (what the branch does not
-reach) with _orbit_search and _orbit_starts; _criticality (what vanishes where an orbit bifurcates),
-_locating and _special_points (what is found along a branch) with _bifurcation_system (its exact equations)
-and _extended_system (their solution); then _branch_switching, _codimension_two with _orbit_curve,
-_bifurcation_curves and _curve_special_points, _branch_bands (errors of a fit) with _drive_words, and
-_nearest_folds.
+period doublings and Neimark-Sacker bifurcations, nearest folds. Read _parameter_family, _arc_length (how
+a curve is followed), _branch with _branch_point, _continuation with _tracing; then _other_branches (what
+the branch does not reach) with _orbit_search and _orbit_starts; _criticality (what vanishes where an
+orbit bifurcates), _locating and _special_points (what is found along a branch) with _bifurcation_system
+(its exact equations) and _extended_system (their solution); then _branch_switching, _codimension_two with
+_orbit_curve, _bifurcation_curves and _curve_special_points, _moved_point (where a bifurcation goes when
+the model moves), _possible_points (what the model lacks and others within its errors have), _branch_bands
+(errors of a fit) with _drive_words, and _nearest_folds.
 """
 
 from ._bifurcation_curves import CodimensionTwoPoint as CodimensionTwoPoint

@@ -5,26 +5,17 @@ from collections.abc import Callable
 from typing import Literal
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
-from ..._implicit import frozen, with_derivatives
+from ..._quantities import typeset_unit
 from ..._results import RESULTS, names_of_results
 from ..._show import Row, amount, brief, number, shown
 from ..._types import Scalar
 from ...models import Band, Integrator, Isolator
-from ..orbit import (
-    ShootingMethod,
-    half_range,
-    modulus,
-    multipliers,
-    pair_angle,
-    trajectory,
-    value_and_jacobian,
-)
-from ._drive_words import drive_in_words
+from ..orbit import ShootingMethod, modulus, pair_angle
+from ._drive_words import drive_in_words, unit_of
 from ._parameter_family import ParameterFamily
 
 
@@ -111,7 +102,11 @@ class SpecialPoint(eqx.Module):
         family: isolators and drives along the parameter.
         integrator: steps and solver.
         symmetric: whether it was closed with the half-period map.
-        band: of value, amplitude and frequency, where a fit was given; zero wide for what is held fixed.
+        band: of value, amplitude and frequency, where a fit was given; zero wide for what is held fixed. Of
+            the models that have the bifurcation, where not all within the errors do.
+        probability: that the true isolator has it, by the share of the models within the errors of the fit
+            that do; None without a fit, and of an event.
+        probability_error: standard error of that share, by the count of models.
     """
 
     kind: str = eqx.field(static=True)
@@ -129,6 +124,8 @@ class SpecialPoint(eqx.Module):
     integrator: Integrator
     symmetric: bool = eqx.field(static=True)
     band: Band | None = None
+    probability: float | None = None
+    probability_error: float | None = None
 
     @property
     def method(self) -> ShootingMethod:
@@ -155,10 +152,25 @@ class SpecialPoint(eqx.Module):
         if self.kind == "neimark_sacker" and np.isfinite(np.asarray(self.value)):
             turns = number(float(self.rotation_number))
             torus = f": quasi-periodic motion begins here, rotation number {turns}"
-        return f"{self.kind.replace('_', ' ')} at {drive}{after}{torus}"
+        doubt = ""
+        if self.probability is not None and self.probability < 1.0:
+            doubt = f"; exists with probability {number(self.probability)}"
+        return f"{self.kind.replace('_', ' ')} at {drive}{after}{torus}{doubt}"
+
+    @property
+    def in_doubt(self) -> str:
+        """How probable a bifurcation is that the fitted model lacks, and where it lies if it exists."""
+        kind, name = self.kind.replace("_", " "), self.family.names[0]
+        chance = f"{kind}: probability {number(self.probability)}"
+        if self.band is None or not np.isfinite(float(self.band.lower["value"])):
+            return chance
+        unit = typeset_unit(unit_of(self.family.model, name))
+        low, high = (number(float(end["value"])) for end in (self.band.lower, self.band.upper))
+        share = f"{self.band.confidence:.0%}"
+        return f"{chance}; where there is one, {share} of its {name} lies in {low} to {high} {unit}".rstrip()
 
     def _rows(self) -> list[str]:
-        own = ["value", *(["band"] if self.band is not None else [])]
+        own = ["value", *(["band", "probability"] if self.band is not None else [])]
         return [*own, "y0", "multipliers", "direction", "result"]
 
 
@@ -214,6 +226,9 @@ class Branch(eqx.Module):
         searched: where they were sought; None if they were not.
         events: what was looked out for.
         band: of value and response, across the branch, where a fit was given.
+        possible_points: bifurcations that the model has not, but others within the errors of the fit have,
+            each at the nearest such model, with its probability; `find_again` starts from there as from a
+            special point. Empty without a fit.
     """
 
     model: Isolator
@@ -232,6 +247,7 @@ class Branch(eqx.Module):
     searched: Searched | None = None
     events: tuple[BranchEvent, ...] = ()
     band: Band | None = None
+    possible_points: tuple[SpecialPoint, ...] = ()
 
     @property
     def connection(self) -> Literal["none", "bifurcation", "unknown"]:
@@ -270,7 +286,8 @@ class Branch(eqx.Module):
     def _headline(self) -> str:
         kinds = [point.kind.replace("_", " ") for point in self.special_points]
         special = ", ".join(f"{kinds.count(kind)} × {kind}" for kind in dict.fromkeys(kinds))
-        words = f"along {self.parameter}, {self.points._headline()}; {special or 'no bifurcation'}"
+        none = "no bifurcation of its own" if self.possible_points else "no bifurcation"
+        words = f"along {self.parameter}, {self.points._headline()}; {special or none}"
         return f"{self.missing_part}; {words}" if self.missing_part else words
 
     def _rows(self) -> list[str | Row]:
@@ -281,6 +298,7 @@ class Branch(eqx.Module):
 
     def _lines(self) -> list[str]:
         lines = [f"  {point._headline()}" for point in self.special_points]
+        lines += [f"  possible {point.in_doubt}" for point in self.possible_points]
         if self.searched is None:
             return lines
         beside = [f"  beside it {other._in_words()}" for other in self.others]
@@ -300,78 +318,3 @@ class Branch(eqx.Module):
         held = f"{int(stable.sum())} of {value.size} points stable"
         words = f"{how[self.connection]}{after}: {span}, up to {size}, {held}"
         return f"{words}; {self.missing_part}" if self.missing_part else words
-
-
-def branch_point(
-    family: ParameterFamily,
-    method: ShootingMethod,
-    scale: Float[Array, " state"],
-    unknown: Float[Array, " unknown"],
-    tangent: Float[Array, " unknown"],
-) -> BranchPoints:
-    """Give what is known of one point of a branch.
-
-    Args:
-        family: isolators and drives.
-        method: how the orbits are closed.
-        scale: size of each state.
-        unknown: scaled state and share of the parameter.
-        tangent: along the branch.
-
-    Returns:
-        The point. Its derivatives by the model are those of the branch moving across itself.
-    """
-    held = method, scale, tangent, unknown
-    left, slope = value_and_jacobian(lambda here: _across(here, frozen(family), held)[0], unknown)
-    closed = unknown - jnp.linalg.solve(slope, left)
-    unknown = with_derivatives(closed, _across, closed, family, held)
-    return orbit_at(family, method, scale, unknown, tangent)
-
-
-def orbit_at(
-    family: ParameterFamily,
-    method: ShootingMethod,
-    scale: Float[Array, " state"],
-    unknown: Float[Array, " unknown"],
-    tangent: Float[Array, " unknown"],
-) -> BranchPoints:
-    """Give what is known of one closed motion.
-
-    Args:
-        family: isolators and drives.
-        method: how the orbits are closed.
-        scale: size of each state.
-        unknown: scaled state and share of the parameter.
-        tangent: along the branch.
-
-    Returns:
-        The point.
-    """
-    states = scale.shape[0]
-    scaled, shares = unknown[:states], unknown[states:]
-    setting = family.at(shares)
-    matrix = jax.jacfwd(lambda z: family.image(method, scale, z, shares))(scaled)
-    roots = multipliers(matrix)
-    lasting = float(method.periods)
-    path = trajectory(setting.model, method.integrator, setting.drive, tuple(scaled * scale), turns=lasting)
-    return BranchPoints(
-        family.values(shares)[0],
-        jnp.asarray(setting.amplitude),
-        jnp.asarray(setting.frequency),
-        scaled * scale,
-        half_range(setting.model, setting.drive, path, lasting),
-        roots * roots if method.half else roots,
-        roots if method.half else jnp.full(states, jnp.nan + 0j),
-        tangent,
-    )
-
-
-def _across(
-    unknown: Float[Array, " unknown"],
-    family: ParameterFamily,
-    held: tuple[ShootingMethod, Float[Array, " state"], Float[Array, " unknown"], Float[Array, " unknown"]],
-) -> tuple[Float[Array, " unknown"], Float[Array, " unknown"]]:
-    """Give what vanishes at a point that moves across the branch: the equations of its derivatives."""
-    method, scale, tangent, origin = held
-    left = family.open_end(method, scale, unknown)
-    return jnp.concatenate([left, jnp.dot(tangent, unknown - origin)[None]]), unknown

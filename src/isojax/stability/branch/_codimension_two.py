@@ -22,7 +22,7 @@ from ...models import (
     Modelled,
     as_isolator,
     coefficient_errors,
-    find_band,
+    find_band_across,
 )
 from ..orbit import ShootingMethod, is_odd, refuse_traced
 from ._arc_length import Stride
@@ -213,7 +213,7 @@ def _bands(
         own = moved.numbers(moved.polished(followed))
         return jnp.stack([own.frequency, own.amplitude])
 
-    band = find_band(errors, ("frequency", "amplitude"), across, across=True)
+    band = find_band_across(errors, ("frequency", "amplitude"), across)
     return with_bands_at(special, errors), band
 
 

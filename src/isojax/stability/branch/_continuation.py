@@ -34,10 +34,11 @@ from ..orbit import (
 )
 from ._arc_length import HELD, NEVER_STARTED, REACHED_BOUND, STALLED, STIFF, Departure, Followed, Stride
 from ._branch import Branch, BranchEvent
-from ._branch_bands import with_bands
+from ._branch_bands import with_bands, with_probability
 from ._criticality import BifurcationKind
 from ._other_branches import BranchSearch, find_other_branches
 from ._parameter_family import ParameterFamily
+from ._possible_points import find_possible_points
 from ._tracing import assemble, trace
 
 _SIZED_AT = 33
@@ -109,8 +110,9 @@ def continue_branch(
         integrator: solver and steps; 256 a period if omitted.
         events: numbers of the orbits whose zeros are to be located too; they are among the special points,
             by their names. Passing the same events again uses what was compiled for them.
-        fit: with whose errors branches and special points are given bands; `model` is its model. None for
-            no band.
+        fit: with whose errors branches and special points are given bands, and these their probability;
+            bifurcations that `model`, which is its model, lacks are then sought within them: see
+            `possible_points` of the result. None for neither.
 
     Returns:
         The branch. Where it ends early `result` says so, and the points found so far stand. Where dry
@@ -176,7 +178,17 @@ def continue_branch(
         search = BranchSearch(tuple(other_periods), stride, tuple(events))
         found, searched = find_other_branches(family, method, scale, followed, search)
         branch = dataclasses.replace(branch, others=found, searched=searched)
-    return branch if errors is None else with_bands(branch, errors)
+    if errors is None:
+        return branch
+
+    def again(isolator: Isolator) -> Branch:
+        other = dataclasses.replace(frozen(family), model=isolator)
+        return assemble(other, method, *follow_branches(other, method, begin, stride), batched, step)
+
+    possible = find_possible_points(frozen(branch), errors, again)
+    branch = with_bands(branch, errors)
+    possible = tuple(with_probability(point, errors) for point in possible)
+    return dataclasses.replace(branch, possible_points=possible)
 
 
 def _stalled(followed: Followed) -> Bool[Array, " branch"]:

@@ -5,9 +5,25 @@ import math
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._parameters import list_parameters
 from ..._quantities import DRIVE_UNITS, typeset_unit
 from ..._show import amount, number
 from ...models import Band, Isolator
+
+
+def unit_of(model: Isolator, parameter: str) -> str:
+    """Give the unit of what varies along a branch.
+
+    Args:
+        model: the isolator.
+        parameter: "amplitude", "frequency", or a coefficient by its name in reports.
+
+    Returns:
+        The unit.
+    """
+    units = {"amplitude": DRIVE_UNITS[model.excitation], "frequency": "Hz"}
+    entries = {entry.name: entry.spec.unit for entry in list_parameters(model)}
+    return units.get(parameter) or entries[parameter]
 
 
 def drive_in_words(

@@ -10,7 +10,8 @@ from jaxtyping import Array, Float, Int
 
 from ..._quick_jit import quick_jit
 from ..orbit import ShootingMethod, is_odd, period_map, value_and_jacobian
-from ._branch import BranchEvent, BranchPoints, orbit_at
+from ._branch import BranchEvent, BranchPoints
+from ._branch_point import orbit_at
 from ._criticality import BifurcationKind, criticality
 from ._extended_system import PointGuess
 from ._parameter_family import ParameterFamily
@@ -28,6 +29,14 @@ below which it counts as symmetric or repeated: bisection leaves a ten-thousandt
 
 _REAL = 1e-6
 """Imaginary part below which a pair of multipliers counts as two real ones, one the inverse of the other."""
+
+TEST_OF: dict[BifurcationKind, int] = {
+    "fold": 0,
+    "period_doubling": 1,
+    "symmetry_breaking": 1,
+    "neimark_sacker": 2,
+}
+"""Which of `critical_values` vanishes at each, its orbit closed as that of the point is."""
 
 _BIFURCATIONS = 3
 """Test functions of bifurcations, which stand before those of events."""

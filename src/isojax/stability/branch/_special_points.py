@@ -10,18 +10,21 @@ from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS, is_successful
 from ..orbit import ShootingMethod, event_places, multipliers
-from ._branch import BranchEvent, BranchPoints, SpecialPoint, orbit_at
+from ._branch import BranchEvent, BranchPoints, SpecialPoint
+from ._branch_point import orbit_at
 from ._criticality import BifurcationKind
 from ._extended_system import (
     LOCATED_WITHIN,
     MOST_PLACES,
-    MOVED_WITHIN,
     PointGuess,
     Polished,
     polish_jitted,
 )
 from ._locating import SAME_MOTION, BranchCurves, crossed_branch, distance_from, locate, repeats_jitted
+from ._moved_point import moved_guess
 from ._parameter_family import ParameterFamily
+
+moved_guess_jitted = quick_jit(moved_guess)
 
 
 def find_special_points(
@@ -107,7 +110,7 @@ def special_point(
 def find_bifurcation_again(
     point: SpecialPoint, kind: BifurcationKind, family: ParameterFamily
 ) -> SpecialPoint:
-    """Find a bifurcation of a branch again among other isolators and drives.
+    """Find a bifurcation of a branch again among other isolators and drives: on the branch there, or nowhere.
 
     Args:
         point: the known point; no number of it is traced.
@@ -117,8 +120,23 @@ def find_bifurcation_again(
     Returns:
         The point there.
     """
+    guess = moved_guess_jitted(point, kind, frozen(family))
+    return special_point(family, point.method, kind, point.branch, guess)
+
+
+def bifurcation_moving(point: SpecialPoint, kind: BifurcationKind, family: ParameterFamily) -> SpecialPoint:
+    """Give a bifurcation of a branch with its derivatives by the isolators and drives.
+
+    Args:
+        point: the known point; no number of it is traced.
+        kind: which bifurcation it is.
+        family: the same isolators and drives; their derivatives reach the point.
+
+    Returns:
+        The point.
+    """
     guess = PointGuess(point.y0, point.family.shares(point.value[None]))
-    return special_point(family, point.method, kind, point.branch, guess, MOVED_WITHIN)
+    return special_point(family, point.method, kind, point.branch, guess)
 
 
 def find_event_again(

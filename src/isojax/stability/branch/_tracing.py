@@ -10,7 +10,8 @@ from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..orbit import ShootingMethod
 from ._arc_length import HELD, REACHED_BOUND, RETURNED, STIFF, Departure, Followed, Stride, follow
-from ._branch import Branch, BranchEvent, BranchPoints, branch_point
+from ._branch import Branch, BranchEvent, BranchPoints
+from ._branch_point import branch_point
 from ._locating import BranchCurves
 from ._parameter_family import ParameterFamily
 from ._special_points import find_special_points
@@ -82,6 +83,39 @@ def branch_points(
 def room_for(counts: Int[np.ndarray, " branch"], most: int) -> int:
     """Give how many points of each branch to keep: all, rounded up, so that few shapes are compiled."""
     return min(-(-max(int(counts.max()), 2) // 128) * 128, most)
+
+
+def lanes_of(
+    branch: Branch,
+) -> tuple[
+    ParameterFamily,
+    Float[Array, "branch state"],
+    Float[Array, "branch point unknown"],
+    Float[Array, "branch point unknown"],
+]:
+    """Give what branches were traced from, and their points, with an axis for the branches also of one.
+
+    Args:
+        branch: one, or a batch.
+
+    Returns:
+        Isolators and drives, sizes of the states, points (scaled states and shares) and tangents; NaN past
+        the end of a branch.
+    """
+    points, single = branch.points, branch.points.value.ndim == 1
+    shares = branch.family.shares(points.value)
+    lanes = (branch.scale, points.y0, shares, points.tangent)
+    scale, states, shares, tangents = (one[None] if single else one for one in lanes)
+    unknowns = jnp.concatenate([states / scale[:, None], shares[..., None]], axis=-1)
+    count = points.value.shape[-1]
+    # Rounded up, so that few shapes are compiled.
+    room = room_for(np.array([count]), 2 * count + 128) - count
+    unknowns, tangents = (
+        jnp.pad(values, ((0, 0), (0, room), (0, 0)), constant_values=jnp.nan)
+        for values in (unknowns, tangents)
+    )
+    drives = (jnp.atleast_1d(one) for one in (branch.family.amplitude, branch.family.frequency))
+    return branch.family.driven(*drives), scale, unknowns, tangents
 
 
 def assemble(

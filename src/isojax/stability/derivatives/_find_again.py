@@ -37,12 +37,14 @@ def find_again(
 
     From the known one by Newton's method, so that the shape of the answer is known beforehand: `jax.jit`,
     `jax.vmap`, `jax.jacfwd` and `jax.grad` go through, also where those that found it in the first place
-    refuse. What vanishes on the way, as an orbit does past its fold, is NaN.
+    refuse. What vanishes on the way, as an orbit does past its fold, is NaN. A bifurcation of a branch is
+    sought along the branch of the other model, so that it is found where it is, and nothing else where it is
+    gone.
 
     Args:
-        answer: an orbit; a special point of a branch, such as a fold, or of a curve of bifurcations, such as
-            a cusp; a resonance; a transmissibility; or a map, of which each cell is found again. Its numbers
-            must be known: find it outside what JAX transforms.
+        answer: an orbit; a special or possible point of a branch, such as a fold; a special point of a curve
+            of bifurcations, such as a cusp; a resonance; a transmissibility; or a map, of which each cell is
+            found again. Its numbers must be known: find it outside what JAX transforms.
         model: the isolator, with the same elements; its numbers may be traced.
         amplitude: of the drive, in place of that of the answer [N, or m/s^2 for base excitation].
         frequency: of the drive, in place of that of the answer [Hz].

@@ -83,7 +83,9 @@ class FrequencyResponse(eqx.Module):
             {"frequency": part["value"], "amplitude": part["response"]}
             for part in (own.standard_error, own.lower, own.upper)
         )
-        return Band(error, lower, upper, own.confidence)
+        bent = own.curved
+        curved = None if bent is None else {"frequency": bent["value"], "amplitude": bent["response"]}
+        return Band(error, lower, upper, own.confidence, curved)
 
     @property
     def result(self) -> RESULTS:

@@ -24,7 +24,7 @@ from ...models import (
     Estimated,
     Integrator,
     Isolator,
-    band_around,
+    band_across,
     coefficient_errors,
 )
 from ..orbit import ascending, integrator_for, margin_beside_folds
@@ -277,7 +277,7 @@ class _Surface:
         for name, one, size in zip(_NAMES, (displacement, ratio), sizes, strict=True):
             change = np.array([frequency * across[:, 0], size * one.moved(across)])
             values, change = np.array([frequency, size]), np.moveaxis(change, 1, 2)
-            bands.append(band_around(("frequency", name), values, change, across=True))
+            bands.append(band_across(("frequency", name), values, change))
             errors[name] = size * np.linalg.norm(one.moved(up), axis=0)
         stable = (drive.slopes[1] > 0.0) & (self.margin.ev(*at) > 0.0)
         folds = self._folds(at, drive.slopes[1])

@@ -1,0 +1,113 @@
+"""What draws say of a quantity: how probable it is that it exists, and where it then lies."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.special import ndtri
+
+from .._show import shown
+
+_BEND = 0.1
+"""Share of an interval by which delta method and draws may differ."""
+
+_DRAWS_BEYOND = 2
+"""Draws that an interval must leave out at least, one at either end: else they do not show its ends."""
+
+
+@shown
+class CredibleSet(NamedTuple):
+    """Where a quantity lies that a model may not have, such as a fold: numbers, and the answer "none".
+
+    Attributes:
+        probability: that it exists: the share of the draws that give a number.
+        probability_error: of this share, by the count of draws; never less than what one draw makes.
+        standard_error: by the delta method; where `curved`, standard deviation of the draws that have it.
+        interval: lower and upper end, first axis. Where "none" is improbable, so that the interval alone can
+            hold the truth with the confidence asked for, its share of the draws times their probability is
+            that confidence. Elsewhere "none" belongs to the set, and the interval is that of the draws that
+            have the quantity.
+        curved: whether an end by the delta method differs from that by draws by more than a tenth of the
+            interval; its ends are then quantiles of the draws.
+    """
+
+    probability: Float[np.ndarray, "..."]
+    probability_error: Float[np.ndarray, "..."]
+    standard_error: Float[np.ndarray, "..."]
+    interval: Float[np.ndarray, "2 ..."]
+    curved: Bool[np.ndarray, "..."]
+
+
+def credible_set(
+    value: Float[np.ndarray, "..."],
+    error: Float[np.ndarray, "..."],
+    drawn: Float[np.ndarray, "draw ..."],
+    confidence: float,
+) -> CredibleSet:
+    """Give the set of numbers, and perhaps "none", that holds a quantity.
+
+    Args:
+        value: at the fitted coefficients; NaN where it does not exist there.
+        error: by the delta method; NaN where that must not be taken.
+        drawn: the quantity at coefficients drawn from their distribution; NaN where it does not exist.
+        confidence: chance that the set is meant to hold the truth.
+
+    Returns:
+        The set. Ends are NaN where too few draws have the quantity to tell them.
+
+    Source: Box & Tiao 1973, Bayesian Inference in Statistical Analysis, sec. 2.8 (regions of given content).
+    """
+    count, held = len(drawn), np.sum(np.isfinite(drawn), axis=0)
+    share, share_error = existence(drawn)
+    # "None" is left out of the set where the numbers alone can reach the confidence.
+    alone = share > confidence
+    content = np.where(alone, confidence / np.where(alone, share, 1.0), confidence)
+    tail = np.asarray(np.maximum(0.5 * (1.0 - content), 0.5 / count))
+    spread = -ndtri(tail) * error
+    straight = np.stack([value - spread, value + spread])
+    ends = _quantiles(drawn, tail)
+    ends = np.where(alone | (held * (1.0 - confidence) >= _DRAWS_BEYOND), ends, np.nan)
+    with np.errstate(invalid="ignore"):
+        curved = ~(np.max(np.abs(ends - straight), axis=0) <= _BEND * 2.0 * spread)
+    return CredibleSet(
+        share,
+        share_error,
+        np.where(curved & np.isfinite(ends).all(axis=0), _spread(drawn), error),
+        np.where(curved, ends, straight),
+        np.asarray(curved),
+    )
+
+
+def existence(
+    drawn: Float[np.ndarray, "draw ..."],
+) -> tuple[Float[np.ndarray, "..."], Float[np.ndarray, "..."]]:
+    """Give the share of draws that have a quantity, and the standard error of it.
+
+    Args:
+        drawn: the quantity; NaN where it does not exist.
+
+    Returns:
+        Both. The error is never less than what one draw makes.
+    """
+    share = np.asarray(np.mean(np.isfinite(drawn), axis=0))
+    return share, np.asarray(np.sqrt(np.maximum(share * (1.0 - share), 1.0 / len(drawn)) / len(drawn)))
+
+
+def _quantiles(
+    drawn: Float[np.ndarray, "draw ..."], tail: Float[np.ndarray, "..."]
+) -> Float[np.ndarray, "2 ..."]:
+    """Give the two draws that leave a tail out at either end, of those that are numbers; NaN of none."""
+    held = np.sum(np.isfinite(drawn), axis=0)
+    ordered = np.sort(np.where(np.isfinite(drawn), drawn, np.nan), axis=0)  # NaN last
+    reach = np.floor(tail * (held - 1)).astype(int)
+    ends = [np.take_along_axis(ordered, np.maximum(at, 0)[None], 0)[0] for at in (reach, held - 1 - reach)]
+    return np.stack(ends)
+
+
+def _spread(drawn: Float[np.ndarray, "draw ..."]) -> Float[np.ndarray, "..."]:
+    """Give the standard deviation of the draws that are numbers."""
+    there = np.isfinite(drawn)
+    held = np.maximum(np.sum(there, axis=0), 1)
+    known = np.where(there, drawn, 0.0)
+    away = np.where(there, known - np.sum(known, axis=0) / held, 0.0)
+    return np.asarray(np.sqrt(np.sum(away**2, axis=0) / held))
