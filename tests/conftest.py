@@ -1,5 +1,6 @@
 """Shared fixtures: float64 before any array is made, shape checks, and the folder of third-party data."""
 
+import ctypes
 import gc
 import os
 import shutil
@@ -51,6 +52,9 @@ _MOST_MAPPINGS = 40_000
 """Memory mappings of the process from which compiled code is let go; Linux allows 65530, and every compiled
 function takes several. Beyond that limit the compiler does not raise, it crashes."""
 
+_MOST_MEMORY = 8e9
+"""Resident memory of the process [B] from which compiled code is let go: there is one process a core."""
+
 _compiled_since: list[str] = []
 """An entry for each function compiled, or read from the folder, since the mappings were last counted."""
 
@@ -73,7 +77,7 @@ def unchecked():
 
 @pytest.fixture(autouse=True)
 def _let_compiled_code_go() -> Iterator[None]:
-    """Forget compiled functions after a test, once they crowd the address space.
+    """Forget compiled functions after a test, once they crowd the address space or the memory.
 
     To count the mappings takes up to a tenth of a second, too long for a test that compiled next to nothing.
     """
@@ -81,10 +85,15 @@ def _let_compiled_code_go() -> Iterator[None]:
     if len(_compiled_since) < 300:
         return
     _compiled_since.clear()
-    mappings = Path("/proc/self/maps")
-    if mappings.exists() and len(mappings.read_bytes().splitlines()) > _MOST_MAPPINGS:
+    process = Path("/proc/self")
+    if not process.exists():
+        return
+    pages = int((process / "statm").read_text().split()[1])
+    crowded = len((process / "maps").read_bytes().splitlines()) > _MOST_MAPPINGS
+    if crowded or pages * os.sysconf("SC_PAGE_SIZE") > _MOST_MEMORY:
         jax.clear_caches()
         gc.collect()
+        ctypes.CDLL(None).malloc_trim(0)  # glibc keeps what was freed otherwise
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -1,6 +1,7 @@
 """Errors of a fit at branches and special points, against how the solutions of two oscillators scale."""
 
 import dataclasses
+import functools
 from typing import NamedTuple
 
 import diffrax
@@ -179,7 +180,9 @@ def force_at_folds(damping):
     return np.sqrt(4.0 * y / 3.0 * ((y - d) ** 2 + loss))
 
 
-def along_force(fit):
+@functools.cache
+def along_force(share):
+    fit = lightly_damped(share)
     return ij.continue_branch(
         fit.model,
         parameter="amplitude",
@@ -195,7 +198,7 @@ def along_force(fit):
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_a_fold_beside_its_cusp_has_the_probability_and_the_force_of_the_closed_form(share):
-    branch = along_force(lightly_damped(share))
+    branch = along_force(share)
     own, points = branch.special_points, (*branch.special_points, *branch.possible_points)
     assert len(own) == (2 if share < 1.0 else 0)
     assert [point.kind for point in points] == ["fold", "fold"]
@@ -216,7 +219,7 @@ def test_a_fold_beside_its_cusp_has_the_probability_and_the_force_of_the_closed_
 @pytest.mark.slow
 def test_a_fold_is_found_again_on_its_own_branch_or_nowhere():
     """Newton's method alone went to folds of other motions, or missed one whose pair had moved apart."""
-    first, second = along_force(lightly_damped(0.98)).special_points
+    first, second = along_force(0.98).special_points
     for share in (0.7, 0.95):
         found = [float(ij.find_again(point, _damped(share)).amplitude) for point in (first, second)]
         np.testing.assert_allclose(found, force_at_folds(share * TURNING)[:, 0], rtol=5e-3)
@@ -230,7 +233,7 @@ def _damped(share):
 
 @pytest.mark.slow
 def test_a_fold_that_no_model_within_the_errors_has_is_not_possible():
-    branch = along_force(lightly_damped(1.2))
+    branch = along_force(1.2)
     assert not branch.special_points
     assert not branch.possible_points
     assert "no bifurcation" in str(branch)

@@ -65,6 +65,7 @@ class Band(eqx.Module):
         ]
 
 
+@shown
 class CurveBeside(NamedTuple):
     """A curve of other models, from which draws of it follow.
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-_REACH = 2.0
+_EXPANDED_AT = 2.0
 """Standard deviations at which a curve is worked out for its expansion: where an interval of 95 % ends."""
 
 
@@ -19,7 +19,7 @@ def expansion_nodes(count: int) -> Float[np.ndarray, "node step"]:
     unit = np.eye(count)
     first, second = np.triu_indices(count, 1)
     ways = np.concatenate([unit, (unit[first] + unit[second]) / np.sqrt(2.0)])
-    return _REACH * np.concatenate([ways, -ways])
+    return _EXPANDED_AT * np.concatenate([ways, -ways])
 
 
 def expanded(
@@ -37,9 +37,9 @@ def expanded(
     count = draws.shape[1]
     ahead, behind = np.split(shifts, 2)
     even, odd = 0.5 * (ahead + behind), 0.5 * (ahead - behind)
-    slopes, bends = odd[:count] / _REACH, 2.0 * even[:count] / _REACH**2
+    slopes, bends = odd[:count] / _EXPANDED_AT, 2.0 * even[:count] / _EXPANDED_AT**2
     first, second = np.triu_indices(count, 1)
-    mixed = 2.0 * even[count:] / _REACH**2 - 0.5 * (bends[first] + bends[second])
+    mixed = 2.0 * even[count:] / _EXPANDED_AT**2 - 0.5 * (bends[first] + bends[second])
     squares = np.tensordot(0.5 * draws**2, bends, axes=1)
     products = np.tensordot(draws[:, first] * draws[:, second], mixed, axes=1)
     return np.tensordot(draws, slopes, axes=1) + squares + products

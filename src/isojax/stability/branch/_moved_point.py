@@ -42,7 +42,7 @@ _FOUND_WITHIN = 1e-6
 _STRAIGHT = 0.8
 """Cosine of the turn of the tangent in one step below which the branch counts as lost."""
 
-_ASIDE = 2e-3
+_SIDESTEP = 2e-3
 """Distance along the known branch at which the sense of its test function's change is read."""
 
 
@@ -77,7 +77,7 @@ def moved_guess(point: SpecialPoint, kind: BifurcationKind, family: ParameterFam
     _, slope = value_and_jacobian(lambda u: known.open_end(method, scale, u), origin)
     # Null vector of the slope: the way along the branch.
     across = jnp.linalg.svd(slope)[2][-1]
-    aside = jax.vmap(lambda side: place(known, origin + side * _ASIDE * across, across).test)
+    aside = jax.vmap(lambda side: place(known, origin + side * _SIDESTEP * across, across).test)
     behind, ahead = aside(jnp.array([-1.0, 1.0]))
     sense = jnp.sign(ahead - behind)
 

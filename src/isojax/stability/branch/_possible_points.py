@@ -27,7 +27,7 @@ from ._locating import critical_values
 from ._parameter_family import ParameterFamily
 from ._tracing import lanes_of
 
-_FARTHEST = 3.5
+_FARTHEST_MODEL = 3.5
 """Standard deviations up to which the nearest coefficients with a bifurcation are sought: beyond, fewer than
 one model in four thousand has it."""
 
@@ -35,7 +35,7 @@ _BEYOND = (0.4, 1.0, 2.0)
 """Standard deviations past these at which the branch is followed, until it has the bifurcation: there it lies
 clear of where it vanishes."""
 
-_AT_ONCE = 4
+_TRIED_AT_ONCE = 4
 """Extrema of which derivatives are taken together, so that one shape is compiled."""
 
 _PAIR = 2
@@ -72,12 +72,12 @@ def find_possible_points(
     tests = np.asarray(_tests(family, method, *curves))
     found: list[SpecialPoint] = []
     dips = _dips(tests)
-    for first in range(0, len(dips), _AT_ONCE):
-        some = dips[first : first + _AT_ONCE]
+    for first in range(0, len(dips), _TRIED_AT_ONCE):
+        some = dips[first : first + _TRIED_AT_ONCE]
         values, slopes = _with_slopes(branch, method, curves, some, errors)
         for dip, value, slope in zip(some, values, slopes, strict=True):
             size = float(np.linalg.norm(slope))
-            if size > 0.0 and abs(value) <= _FARTHEST * size:
+            if size > 0.0 and abs(value) <= _FARTHEST_MODEL * size:
                 way = -np.sign(value) * slope / size
                 found += _new_points(branch, errors, again, dip, (abs(value) / size, way))
     return tuple(found)
@@ -136,7 +136,7 @@ def _with_slopes(
     branch: Branch, method: ShootingMethod, curves: _Curves, dips: list[_Dip], errors: CoefficientErrors
 ) -> tuple[Float[np.ndarray, " dip"], Float[np.ndarray, "dip step"]]:
     """Give the test functions at their extrema, and their changes by each independent step."""
-    filled = [dips[place % len(dips)] for place in range(_AT_ONCE)]
+    filled = [dips[place % len(dips)] for place in range(_TRIED_AT_ONCE)]
     some, lanes = curves.at(filled), np.array([dip.lane for dip in filled])
     amplitude, frequency = (
         jnp.atleast_1d(one)[lanes] for one in (branch.family.amplitude, branch.family.frequency)

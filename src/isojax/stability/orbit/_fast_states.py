@@ -20,7 +20,7 @@ may take steps four times longer than the whole does."""
 _MOST_STEPS = 1 << 14
 """Steps a drive period at most; beyond, a model is stiff."""
 
-_LOOKED_AT = 5
+_RANGE_LOOKED_AT = 5
 """Sizes of motion, and frequencies, of a range at which the states are looked at."""
 
 _SAMPLES = 64
@@ -47,8 +47,8 @@ def integrator_over(
     Returns:
         The integrator.
     """
-    motions = np.geomspace(sizes[0], sizes[1], _LOOKED_AT)
-    band = np.linspace(frequencies[0], frequencies[-1], _LOOKED_AT)
+    motions = np.geomspace(sizes[0], sizes[1], _RANGE_LOOKED_AT)
+    band = np.linspace(frequencies[0], frequencies[-1], _RANGE_LOOKED_AT)
     grid = np.meshgrid(motions, band, indexing="ij")
     return integrator_that_follows(model, integrator, *(axis.ravel() for axis in grid))[0]
 
