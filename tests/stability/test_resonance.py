@@ -3,6 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 import isojax as ij
@@ -63,3 +64,21 @@ def test_an_answer_that_is_traced_is_refused(resonance):
     model = linear(STIFFNESS, DAMPING)
     with pytest.raises(ValueError, match="`answer` must hold known numbers"):
         eqx.filter_jit(lambda known: ij.find_again(known, model).frequency)(resonance)
+
+
+@pytest.mark.slow
+def test_the_largest_response_may_lie_on_an_isola():
+    """Damping that rises, falls and rises again: of three amplitudes at resonance the largest is detached."""
+    model = ij.Isolator(
+        1.0,
+        (
+            ij.LinearStiffness(1.0),
+            ij.LinearDamping(0.25),
+            ij.elements.AbsQuadraticDamping(-0.2),
+            ij.elements.CubicDamping(0.045),
+        ),
+    )
+    resonance = ij.find_resonance(model, 0.105, (0.05, 0.4))
+    # One harmonic, x = a cos: the damper takes all of the force where the spring balances the mass.
+    speeds = np.roots([0.75 * 0.045, -0.2 * 8.0 / (3.0 * np.pi), 0.25, -0.105])
+    assert float(resonance.amplitude) == pytest.approx(float(np.max(speeds.real)), rel=0.02)

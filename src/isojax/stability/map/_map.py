@@ -134,15 +134,18 @@ class StabilityMap(eqx.Module):
     def _headline(self) -> str:
         count, radius = np.asarray(self.count), np.asarray(self.spectral_radius)
         found = radius[np.isfinite(radius)]
-        cells = {
-            "with an unstable orbit": self._unstable,
-            "with coexisting orbits": count > 1,
-            "without any": count == 0,
-        }
+        cells = {"with an unstable orbit": self._unstable}
+        if self._all_sought:
+            cells["with coexisting orbits"] = count > 1
+        cells["without any"] = count == 0
         counted = ", ".join(f"{int(np.sum(which))} {words}" for words, which in cells.items())
         largest = number(found.max()) if found.size else "unknown"
         grid = " × ".join(map(str, count.shape))
         return f"{grid} cells of amplitude and frequency, {counted}; largest |mu| {largest}"
+
+    @property
+    def _all_sought(self) -> bool:
+        return np.ndim(self.spectral_radius) > np.ndim(self.count)
 
     @property
     def _unstable(self) -> np.ndarray:
@@ -162,10 +165,9 @@ class StabilityMap(eqx.Module):
         columns = np.unique(np.linspace(0, band.size - 1, min(_COLUMNS, band.size)).round().astype(int))
         drawn = [f"  {forces[row]:>10.4g} |{''.join(marks[row, columns])}" for row in rows[::-1]]
         chances = chance_words(self)
-        sought = np.ndim(self.spectral_radius) > count.ndim
         legend = (
             "  . one stable orbit, x one unstable orbit, 2 to 9 coexisting orbits, ? none found"
-            if sought
+            if self._all_sought
             else "  the orbit of smallest motion in each cell: . stable, x unstable, ? none found"
         )
         return [

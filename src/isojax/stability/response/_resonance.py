@@ -70,9 +70,10 @@ def find_resonance(
 ) -> Resonance:
     """Find where the response over frequency is largest, and how large.
 
-    From the largest point of `frequency_response` by Newton's method: the motion closes, and along the curve
-    its amplitude is stationary. The orbit there is then found as `find_periodic_orbit` finds it; an error of
-    the frequency changes its amplitude only by the square. `jax.jacfwd` and `jax.grad` over the model work;
+    From the largest point of `frequency_response`, isolas included, by Newton's method: the motion closes,
+    and along the curve its amplitude is stationary. The orbit there is then found as `find_periodic_orbit` finds
+    it; an error of the frequency changes its amplitude only by the square. `jax.jacfwd` and `jax.grad` over
+    the model work;
     under `jax.jit` and `jax.vmap` use `find_again`.
 
     Args:
@@ -104,9 +105,12 @@ def find_resonance(
     curve = frequency_response(
         frozen(model), np.asarray(frozen(push)), frequencies, step=step, integrator=integrator
     )
+    # An isola may reach higher than the curve; a subharmonic is no answer at the frequency of the drive.
+    own = [one for one in (curve, *curve.others) if one.branch.periods == 1]
+    curve = max(own, key=lambda one: float(np.nanmax(np.asarray(one.amplitude))))
     sizes = np.asarray(curve.amplitude)
     top = int(np.nanargmax(sizes))
-    if top in (0, int(np.flatnonzero(np.isfinite(sizes))[-1])):
+    if not curve.branch.closed and top in (0, int(np.flatnonzero(np.isfinite(sizes))[-1])):
         raise ValueError(
             f"Argument `frequencies` must hold the resonance, but from {frequencies[0]} to {frequencies[-1]} "
             "Hz the response is largest at an end of the curve."
