@@ -71,10 +71,9 @@ def find_resonance(
     """Find where the response over frequency is largest, and how large.
 
     From the largest point of `frequency_response`, isolas included, by Newton's method: the motion closes,
-    and along the curve its amplitude is stationary. The orbit there is then found as `find_periodic_orbit` finds
-    it; an error of the frequency changes its amplitude only by the square. `jax.jacfwd` and `jax.grad` over
-    the model work;
-    under `jax.jit` and `jax.vmap` use `find_again`.
+    and along the curve its amplitude is stationary. The orbit there is then found as `find_periodic_orbit`
+    finds it; an error of the frequency changes its amplitude only by the square. `jax.jacfwd` and `jax.grad`
+    over the model work; under `jax.jit` and `jax.vmap` use `find_again`.
 
     Args:
         model: the isolator.
