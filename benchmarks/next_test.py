@@ -13,8 +13,7 @@ the fold (c-optimal).
   with the same three records.
 - Many campaigns: the three records are measured anew as well, and the prediction is made from them.
 - From the rig: as from the posterior, but every time on the rig that the three records came from. Where they
-  happen to scatter less, or more, than this rig does, the prediction from them differs from what it shows;
-  no mark applies.
+  happen to scatter less, or more, than this rig does, the prediction from them differs from what it shows.
 
 The report prints the standard error as predicted and as the refits gave it, both as root mean squares over
 the standard error before, for all coefficients the geometric mean along the axes of their ellipsoid. PASS or
@@ -162,11 +161,8 @@ def report(rows: list[dict]) -> None:
                 f"{name}, {words}, {len(some)} refits: predicted {predicted:.3f}, found {found:.3f}, "
                 f"ratio {found / predicted:.3f}"
             )
-            if truth == "rig":
-                print(f"{line} (no mark)")
-            else:
-                met = abs(found / predicted - 1.0) <= MARK
-                marks.judge(f"{line} (mark 1 +- {MARK}); {some[0]['words']}", met)
+            met = abs(found / predicted - 1.0) <= MARK
+            marks.judge(f"{line} (mark 1 +- {MARK}); {some[0]['words']}", met)
     marks.leave()
 
 

@@ -53,7 +53,10 @@ class Band(eqx.Module):
         if self.curved is None:
             return ""
         bent = np.any([np.asarray(one) for one in self.curved.values()], axis=0)
-        return f"curved at {np.count_nonzero(bent)} of {bent.size} points" if bent.any() else ""
+        # Curves side by side are filled up with NaN to the longest.
+        there = np.all([np.isfinite(one) for one in self.standard_error.values()], axis=0)
+        bent = np.count_nonzero(bent & there)
+        return f"curved at {bent} of {np.count_nonzero(there)} points" if bent else ""
 
     def _headline(self) -> str:
         bent = f", {self.curved_part}" if self.curved_part else ""
