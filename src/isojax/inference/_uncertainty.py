@@ -123,8 +123,8 @@ def uncertainty(
         fit: a fit, a saved one, or what ends with one: an extension, a closed loop.
         quantity: function of an isolator that gives real numbers: one, or an array. It must be differentiable
             by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one; `find_again`
-            lets it go through folds and orbits. A draw where it raises counts as one without it; at the fitted
-            coefficients it must not raise, but may be NaN.
+            lets it go through folds and orbits. A draw where it raises counts as one without it; at the
+            fitted coefficients it may be NaN, but must not raise.
         confidence: chance that the interval is to hold the truth.
         draws: how many; at least 100.
         seed: of the draws.

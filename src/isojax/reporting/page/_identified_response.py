@@ -161,7 +161,9 @@ def _fold_words(bands: ResponseBands) -> str:
             words.append(f"at {quantity(amplitude, unit)} at {' and '.join(places)}")
     if not words:
         return (
-            "At these drive amplitudes the model has one steady response per frequency: no fold, so no jump."
+            "At these drive amplitudes the fitted model has one steady response per frequency: "
+            "no fold, so no jump. How probable a fold is within the errors, `continue_branch` tells "
+            "where it is given the fit."
         )
     return f"The response jumps (folds) {'; '.join(words)}."
 

@@ -37,9 +37,9 @@ def find_again(
 
     From the known one by Newton's method, so that the shape of the answer is known beforehand: `jax.jit`,
     `jax.vmap`, `jax.jacfwd` and `jax.grad` go through, also where those that found it in the first place
-    refuse. What vanishes on the way, as an orbit does past its fold, is NaN. A bifurcation of a branch is
-    sought along the branch of the other model, so that it is found where it is, and nothing else where it is
-    gone.
+    refuse. A bifurcation of a branch is sought along the branch of the other model, so that it is found where
+    it is, and nothing else where it is gone. An orbit is not: past its fold the search may end on another
+    orbit in place of NaN, so ask `uncertainty` for the fold where one is near.
 
     Args:
         answer: an orbit; a special or possible point of a branch, such as a fold; a special point of a curve
