@@ -129,7 +129,7 @@ def input_columns(
         family: the effects, of one kind and at zero strength.
         motion: the motion, with the channels that the kind follows.
         start: its internal states at the first step, members first.
-        step: time between samples [s].
+        step: time between the instants of the motion [s].
 
     Returns:
         The changes, by effect input.

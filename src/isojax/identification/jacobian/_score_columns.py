@@ -3,9 +3,9 @@
 The derivatives of `information` cost a full step of the model a column. For dozens of absent effects the
 motion is simulated once; what each effect would add is worked out along it, all samples at once; and one
 linear, time-varying solve, which knows nothing of the effects, carries all columns. The motion is that of
-the fit's own solver; the solve along it takes one step a sample, whatever simulated the motion. Compiled code
-depends on the model, on the kind of an effect, or on neither, and never on which effects ride along with
-which model.
+the fit's own solver; the solve along it takes one step for each sample, or for several that are averaged.
+Compiled code depends on the model, on the kind of an effect, or on neither, and never on which effects ride
+along with which model.
 """
 
 import itertools

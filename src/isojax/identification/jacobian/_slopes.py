@@ -103,7 +103,6 @@ class Slopes(NamedTuple):
     """What the model makes of small changes along its path.
 
     Attributes:
-        reading: the reading itself.
         parameters: with each parameter that moves.
         inputs: with a unit at each effect input, by name.
         scale: with the stiffness scale, or None without one.
@@ -111,7 +110,6 @@ class Slopes(NamedTuple):
         motion: what absent effects see of the path.
     """
 
-    reading: Array
     parameters: tuple[Change, ...]
     inputs: dict[str, Change]
     scale: Change | None
@@ -128,12 +126,12 @@ def slopes_along(
     ringing: Ringing | None,
     batch: Batch,
     quantity: Quantity,
-    node: int = 1,
+    node: int,
 ) -> Slopes:
     """Differentiate rates and reading along the path.
 
-    With several samples a node the slopes are those at the nodes; internal states of absent effects follow
-    every sample.
+    Of several samples as one (`Batch.thinned`) the slopes are those at the first of each; internal states of
+    absent effects follow every sample.
 
     A law that jumps has no slope. Where the path was split at its jumps, the rates are those of the rounded
     law, used by effect inputs alone; what the jumps do to changes of states and parameters is in
@@ -217,7 +215,6 @@ def slopes_along(
         {},
     )
     return Slopes(
-        seen[0][2][::node],
         tuple(sampled(by_parameter(place)) for place in moving),
         {name: sampled(by_input(name)) for name in EFFECT_INPUTS},
         None if by_scale is None else sampled(by_scale),
