@@ -162,8 +162,8 @@ def _fold_words(bands: ResponseBands) -> str:
     if not words:
         return (
             "At these drive amplitudes the fitted model has one steady response per frequency: "
-            "no fold, so no jump. How probable a fold is within the errors, `continue_branch` tells "
-            "where it is given the fit."
+            "no fold, so no jump. The chance that the true isolator has one is not worked out here; "
+            "isojax.continue_branch does that with fit=."
         )
     return f"The response jumps (folds) {'; '.join(words)}."
 

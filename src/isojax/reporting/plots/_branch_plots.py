@@ -294,7 +294,7 @@ def _missing_words(branches: Sequence[Branch]) -> str:
     """Say below the title what the curves lack of their range, and what of them is in doubt."""
     words = [one.missing_part for one in branches]
     bent = [one.band.curved_part for one in branches if one.band is not None]
-    words += [f"band {one}, by draws there" for one in bent if one]
+    words += [f"band {one}, and rough there" for one in bent if one]
     words += [f"possible {point.in_doubt}" for one in branches for point in one.possible_points]
     return "".join(f"\n{one}" for one in dict.fromkeys(words) if one)
 
