@@ -375,11 +375,14 @@ def closed(model):
     def moved(state):
         return jnp.stack(period_map(model, Integrator(), drive, tuple(state)))
 
-    def improve(_, state):
-        return state - jnp.linalg.solve(jax.jacfwd(moved)(state) - jnp.eye(state.size), moved(state) - state)
+    def improve(state, _):
+        # One copy of the period map in the compiled code, which is most of this test's time.
+        end, matrix = jax.vmap(lambda one: jax.jvp(moved, (state,), (one,)), out_axes=(None, 1))(jnp.eye(state.size))
+        step = jnp.linalg.solve(matrix - jnp.eye(state.size), end - state)
+        return state - step, (matrix, (end - state)[:2])
 
-    state = jax.lax.fori_loop(0, 8, improve, start)
-    return multipliers(jax.jacfwd(moved)(state)), (moved(state) - state)[:2]
+    _, (matrices, left) = jax.lax.scan(improve, start, length=9)
+    return multipliers(matrices[-1]), left[-1]
 
 
 @pytest.mark.slow

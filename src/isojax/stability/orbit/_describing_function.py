@@ -85,10 +85,11 @@ def imposed_internal(
 
     def relaxed(internal: tuple[Lanes, ...], x: Lanes, v: Lanes) -> list[Lanes]:
         """Give `1 - gamma h J`, with the rate at which each internal state relaxes by itself for J."""
-        units = [[zero + float(one == own) for one in range(len(internal))] for own in range(len(internal))]
-        slopes = [jax.jvp(lambda *s: rates(s, x, v), internal, tuple(unit))[1] for unit in units]
+        units = tuple(one.reshape(-1, *(1,) * zero.ndim) + 0.0 * zero for one in jnp.eye(len(internal)))
+        moved = jax.vmap(lambda *unit: jax.jvp(lambda *s: rates(s, x, v), internal, unit)[1])(*units)
+        slopes = [rate[own] for own, rate in enumerate(moved)]
         # What relaxes damps; nothing else makes a step unstable.
-        return [1.0 - _ROS2 * step * jnp.minimum(slope[own], 0.0) for own, slope in enumerate(slopes)]
+        return [1.0 - _ROS2 * step * jnp.minimum(slope, 0.0) for slope in slopes]
 
     def advanced(
         number: int | Array, internal: tuple[Lanes, ...], ends: list[tuple[Lanes, Lanes]]
