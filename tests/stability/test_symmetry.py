@@ -14,8 +14,8 @@ from isojax._types import Internal, Lanes, Scalar
 from isojax.elements import Group
 from isojax.stability.orbit import is_odd
 
-FORCE, FREQUENCY = 1.0, 0.2
-PLACE, WIDTH, PUSH = 0.275, 0.034, 0.3
+FORCE, FREQUENCY = 0.6, 0.2
+PLACE, WIDTH, PUSH = 0.289, 0.026, 0.3
 
 
 class Bump(ij.AbstractElement):

@@ -195,7 +195,8 @@ def bifurcation_diagram(
     runs = tuple(leg for leg in legs for _ in range(lanes[0].size))
     judged = _classify_motions(points[1], path, growth, Repetition(longest, tolerance))
     shown = (values[:, 0] if single else jnp.swapaxes(values, 0, 1) for values in judged)
-    *seen, finite = shown
+    kept, period, exponent, chaotic, settling, finite = shown
+    seen = kept, period, exponent, chaotic, settling
     return BifurcationDiagram(model, parameter, *points, runs, *seen, bounded_or_not(finite))
 
 

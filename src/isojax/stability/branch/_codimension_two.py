@@ -300,6 +300,9 @@ def _steps_over(
     model: Isolator, integrator: Integrator, window: tuple[tuple[float, float], tuple[float, float]]
 ) -> Integrator:
     """Give steps that follow the states of a model along its answers to the drives of a window."""
+    if not model.internal_states:
+        # Nothing is faster than the resonance, near which bifurcations lie.
+        return integrator
     grid = np.meshgrid(window[0], np.linspace(*window[1], _LOOKED_AT), indexing="ij")
     drives = [axis.ravel() for axis in grid]
     sizes = np.asarray(answer_sizes(model, *map(jnp.asarray, drives)))

@@ -1,7 +1,7 @@
 """Orbits of one or several drive periods from many starts, each found once."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -15,8 +15,9 @@ from ..orbit import fastest_rate, integrator_with, period_map, value_and_jacobia
 from ._orbit_starts import OrbitStarts
 from ._parameter_family import ParameterFamily
 
-_LANES = 352
-"""Starts that are improved at once: one compiled batch serves any number."""
+_FEW, _LANES = 32, 352
+"""Starts that are improved at once, where they are few and where they are many: a compiled batch serves any
+number."""
 
 _STEPS_TO_CLOSE = 10
 """Steps of Newton's method from each start."""
@@ -128,7 +129,7 @@ class OrbitSearch(NamedTuple):
     odd: bool
     periods: int
 
-    def settled(self, starts: OrbitStarts) -> tuple[list[tuple["OrbitSearch", OrbitStarts]], int]:
+    def settled(self, starts: OrbitStarts) -> tuple[Sequence[tuple["OrbitSearch", OrbitStarts]], int]:
         """Close motions, those that do not close once more with steps that follow their fastest states.
 
         Args:
@@ -205,10 +206,11 @@ def _in_batches(
 ) -> tuple[np.ndarray, ...]:
     """Give values of some starts, computed by batches of one size."""
     parts = []
-    for begin in range(0, max(starts.shares.size, 1), _LANES):
-        rows = [values[begin : begin + _LANES] for values in starts]
+    lanes = _FEW if starts.shares.size <= _FEW else _LANES
+    for begin in range(0, max(starts.shares.size, 1), lanes):
+        rows = [values[begin : begin + lanes] for values in starts]
         count = rows[0].shape[0]
-        out = function(*(jnp.asarray(np.resize(row, (_LANES, *row.shape[1:]))) for row in rows))
+        out = function(*(jnp.asarray(np.resize(row, (lanes, *row.shape[1:]))) for row in rows))
         parts.append([np.asarray(values)[:count] for values in out])
     return tuple(np.concatenate(own) for own in zip(*parts, strict=True))
 

@@ -10,8 +10,8 @@ from ..._parameters import list_parameters, replace_parameters
 from ..._quick_jit import quick_jit
 from ...models import Instant, Isolator
 
-_SIZES = np.logspace(-8.0, 3.0, 89)
-"""Displacements at which oddness is tried [m], eight a decade: a stop on one side acts at all beyond its gap;
+_SIZES = np.logspace(-8.0, 3.0, 133)
+"""Displacements at which oddness is tried [m], twelve a decade: a stop on one side acts at all past its gap;
 what acts over less than the step between two of them shows along the motions that are found."""
 
 _VELOCITY_OVER_DISPLACEMENT = 30.0
@@ -81,7 +81,9 @@ def is_odd_along(model: Isolator, states: Float[Array | np.ndarray, "state time"
     Returns:
         Whether its rates at these are minus those at their mirror images, and so are their slopes.
     """
-    return _turns(model, states, np.zeros(states.shape[1]))
+    # As many as are tried beforehand: what is compiled for these serves here as well.
+    place = np.linspace(0, states.shape[1] - 1, _SIZES.size).astype(int)
+    return _turns(model, np.asarray(states)[:, place], np.zeros(place.size))
 
 
 def _closely(states: Float[np.ndarray, "state trial"], up_to: float) -> Float[np.ndarray, "state trial"]:
@@ -92,7 +94,7 @@ def _closely(states: Float[np.ndarray, "state trial"], up_to: float) -> Float[np
 
 
 def _turns(
-    model: Isolator, states: Float[Array | np.ndarray, "state trial"], drive: Float[np.ndarray, " trial"]
+    model: Isolator, states: Float[np.ndarray, "state trial"], drive: Float[np.ndarray, " trial"]
 ) -> bool:
     """Say whether rates and slopes change their sign with states and drive."""
     forth, back = map(np.asarray, _both_sides(model, jnp.asarray(states), jnp.asarray(drive)))
