@@ -158,6 +158,17 @@ def test_linear_response_is_the_receptance():
 
 
 @pytest.mark.slow
+def test_an_event_of_the_response_is_where_the_receptance_has_it():
+    model = ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.LinearDamping(0.2)))
+    two = ij.BranchEvent("two metres", lambda orbit: orbit.response - 2.0)
+    response = ij.frequency_response(model, 1.0, (0.05, 0.3), events=(two,), periods=())
+    # (1 - w^2)^2 + (0.2 w)^2 = 1 / 4.
+    squares = np.sort(np.roots([1.0, 0.04 - 2.0, 1.0 - 0.25]))
+    assert [point.kind for point in response.special_points] == ["two metres"] * 2
+    found = [float(point.frequency) for point in response.special_points]
+    np.testing.assert_allclose(found, np.sqrt(squares) / (2.0 * math.pi), rtol=1e-5)
+
+
 def test_response_folds_where_the_force_is_a_fold_force():
     # 144.52 N is the lower fold at 4.4 Hz and 150.66 N the upper, by an independent shooting code.
     response = ij.frequency_response(
