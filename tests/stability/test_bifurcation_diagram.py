@@ -207,6 +207,17 @@ def test_many_starts_are_as_each_alone():
     np.testing.assert_allclose(together.samples[1], alone.samples, atol=1e-12)
 
 
+def test_a_transient_of_light_damping_is_no_torus():
+    # Linear: after n periods the free part is exp(-n c T / 2 m) of its size, whatever the drive.
+    model = ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.LinearDamping(4e-4)))
+    diagram = ij.bifurcation_diagram(model, [1.0], frequency=0.1, settle=100)
+    assert int(diagram.period[0]) == 0
+    assert bool(diagram.settling[0])
+    assert not bool(diagram.quasi_periodic[0])
+    assert np.isnan(float(diagram.rotation_number[0]))
+    assert "1 not settled yet" in str(diagram)
+
+
 def test_quasi_periodic_motion_turns_as_often_as_the_two_frequencies_say():
     # x'' - e (1 - x^2) x' + x = F sin(w t), far from its lock: the free motion has the frequency 1 - e^2/16
     # of van der Pol's equation (Nayfeh & Mook 1979, sec. 3.3.4), little changed by a weak drive.

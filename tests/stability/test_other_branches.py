@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import isojax as ij
+from isojax.stability.branch._other_branches import Curve
+from isojax.stability.orbit import ShootingMethod
 
 TURN = 2.0 * math.pi
 
@@ -53,6 +55,33 @@ def test_an_isola_is_found_unasked_where_the_balance_of_one_harmonic_has_it(besi
     assert sizes.max() == pytest.approx(outer, rel=0.02)
     assert sizes.min() == pytest.approx(inner, rel=0.02)
     assert [point.kind for point in isola.special_points] == ["fold", "fold"]
+
+
+def test_an_isola_is_found_beside_an_internal_state_that_coarse_steps_cannot_follow(beside_isola):
+    beside = oscillator(0.0, 0.25, -0.2, 0.045).with_elements(ij.elements.MaxwellBranch(1e-3, 0.02))
+    response = ij.frequency_response(beside, 0.105, (0.14, 0.18), periods=(1,))
+    assert [bool(one.branch.closed) for one in response.others] == [True]
+    # Beside the damper of 0.25 N s/m the branch is one of 2e-5 N s/m more.
+    ours, plain = (np.asarray(one.others[0].amplitude).max() for one in (response, beside_isola))
+    assert ours == pytest.approx(plain, rel=5e-3)
+
+
+def test_starts_that_lead_nowhere_are_counted(beside_isola):
+    searched = beside_isola.branch.searched
+    assert 0 < searched.unsettled < 0.1 * searched.starts
+    assert f"{searched.unsettled} of {searched.starts} starts did not settle" in " ".join(
+        repr(beside_isola).split()
+    )
+
+
+def test_a_small_orbit_is_not_taken_for_one_of_a_branch_of_large_ones():
+    # A straight branch along the displacement, and an orbit of a hundredth of its size as far away.
+    shares = np.linspace(0.0, 1.0, 51)
+    unknowns = np.stack([0.0 * shares, 0.0 * shares, shares], axis=1)
+    method = ShootingMethod(ij.Integrator(), 1, False)
+    curve = Curve(method, np.ones(2), unknowns, np.tile([0.0, 0.0, 1.0], (51, 1)), 0)
+    assert curve.distance(0.513, np.array([0.006, 0.008])) == pytest.approx(1.0)
+    assert curve.distance(0.513, np.array([3.0, 4.0])) == pytest.approx(1.0)
 
 
 def test_the_motions_of_an_isola_return_under_scipy(beside_isola):

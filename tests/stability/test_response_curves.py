@@ -109,6 +109,32 @@ def test_phase_resonance_with_relaxation_is_the_closed_form():
     assert float(curve.force[0]) == pytest.approx(force, rel=1e-6)
 
 
+def test_phase_resonance_beside_a_quick_relaxation_is_that_with_its_damper():
+    # The branch tends to a damper of k tau where it relaxes within a step of 256 a period.
+    laws, sizes = (ij.LinearStiffness(1e6), ij.LinearDamping(4e3)), np.array([1e-4, 1e-3])
+    relaxation, damper = 1e-4, 500.0
+    quick = ij.Isolator(800.0, (*laws, ij.elements.MaxwellBranch(damper / relaxation, relaxation)))
+    found = ij.backbone_curve(quick, sizes)
+    omega = math.sqrt(1e6 / 800.0)
+    np.testing.assert_allclose(found.force, (4e3 + damper) * omega * sizes, rtol=2e-4)
+    np.testing.assert_allclose(found.frequency, omega / (2.0 * math.pi), rtol=1e-4)
+    stiff = ij.Isolator(800.0, (*laws, ij.elements.MaxwellBranch(damper / 1e-7, 1e-7)))
+    beyond = ij.backbone_curve(stiff, sizes)
+    assert np.all(np.isnan(beyond.force))
+    assert bool(np.all(beyond.result == ij.RESULTS.stiff))
+    with pytest.raises(ValueError, match="no state that follows the motion within less than a step"):
+        ij.fold_curve(stiff, amplitude_range=(1.0, 100.0), frequency_range=(4.0, 8.0))
+
+
+def test_transmissibility_beside_a_quick_relaxation_is_the_textbooks_with_its_damper():
+    laws = ij.LinearStiffness(1e6), ij.LinearDamping(4e3), ij.elements.MaxwellBranch(5e6, 1e-4)
+    frequencies = np.array([3.0, 5.5, 9.0])
+    ratio = ij.transmissibility(ij.Isolator(800.0, laws), 10.0, frequencies).ratio
+    omega = 2.0 * math.pi * frequencies
+    passed = 1e6 + 1j * omega * (4e3 + 5e6 * 1e-4 / (1.0 + 1j * omega * 1e-4))
+    np.testing.assert_allclose(ratio, passed / (passed - 800.0 * omega**2), rtol=1e-6)
+
+
 def test_phase_resonance_is_an_orbit_of_that_size_in_quadrature():
     model = ij.paper.y_direction()
     curve = ij.backbone_curve(model, [4e-4, 1.5e-3])
@@ -132,6 +158,17 @@ def test_linear_response_is_the_receptance():
 
 
 @pytest.mark.slow
+def test_an_event_of_the_response_is_where_the_receptance_has_it():
+    model = ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.LinearDamping(0.2)))
+    two = ij.BranchEvent("two metres", lambda orbit: orbit.response - 2.0)
+    response = ij.frequency_response(model, 1.0, (0.05, 0.3), events=(two,), periods=())
+    # (1 - w^2)^2 + (0.2 w)^2 = 1 / 4.
+    squares = np.sort(np.roots([1.0, 0.04 - 2.0, 1.0 - 0.25]))
+    assert [point.kind for point in response.special_points] == ["two metres"] * 2
+    found = [float(point.frequency) for point in response.special_points]
+    np.testing.assert_allclose(found, np.sqrt(squares) / (2.0 * math.pi), rtol=1e-5)
+
+
 def test_response_folds_where_the_force_is_a_fold_force():
     # 144.52 N is the lower fold at 4.4 Hz and 150.66 N the upper, by an independent shooting code.
     response = ij.frequency_response(

@@ -23,6 +23,7 @@ from ._stroboscope import (
     check_counts,
     repeats_after,
     start_states,
+    still_settling,
     watch_settled,
 )
 
@@ -49,6 +50,8 @@ class BifurcationDiagram(eqx.Module):
         period: drive periods after which the motion repeats; 0 where it repeats after none up to the bound.
         lyapunov: largest Lyapunov exponent over the samples [1/s].
         chaotic: whether the motion repeats nowhere and a disturbance grew a hundredfold over the samples.
+        settling: whether the motion repeats nowhere because it still settles: more `settle` shows where it
+            goes.
         result: whether the motion stayed bounded; where not, its numbers are NaN.
     """
 
@@ -61,14 +64,16 @@ class BifurcationDiagram(eqx.Module):
     period: Int[Array, "*run point"]
     lyapunov: Float[Array, "*run point"]
     chaotic: Bool[Array, "*run point"]
+    settling: Bool[Array, "*run point"]
     result: RESULTS
 
     @property
     def quasi_periodic(self) -> Bool[Array, "*run point"]:
-        """Whether the motion repeats nowhere up to the bound and is not chaotic: it runs on a torus, or has a
-        longer period.
+        """Whether the motion repeats nowhere up to the bound, is not chaotic and does not settle any more: it
+        runs on a torus, or has a longer period.
         """
-        return (self.period == 0) & ~self.chaotic & jnp.isfinite(self.samples[..., 0, 0])
+        finite = jnp.isfinite(self.samples[..., 0, 0])
+        return (self.period == 0) & ~self.chaotic & ~self.settling & finite
 
     @property
     def rotation_number(self) -> Float[Array, "*run point"]:
@@ -102,8 +107,11 @@ class BifurcationDiagram(eqx.Module):
         counts = zip(*np.unique(period, return_counts=True), strict=True)
         words = ", ".join(f"{count} of period {value}" for value, count in counts if value)
         runs = ", ".join(dict.fromkeys(self.runs))
-        torus = (period == 0) & ~np.asarray(self.chaotic) & np.isfinite(np.asarray(self.samples)[..., 0, 0])
+        settling = np.asarray(self.settling)
+        torus = (period == 0) & ~np.asarray(self.chaotic) & ~settling
+        torus &= np.isfinite(np.asarray(self.samples)[..., 0, 0])
         more = f", {int(torus.sum())} quasi-periodic" if torus.any() else ""
+        more += f", {int(settling.sum())} not settled yet" if settling.any() else ""
         return f"along {self.parameter} ({runs}): {words or 'no periodic motion'}{more}, {chaotic} chaotic"
 
     def _rows(self) -> list[str]:
@@ -187,9 +195,9 @@ def bifurcation_diagram(
     runs = tuple(leg for leg in legs for _ in range(lanes[0].size))
     judged = _classify_motions(points[1], path, growth, Repetition(longest, tolerance))
     shown = (values[:, 0] if single else jnp.swapaxes(values, 0, 1) for values in judged)
-    kept, period, exponent, chaotic, finite = shown
-    result = bounded_or_not(finite)
-    return BifurcationDiagram(model, parameter, *points, runs, kept, period, exponent, chaotic, result)
+    kept, period, exponent, chaotic, settling, finite = shown
+    seen = kept, period, exponent, chaotic, settling
+    return BifurcationDiagram(model, parameter, *points, runs, *seen, bounded_or_not(finite))
 
 
 def _points(
@@ -266,17 +274,22 @@ def _classify_motions(
     path: Float[Array, "point run sample state"],
     growth: Float[Array, "point run sample"],
     repetition: Repetition,
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Give samples, period, Lyapunov exponent, whether chaotic, and whether finite, of each point and run."""
+) -> tuple[Array, ...]:
+    """Give samples, period, Lyapunov exponent, whether chaotic, whether it still settles, and whether finite,
+    of each point and run.
+    """
     finite = jnp.all(jnp.isfinite(path), axis=(2, 3))
     strobe = jnp.moveaxis(path, 2, 0)
     omega = jnp.broadcast_to(2.0 * math.pi * frequencies[:, None], strobe.shape[:-1])
     period = jnp.where(finite, repeats_after(strobe[..., 0], strobe[..., 1], omega, repetition), 0)
     total = jnp.where(finite, jnp.sum(growth, axis=2), jnp.nan)
+    chaotic = (period == 0) & (total > _CHAOS)
+    approaches = still_settling(strobe[..., 0], strobe[..., 1], omega)
     return (
         jnp.where(finite[..., None, None], path, jnp.nan),
         period,
         total * frequencies[:, None] / path.shape[2],
-        (period == 0) & (total > _CHAOS),
+        chaotic,
+        (period == 0) & ~chaotic & approaches & finite,
         finite,
     )

@@ -17,6 +17,13 @@ _TURNING = 20
 """Periods before the first sample in which a disturbance turns to the direction in which it grows most."""
 
 
+_RETURNS = 16
+"""Periods up to which a motion is compared with itself to see whether it still settles."""
+
+_FALL = 0.95
+"""Of its distance from itself over the samples, below which it does: on a torus chance may change it less."""
+
+
 class Watch(NamedTuple):
     """How long a motion settles and is then watched.
 
@@ -171,6 +178,35 @@ def repeats_after(
         gap = jnp.hypot(displacement[period:] - displacement[:-period], reduced[period:] - reduced[:-period])
         found = jnp.where(jnp.max(gap, axis=0) <= tolerance * size, period, found)
     return found
+
+
+def still_settling(
+    displacement: Float[Array, "sample ..."], velocity: Float[Array, "sample ..."], angular_frequency: Lanes
+) -> Bool[Array, "..."]:
+    """Say whether a motion that repeats nowhere comes ever nearer to one that does.
+
+    Its distance from itself some periods later falls from quarter to quarter of the samples; on a torus it
+    stays. The periods are those after which the distance ends smallest.
+
+    Args:
+        displacement: once a period [m].
+        velocity: once a period [m/s].
+        angular_frequency: of the drive [rad/s].
+
+    Returns:
+        Whether it does. A torus around which the samples go less than once may pass for it.
+    """
+    reduced = velocity / angular_frequency
+    count = displacement.shape[0]
+    best = jnp.full(displacement.shape[1:], jnp.inf)
+    falls = jnp.zeros(displacement.shape[1:], dtype=bool)
+    for period in range(1, min(_RETURNS, count // 2) + 1):
+        gap = jnp.hypot(displacement[period:] - displacement[:-period], reduced[period:] - reduced[:-period])
+        first, second, third, last = (jnp.sqrt(jnp.mean(part**2, axis=0)) for part in jnp.array_split(gap, 4))
+        fall = (first > second) & (second > third) & (third > last) & (last < _FALL * first)
+        falls = jnp.where(last < best, fall, falls)
+        best = jnp.minimum(last, best)
+    return falls
 
 
 def bounded_or_not(finite: Bool[Array, "..."]) -> RESULTS:

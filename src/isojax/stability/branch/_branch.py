@@ -184,6 +184,8 @@ class Searched(eqx.Module):
         periods: drive periods of the orbits that were sought.
         displacement: largest displacement amplitude of the motions that were tried [m].
         left: orbits that lie on branches that were not followed any more.
+        starts: states from which an orbit was sought.
+        unsettled: those of them from which Newton's method closed no motion. What lies there is not known.
     """
 
     parameter: str = eqx.field(static=True)
@@ -191,6 +193,8 @@ class Searched(eqx.Module):
     periods: tuple[int, ...] = eqx.field(static=True)
     displacement: float
     left: int
+    starts: int
+    unsettled: int
 
     def _headline(self) -> str:
         *more, last = map(str, self.periods)
@@ -199,7 +203,9 @@ class Searched(eqx.Module):
         span = f"{number(values.min())} to {number(values.max())}"
         where = f"{values.size} values of {self.parameter} from {span}"
         left = f"; {self.left} orbits lie on branches that were not followed" if self.left else ""
-        return f"orbits of {periods} drive periods, up to {amount(self.displacement, 'm')}, at {where}{left}"
+        open_ended = f"; {self.unsettled} of {self.starts} starts did not settle" if self.unsettled else ""
+        size = amount(self.displacement, "m")
+        return f"orbits of {periods} drive periods, up to {size}, at {where}{left}{open_ended}"
 
 
 @shown

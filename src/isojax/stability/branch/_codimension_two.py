@@ -24,7 +24,7 @@ from ...models import (
     coefficient_errors,
     find_band_across,
 )
-from ..orbit import ShootingMethod, is_odd, refuse_traced
+from ..orbit import ShootingMethod, answer_sizes, integrator_that_follows, is_odd, refuse_traced
 from ._arc_length import Stride
 from ._bifurcation_curves import CodimensionTwoPoint, FoldCurve, NeimarkSackerCurve, PeriodDoublingCurve
 from ._branch import SpecialPoint
@@ -75,8 +75,8 @@ def fold_curve(
 
     Raises:
         ValueError: if a range is not positive and ascending, `start` is no fold that was found, none was met
-            inside the window, `search`, `step` or `most` is not positive, or `fit` failed, leaves a
-            coefficient undetermined or is of another model.
+            inside the window, `search`, `step` or `most` is not positive, a state of the model is too fast
+            for any steps, or `fit` failed, leaves a coefficient undetermined or is of another model.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Kuznetsov 2004, Elements of Applied Bifurcation Theory, secs. 9.5 (cusp) and 10.3; Govaerts 2000,
@@ -242,6 +242,10 @@ def _between_resonances(whole: Whole, found: Polished) -> tuple[Whole, Polished]
     return whole.part(first, last, ended), jax.tree.map(lambda own: own[first : last + 1], found)
 
 
+_LOOKED_AT = 17
+"""Frequencies of a window at which states are looked at for how fast they are."""
+
+
 class _Search(NamedTuple):
     """What curve is asked for.
 
@@ -274,7 +278,7 @@ def _curve(
     for name, value in counts:
         if not value > 0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
-    integrator = tracing_steps(model, integrator)
+    integrator = _steps_over(frozen(model), tracing_steps(model, integrator), search.window)
     if start is None:
         start = _meet(model, search, integrator)
     elif isinstance(start, SpecialPoint):
@@ -290,6 +294,26 @@ def _curve(
     zero = jnp.asarray(np.zeros(()))
     family = ParameterFamily(model, zero, zero, low, high, ("amplitude", "frequency"))
     return OrbitCurve(family, start.method, search.kind, start, search.stride)
+
+
+def _steps_over(
+    model: Isolator, integrator: Integrator, window: tuple[tuple[float, float], tuple[float, float]]
+) -> Integrator:
+    """Give steps that follow the states of a model along its answers to the drives of a window."""
+    if not model.internal_states:
+        # Nothing is faster than the resonance, near which bifurcations lie.
+        return integrator
+    grid = np.meshgrid(window[0], np.linspace(*window[1], _LOOKED_AT), indexing="ij")
+    drives = [axis.ravel() for axis in grid]
+    sizes = np.asarray(answer_sizes(model, *map(jnp.asarray, drives)))
+    integrator, stiff = integrator_that_follows(model, integrator, sizes, drives[1])
+    if stiff:
+        raise ValueError(
+            "Argument `model` must have no state that follows the motion within less than a step of "
+            f"{integrator.steps_a_period(model)} a period, but has. Use the law that it tends to, such as "
+            "dry friction for bristles that bend within a thousandth of the motion."
+        )
+    return integrator
 
 
 def _meet(model: Isolator, search: _Search, integrator: Integrator) -> CurveStart:

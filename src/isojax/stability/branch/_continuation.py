@@ -166,6 +166,12 @@ def continue_branch(
     begin = None if start_state is None else jnp.stack([as_float64(value) for value in start_state])
     method, stride = ShootingMethod(integrator, periods, half), Stride(step, most)
     scale, followed = follow_branches(frozen(family), method, frozen(begin), stride)
+    if half and not is_odd(frozen(model), _largest(scale, followed)):
+        # A law on one side only, between the displacements at which oddness is tried.
+        if symmetric:
+            raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
+        half, method = False, ShootingMethod(integrator, periods, False)
+        scale, followed = follow_branches(frozen(family), method, frozen(begin), stride)
     if _stalled(followed).any():
         finer, stiff = _finer(frozen(family), integrator, scale)
         if finer.steps_per_period > integrator.steps_per_period:
@@ -189,6 +195,12 @@ def continue_branch(
     branch = with_bands(branch, errors)
     possible = tuple(with_probability(point, errors) for point in possible)
     return dataclasses.replace(branch, possible_points=possible)
+
+
+def _largest(scale: Float[Array, "branch state"], followed: Followed) -> float:
+    """Give about the largest displacement along branches [m]."""
+    motion = np.linalg.norm(np.asarray(followed.unknowns)[..., :2], axis=-1).max(axis=1, initial=0.0)
+    return float(np.max(np.where(np.isfinite(motion), motion, 0.0) * np.asarray(scale)[:, 0]))
 
 
 def _stalled(followed: Followed) -> Bool[Array, " branch"]:

@@ -50,6 +50,10 @@ class OrbitStarts(NamedTuple):
     states: Float[np.ndarray, "start state"]
     sizes: Float[np.ndarray, " start"]
 
+    def where(self, which: np.ndarray) -> "OrbitStarts":
+        """Give some of the starts."""
+        return OrbitStarts(*(values[which] for values in self))
+
 
 class OneHarmonic(NamedTuple):
     """The balance of one harmonic over displacement amplitude and parameter.

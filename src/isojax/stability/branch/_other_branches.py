@@ -11,7 +11,7 @@ from ..._implicit import frozen
 from ..orbit import ShootingMethod, integrator_for, is_odd
 from ._arc_length import REACHED_BOUND, RETURNED, Departure, Followed, Stride
 from ._branch import Branch, BranchEvent, Searched
-from ._orbit_search import FoundOrbits, OrbitSearch
+from ._orbit_search import FoundOrbits, OrbitSearch, distinct
 from ._orbit_starts import PLACES, OrbitStarts, one_harmonic, orbit_starts
 from ._parameter_family import ParameterFamily
 from ._tracing import assemble, trace
@@ -19,9 +19,13 @@ from ._tracing import assemble, trace
 _COARSE_STEPS = 64
 """Steps a period with which orbits are sought."""
 
-_NEAR_A_BRANCH, _ON_A_BRANCH = 2e-2, 1e-3
-"""Distance from a branch, in scaled unknowns, below which an orbit lies on it: found by coarse steps, and by
-the steps of the branch."""
+_NEAR_A_BRANCH, _ON_A_BRANCH = 5e-3, 1e-3
+"""Distance from a branch, over the size of the orbit, below which it lies on the branch: found by coarse
+steps, and by the steps of the branch. Coarse steps were seen to miss by up to 1e-3."""
+
+_SMALLEST = 1e-3
+"""Size of an orbit, over that of the branch, below which it counts as this large: the points of the branch
+are solved for to a share of the branch's size."""
 
 _AMONG = 33
 """Points between two of a branch at which the distance from it is taken, and again between two of these."""
@@ -45,9 +49,10 @@ class Curve(NamedTuple):
     ending: int
 
     def distance(self, share: float, state: Float[np.ndarray, " state"]) -> float:
-        """Give the distance of an orbit from the branch, in its scaled unknowns."""
+        """Give the distance of an orbit from the branch, in its scaled unknowns, over the orbit's size."""
         if not len(self.unknowns):
             return np.inf
+        size = max(float(np.linalg.norm(state / self.scale)), _SMALLEST)
         place = np.append(state / self.scale, share)
         nearest = int(np.argmin(np.linalg.norm(self.unknowns - place, axis=1)))
         best = float(np.linalg.norm(self.unknowns[nearest] - place))
@@ -60,7 +65,7 @@ class Curve(NamedTuple):
                 apart = np.linalg.norm(self._between(first, parts) - place, axis=1)
                 best, at = min(best, float(apart.min())), parts[int(apart.argmin())]
                 low, high = at - (high - low) / _AMONG, at + (high - low) / _AMONG
-        return best
+        return best / size
 
     def _between(self, first: int, part: np.ndarray) -> np.ndarray:
         """Give the cubic through two neighbours along their tangents."""
@@ -113,7 +118,7 @@ def find_other_branches(
     still = frozen(live)
     odd = is_odd(still.model)
     found: list[Branch] = []
-    reach, left = 0.0, 0
+    reach, left, tried, unsettled = 0.0, 0, 0, 0
     for lane in range(scale.shape[0]):
         own = still.driven(still.amplitude[lane], still.frequency[lane])
         count = int(followed.found[lane])
@@ -124,54 +129,90 @@ def find_other_branches(
             np.asarray(followed.tangents[lane, :count]),
             int(followed.ending[lane]),
         )
-        curves, largest, more = _other_curves(own, odd, main, search)
-        reach, left = max(reach, largest), left + more
+        sought = _other_curves(own, odd, main, search)
+        reach, left = max(reach, sought.reach), left + sought.left
+        tried, unsettled = tried + sought.tried, unsettled + sought.unsettled
         lanes = live.driven(live.amplitude[lane : lane + 1], live.frequency[lane : lane + 1])
-        found += [_branch(lanes, curve, search) for curve in curves]
+        found += [_branch(lanes, curve, search) for curve in sought.curves]
     shares = (np.arange(PLACES) + 0.5) / PLACES
     values = np.asarray(jax.vmap(still.values)(jnp.asarray(shares)[:, None]))[:, 0]
-    return tuple(found), Searched(still.names[0], jnp.asarray(values), search.periods, reach, left)
+    where = still.names[0], jnp.asarray(values), search.periods, reach
+    return tuple(found), Searched(*where, left, tried, unsettled)
 
 
-def _other_curves(
-    family: ParameterFamily, odd: bool, main: Curve, search: BranchSearch
-) -> tuple[list[Curve], float, int]:
-    """Give the other branches under one drive, the largest displacement tried, and how many orbits lie on
-    branches that were not followed any more.
+class _Sought(NamedTuple):
+    """What was found beside one branch.
+
+    Attributes:
+        curves: the other branches.
+        reach: largest displacement tried [m].
+        left: orbits on branches that were not followed any more.
+        tried: starts from which orbits were sought.
+        unsettled: those of them from which Newton's method did not close a motion.
     """
-    known, reach, left = [main], 0.0, 0
+
+    curves: list[Curve]
+    reach: float
+    left: int
+    tried: int
+    unsettled: int
+
+
+def _other_curves(family: ParameterFamily, odd: bool, main: Curve, search: BranchSearch) -> _Sought:
+    """Give the other branches under one drive."""
+    known, reach, left, tried, unsettled = [main], 0.0, 0, 0, 0
     forced, coarse = one_harmonic(family), integrator_for(family.model, None, _COARSE_STEPS)
     unknowns = main.unknowns if len(main.unknowns) else np.zeros((1, main.scale.size + 1))
     for periods in search.periods:
         starts = orbit_starts(family, forced, periods, unknowns, main.scale)
-        reach = max(reach, float(starts.sizes.max()))
-        closed = OrbitSearch(family, coarse, odd, periods).closed(starts)
-        closed = _off(closed, known)
+        reach, tried = max(reach, float(starts.sizes.max())), tried + starts.shares.size
+        groups, lost = OrbitSearch(family, coarse, odd, periods).settled(starts)
+        closed = OrbitStarts(*map(np.concatenate, zip(*(group for _, group in groups), strict=True)))
+        closed = _off(distinct(family, closed), known)
+        unsettled += lost
         if not closed.shares.size:
             continue
-        exact = OrbitSearch(family, main.method.integrator, odd, periods)
-        orbits = exact.orbits(exact.closed(closed))
-        orbits = orbits.where(_beside(orbits, known))
-        while orbits.shares.size:
-            # Where motions are chaotic there are orbits without end.
-            if sum(len(curve.unknowns) for curve in known[1:]) > search.stride.most:
-                left += orbits.shares.size
-                break
-            curve = _followed_both_ways(family, main.method, odd, periods, orbits, search.stride)
-            orbits = orbits.where(np.arange(orbits.shares.size) > 0)
-            if len(curve.unknowns) > 1:
-                known.append(curve)
-                orbits = orbits.where(_beside(orbits, [curve]))
-            else:
-                left += 1
-    return known[1:], reach, left
+        groups, lost = OrbitSearch(family, main.method.integrator, odd, periods).settled(closed)
+        unsettled += lost
+        for exact, group in groups:
+            orbits = exact.orbits(group)
+            orbits = orbits.where(_beside(orbits, known))
+            method = ShootingMethod(exact.integrator, periods, False)
+            followed, more = _followed_all(family, method, odd, orbits, known, search.stride)
+            known, left = known + followed, left + more
+    return _Sought(known[1:], reach, left, tried, unsettled)
+
+
+def _followed_all(
+    family: ParameterFamily,
+    method: ShootingMethod,
+    odd: bool,
+    orbits: FoundOrbits,
+    known: list[Curve],
+    stride: Stride,
+) -> tuple[list[Curve], int]:
+    """Give the branches of orbits that lie on no known one, and how many orbits were left."""
+    new: list[Curve] = []
+    left = 0
+    while orbits.shares.size:
+        # Where motions are chaotic there are orbits without end.
+        if sum(len(curve.unknowns) for curve in known[1:] + new) > stride.most:
+            return new, left + orbits.shares.size
+        curve = _followed_both_ways(family, method, odd, orbits, stride)
+        orbits = orbits.where(np.arange(orbits.shares.size) > 0)
+        if len(curve.unknowns) > 1:
+            new.append(curve)
+            orbits = orbits.where(_beside(orbits, [curve]))
+        else:
+            left += 1
+    return new, left
 
 
 def _off(closed: OrbitStarts, known: list[Curve]) -> OrbitStarts:
     """Give the motions that are not near a branch."""
     places = zip(closed.shares, closed.states, strict=True)
     far = [min(curve.distance(share, state) for curve in known) > _NEAR_A_BRANCH for share, state in places]
-    return OrbitStarts(*(values[np.array(far, bool)] for values in closed))
+    return closed.where(np.array(far, bool))
 
 
 def _beside(orbits: FoundOrbits, known: list[Curve]) -> Bool[np.ndarray, " orbit"]:
@@ -184,17 +225,12 @@ def _beside(orbits: FoundOrbits, known: list[Curve]) -> Bool[np.ndarray, " orbit
 
 
 def _followed_both_ways(
-    family: ParameterFamily,
-    main: ShootingMethod,
-    odd: bool,
-    periods: int,
-    orbits: FoundOrbits,
-    stride: Stride,
+    family: ParameterFamily, method: ShootingMethod, odd: bool, orbits: FoundOrbits, stride: Stride
 ) -> Curve:
     """Follow the branch of the first of some orbits."""
     share, images, scale = (values[0] for values in orbits)
-    mirrored = odd and periods == 1 and np.max(np.abs(images[1] - images[0]) / scale) <= _ON_A_BRANCH
-    method = ShootingMethod(main.integrator, periods, bool(mirrored))
+    mirrored = odd and method.periods == 1 and np.max(np.abs(images[1] - images[0]) / scale) <= _ON_A_BRANCH
+    method = ShootingMethod(method.integrator, method.periods, bool(mirrored))
     first = np.append(images[0] / scale, share)
     fixed = np.append(np.zeros(scale.size), 1.0)
     lanes = family.driven(family.amplitude[None], family.frequency[None])

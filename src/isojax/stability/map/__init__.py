@@ -16,3 +16,5 @@ from ._map import StabilityMap as StabilityMap
 from ._map import stability_map as stability_map
 from ._map_method import Lane as Lane
 from ._map_method import MapMethod as MapMethod
+from ._surface import MapWindow as MapWindow
+from ._window_steps import window_integrator as window_integrator

@@ -17,8 +17,10 @@ from ._describing_function import response_start as response_start
 from ._describing_function import rest_displacement as rest_displacement
 from ._event_path import follow_events as follow_events
 from ._fast_states import answer_sizes as answer_sizes
+from ._fast_states import fastest_rate as fastest_rate
 from ._fast_states import integrator_over as integrator_over
 from ._fast_states import integrator_that_follows as integrator_that_follows
+from ._fast_states import integrator_with as integrator_with
 from ._floquet import Floquet as Floquet
 from ._floquet import margin_beside_folds as margin_beside_folds
 from ._floquet import modulus as modulus
@@ -61,3 +63,4 @@ from ._split_period_map import state_scale as state_scale
 from ._split_period_map import steps_wanted as steps_wanted
 from ._state_path import AbstractStatePath as AbstractStatePath
 from ._symmetry import is_odd as is_odd
+from ._symmetry import is_odd_along as is_odd_along

@@ -74,9 +74,26 @@ def integrator_that_follows(
         The integrator, its steps doubled as often as needed; and whether more are needed than are taken.
     """
     rates = np.asarray(_fastest(model, jnp.asarray(sizes), jnp.asarray(frequencies)))
-    needed = np.max(rates / frequencies, initial=0.0, where=np.isfinite(rates)) / _STEP_BY_RATE
+    return integrator_with(model, integrator, rates / frequencies)
+
+
+def integrator_with(
+    model: Isolator, integrator: Integrator, rates: Float[np.ndarray, " motion"], most: int = _MOST_STEPS
+) -> tuple[Integrator, bool]:
+    """Give the integrator with as many steps as some rates need, and whether they need more than are taken.
+
+    Args:
+        model: the isolator.
+        integrator: with steps enough for motions that change no faster than the drive.
+        rates: of the fastest states, per drive period; those that are not finite do not count.
+        most: steps a period to take at most.
+
+    Returns:
+        The integrator, its steps doubled as often as needed; and whether more are needed than are taken.
+    """
+    needed = np.max(rates, initial=0.0, where=np.isfinite(rates)) / _STEP_BY_RATE
     taken = integrator.steps_a_period(model)
-    most = max(_MOST_STEPS, taken)
+    most = max(most, taken)
     doublings = math.ceil(math.log2(max(min(needed, most) / taken, 1.0)))
     return integrator.with_steps(integrator.steps_per_period << doublings), bool(needed > most)
 
@@ -107,30 +124,40 @@ def answer_sizes(
 def _fastest(
     model: Isolator, sizes: Float[Array, " motion"], frequencies: Float[Array, " motion"]
 ) -> Float[Array, " motion"]:
-    """Give the largest rate along each motion of one harmonic [1/s]."""
+    return jax.vmap(lambda size, frequency: fastest_rate(model, size, frequency)[0])(sizes, frequencies)
 
-    def one(size: Array, frequency: Array) -> Array:
-        omega, rest = 2.0 * math.pi * frequency, rest_displacement(model)
-        phase = 2.0 * np.pi / _SAMPLES * np.arange(_SAMPLES)
-        x, v = rest + size * np.cos(phase), -size * omega * np.sin(phase)
-        path = (x, v, *imposed_internal(model, x, v, frequency))
-        scale = state_scale(path)
 
-        def radius(state: Array) -> Array:
-            law = ContinuedLaw(
-                tuple(jnp.where(own >= 0.0, 1.0, -1.0) for own in model.switches(tuple(state)))
-            )
+def fastest_rate(
+    model: Isolator, size: Float[Array, ""], frequency: Float[Array, ""]
+) -> tuple[Float[Array, ""], Float[Array, " state"]]:
+    """Give the largest rate at which states change by themselves along a motion of one harmonic.
 
-            def rates(scaled: Array) -> Array:
-                return jnp.stack(model.rates(tuple(scaled * scale), Instant(0.0 * size), law=law)) / scale
+    Args:
+        model: the isolator.
+        size: displacement amplitude of the motion [m].
+        frequency: of the motion [Hz].
 
-            matrix = jax.jacfwd(rates)(state / scale)
-            unit = jnp.maximum(jnp.max(jnp.abs(matrix)), 1e-300)
-            power = matrix / unit
-            for _ in range(_SQUARINGS):
-                power = power @ power
-            return unit * jnp.max(jnp.abs(power)) ** (1.0 / 2**_SQUARINGS)
+    Returns:
+        The largest spectral radius of the derivative of the rates by the state [1/s]; and the size of each
+        state along the motion.
+    """
+    omega, rest = 2.0 * math.pi * frequency, rest_displacement(model)
+    phase = 2.0 * np.pi / _SAMPLES * np.arange(_SAMPLES)
+    x, v = rest + size * np.cos(phase), -size * omega * np.sin(phase)
+    path = (x, v, *imposed_internal(model, x, v, frequency))
+    scale = state_scale(path)
 
-        return jnp.max(jax.vmap(radius)(jnp.stack(path, axis=-1)))
+    def radius(state: Array) -> Array:
+        law = ContinuedLaw(tuple(jnp.where(own >= 0.0, 1.0, -1.0) for own in model.switches(tuple(state))))
 
-    return jax.vmap(one)(sizes, frequencies)
+        def rates(scaled: Array) -> Array:
+            return jnp.stack(model.rates(tuple(scaled * scale), Instant(0.0 * size), law=law)) / scale
+
+        matrix = jax.jacfwd(rates)(state / scale)
+        unit = jnp.maximum(jnp.max(jnp.abs(matrix)), 1e-300)
+        power = matrix / unit
+        for _ in range(_SQUARINGS):
+            power = power @ power
+        return unit * jnp.max(jnp.abs(power)) ** (1.0 / 2**_SQUARINGS)
+
+    return jnp.max(jax.vmap(radius)(jnp.stack(path, axis=-1))), scale

@@ -31,7 +31,7 @@ from ._shooting_method import ShootingMethod
 from ._sine import highest_order, integrator_for, need_fundamental, recorded_sine
 from ._split_period_map import event_places
 from ._state_path import AbstractStatePath
-from ._symmetry import is_odd
+from ._symmetry import is_odd, is_odd_along
 
 _EVENT_ROOM = 16
 """Times the events of a motion for which room is made first, beyond which no more is made."""
@@ -165,16 +165,40 @@ def find_periodic_orbit(
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
     begin = None if start is None else frozen(jnp.stack([as_float64(value) for value in start]))
     method = ShootingMethod(integrator, periods, half)
-    solution, stiff = _solve(still, drive, method, solver, begin), False
+    orbit = _orbit(model, excitation, *_sought(still, drive, method, solver, begin))
+    if (
+        not half
+        or traced
+        or isinstance(frozen(orbit.y0), Tracer)
+        or not np.all(np.isfinite(frozen(orbit.y0)))
+    ):
+        return orbit
+    if is_odd_along(still, np.asarray(frozen(orbit.states)).T):
+        return orbit
+    # A law on one side only, between the displacements at which oddness is tried.
+    if symmetric:
+        raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")
+    method = ShootingMethod(integrator, periods, False)
+    return _orbit(model, excitation, *_sought(still, drive, method, solver, begin))
+
+
+def _sought(
+    model: Isolator,
+    drive: Harmonic,
+    method: ShootingMethod,
+    solver: optx.AbstractRootFinder,
+    begin: Float[Array, " state"] | None,
+) -> tuple[ShootingMethod, ShootingSolution, Bool[Array, ""]]:
+    """Search, once more with steps that follow fast states where this fails; say whether these are stiff."""
+    solution, stiff = _solve(model, drive, method, solver, begin), False
     if not isinstance(solution.found, Tracer) and not (solution.found & solution.accurate):
-        motion = answer_sizes(still, jnp.atleast_1d(drive.amplitude), jnp.atleast_1d(frequency))
-        finer, stiff = integrator_that_follows(
-            still, integrator, np.asarray(motion), np.atleast_1d(np.asarray(frequency))
-        )
-        if finer.steps_per_period > integrator.steps_per_period:
-            method = ShootingMethod(finer, periods, half)
-            solution = _solve(still, drive, method, solver, begin)
-    return _orbit(model, excitation, method, solution, jnp.asarray(stiff))
+        frequency = np.atleast_1d(np.asarray(drive.frequency))
+        motion = answer_sizes(model, jnp.atleast_1d(drive.amplitude), jnp.asarray(frequency))
+        finer, stiff = integrator_that_follows(model, method.integrator, np.asarray(motion), frequency)
+        if finer.steps_per_period > method.integrator.steps_per_period:
+            method = ShootingMethod(finer, method.periods, method.half)
+            solution = _solve(model, drive, method, solver, begin)
+    return method, solution, jnp.asarray(stiff)
 
 
 def _solve(

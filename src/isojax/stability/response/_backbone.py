@@ -7,7 +7,9 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
@@ -34,6 +36,7 @@ from ..orbit import (
     balanced_motion,
     imposed_balance,
     integrator_for,
+    integrator_that_follows,
     rest_displacement,
     trajectory,
     value_and_jacobian,
@@ -92,7 +95,8 @@ def backbone_curve(
     Args:
         model: the isolator.
         displacements: largest displacement over rest, ascending and positive [m].
-        integrator: solver and steps; 256 a period if omitted.
+        integrator: solver and steps; 256 a period if omitted. More are taken where a state of the model
+            follows the motion faster.
         fit: with whose errors the curve is given a band; `model` is its model. None for no band.
 
     Returns:
@@ -114,10 +118,11 @@ def backbone_curve(
     check_float64()
     errors = None if fit is None else coefficient_errors(fit, model)
     amplitudes = jnp.asarray(ascending("displacements", displacements))
-    integrator = integrator_for(frozen(model), integrator, 256)
+    integrator, stiff = _steps(frozen(model), amplitudes, integrator_for(frozen(model), integrator, 256))
 
     def curve_of(isolator: Isolator) -> BackboneCurve:
-        return _resonance(isolator, amplitudes, natural_frequencies(isolator, amplitudes), integrator)
+        natural = natural_frequencies(isolator, amplitudes)
+        return _resonance(isolator, amplitudes, natural, integrator, jnp.asarray(stiff))
 
     def quantities(isolator: Isolator) -> Array:
         found = curve_of(isolator)
@@ -132,12 +137,30 @@ def backbone_curve(
     )
 
 
+def _steps(
+    model: Isolator, amplitudes: Float[Array, " point"], integrator: Integrator
+) -> tuple[Integrator, bool]:
+    """Give steps that follow the states of a model near resonance, and whether these are too fast."""
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(model)):
+        return integrator, False
+    frequencies = np.asarray(_near_resonance(model, amplitudes))
+    known = np.isfinite(frequencies) & (frequencies > 0.0)
+    return integrator_that_follows(model, integrator, np.asarray(amplitudes)[known], frequencies[known])
+
+
+@quick_jit
+def _near_resonance(model: Isolator, amplitudes: Float[Array, " point"]) -> Float[Array, " point"]:
+    rest = rest_displacement(model)
+    return jax.vmap(lambda amplitude: _balanced(model, amplitude, rest)[0].frequency)(amplitudes)
+
+
 @quick_jit
 def _resonance(
     model: Isolator,
     amplitudes: Float[Array, " point"],
     natural: Float[Array, " point"],
     integrator: Integrator,
+    stiff: Bool[Array, ""],
 ) -> BackboneCurve:
     rest = rest_displacement(model)
 
@@ -172,7 +195,8 @@ def _resonance(
     begin = jnp.stack(states_at_zero(model, method, lanes), axis=-1)
 
     def ending(well: Array) -> RESULTS:
-        return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), RESULTS.not_converged)
+        failed = RESULTS.where(stiff, RESULTS.stiff, RESULTS.not_converged)
+        return RESULTS.where(well, RESULTS.promote(diffrax.RESULTS.successful), failed)
 
     return BackboneCurve(
         amplitudes,

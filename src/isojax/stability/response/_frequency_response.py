@@ -25,7 +25,7 @@ from ...models import (
     State,
     as_isolator,
 )
-from ..branch import Branch, SpecialPoint, continue_branch
+from ..branch import Branch, BranchEvent, SpecialPoint, continue_branch
 from ..orbit import Sine, recorded_sine, trajectory
 
 
@@ -120,6 +120,7 @@ def frequency_response(
     step: float = 0.02,
     most: int = 1000,
     integrator: Integrator | None = None,
+    events: Sequence[BranchEvent] = (),
     fit: Estimated | EndsEstimated | None = None,
 ) -> FrequencyResponse:
     """Follow the periodic response over frequency, and look for responses beside it.
@@ -138,6 +139,8 @@ def frequency_response(
         step: largest step, over the size of the motion and the range of frequency.
         most: points to give up after.
         integrator: solver and steps; 256 a period if omitted.
+        events: numbers of the orbits whose zeros are located among the special points of the curve and of
+            those beside it; see `continue_branch`.
         fit: with whose errors the curves and their special points are given bands; `model` is its model. None
             for no band.
 
@@ -146,7 +149,7 @@ def frequency_response(
 
     Raises:
         ValueError: if an amplitude is not positive, there are not two different positive frequencies, or
-            `periods`, `step` or `most` is not positive.
+            `periods`, `step` or `most` is not positive, or two events have one name or that of a bifurcation.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Nayfeh & Mook 1979, Nonlinear Oscillations, sec. 4.1 (the curve) and 4.2 (subharmonics).
@@ -184,6 +187,7 @@ def frequency_response(
         step=step,
         most=most,
         integrator=integrator,
+        events=events,
         fit=fit,
     )
     others = tuple(FrequencyResponse(one, _receptance(model, one)) for one in branch.others)

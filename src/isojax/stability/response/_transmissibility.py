@@ -25,7 +25,7 @@ from ...models import (
     coefficient_errors,
     find_band,
 )
-from ..map import StabilityMap, found_again, stability_map
+from ..map import MapWindow, StabilityMap, found_again, stability_map, window_integrator
 from ..orbit import (
     PeriodicDrive,
     Sine,
@@ -110,14 +110,16 @@ def transmissibility(
         amplitude: of the recorded drive [N, or m/s^2 for base excitation].
         frequencies: ascending [Hz].
         coexisting: whether to give every orbit; else the one of the smallest motion.
-        integrator: solver and steps; 256 a period if omitted.
+        integrator: solver and steps; if omitted 256 a period, and more where a state of the model follows
+            the motion faster.
         fit: with whose errors the curve is given a band; `model` is its model. None for no band.
 
     Returns:
         The transmissibility.
 
     Raises:
-        ValueError: if the amplitude or a frequency is not positive, or the frequencies do not ascend.
+        ValueError: if the amplitude or a frequency is not positive, the frequencies do not ascend, or a state
+            of the model is too fast for the steps of the `integrator` that was given.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Carrella et al. 2012, Int. J. Mech. Sci. 55:22 (force and displacement, nonlinear isolators).
@@ -131,14 +133,16 @@ def transmissibility(
     model = as_isolator(model)
     check_float64()
     errors = None if fit is None else coefficient_errors(fit, model)
-    integrator = integrator_for(frozen(model), integrator, 256)
+    steps = integrator_for(frozen(model), integrator, 256)
     grid = ascending("frequencies", frequencies)
     force = as_float64(amplitude)
     refuse_traced(model, force)
     held = np.asarray(frozen(force))
     if held.ndim or not np.isfinite(held) or not held > 0.0:
         raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
-    orbits = stability_map(frozen(model), held[None], grid, coexisting=coexisting, integrator=integrator)
+    if integrator is None:
+        steps = window_integrator(frozen(model), steps, MapWindow(held[None], grid, 1.0))
+    orbits = stability_map(frozen(model), held[None], grid, coexisting=coexisting, integrator=steps)
 
     def curve(isolator: Isolator) -> Array:
         return jnp.abs(_of_orbits(isolator, force, orbits).ratio)[None]
