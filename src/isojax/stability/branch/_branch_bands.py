@@ -124,7 +124,7 @@ def _moved_far(
             here = dataclasses.replace(family, model=model).driven(amplitude, frequency)
 
             def point(guess: Array, normal: Array) -> Array:
-                found = corrected(here, guess, normal, method=method, scale=scale, test=0)
+                found = corrected(here, guess, normal, method=method, scale=scale, test=_rise)
                 orbit = orbit_at(here, method, scale, found.unknown, found.tangent)
                 return jnp.stack([orbit.value, orbit.response]) * jnp.where(found.sound, 1.0, jnp.nan)
 
@@ -134,6 +134,10 @@ def _moved_far(
         return jax.vmap(lane, out_axes=1)(*drives, scale, unknowns, tangents)
 
     return jax.lax.map(curve, models)
+
+
+def _rise(_: Array, __: Array, tangent: Array) -> Array:
+    return tangent[-1]
 
 
 def _point_with_band(branch: Branch, point: SpecialPoint, errors: CoefficientErrors) -> SpecialPoint:
