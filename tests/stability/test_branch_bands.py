@@ -13,6 +13,9 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import norm
 
 import isojax as ij
+from isojax._implicit import frozen
+from isojax.models import coefficient_errors
+from isojax.stability.branch._possible_points import find_possible_points
 
 TURN = 2.0 * np.pi
 HALF = norm.ppf(0.975)
@@ -109,6 +112,8 @@ def test_cusps_have_the_error_of_their_scaling(branch):
     assert float(cusp.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-6)
     assert abs(float(cusp.band.standard_error["frequency"])) < 1e-6 * SHARE * float(cusp.frequency)
     assert " ± " in str(cusp)
+    assert not any(bool(one) for one in cusp.band.curved.values())
+    np.testing.assert_allclose(float(cusp.band.upper["amplitude"] - cusp.amplitude), HALF * wanted, rtol=1e-6)
     assert ij.plot.fold_curve(folds).axes[0].containers
 
 
@@ -219,6 +224,7 @@ def test_a_fold_beside_its_cusp_has_the_probability_and_the_force_of_the_closed_
     words = str(branch)
     assert ("no bifurcation of its own" in words) == (share > 1.0)
     assert ("possible fold: probability 0.2" in words) == (share > 1.0)
+    assert (" at 0.17507 Hz; where there is one, 95% of its amplitude lies in" in words) == (share > 1.0)
     assert ("exists with probability 0.7" in words) == (share < 1.0)
 
 
@@ -250,7 +256,7 @@ def test_an_orbit_is_found_again_on_its_own_piece_of_the_branch_or_nowhere(branc
 
     found = np.asarray(jax.vmap(amplitude)(jnp.asarray(springs)))
     assert np.isfinite(found).tolist() == [True] * 3 + [False] * 3
-    # By one harmonic k F^2 = 4 y / 3 ((y - d)^2 + (c w)^2) with y = 3 k a^2 / 4, and the least y is that of the
+    # By one harmonic k F^2 = 4 y / 3 ((y - d)^2 + (c w)^2) with y = 3 k a^2 / 4, and the least y is of the
     # piece. Beside the fold it moves with the root of the distance, so that one harmonic is too coarse there.
     d, loss = 1.6**2 - 1.0, 0.32**2
     for spring, size in zip(springs[:2], found, strict=False):
@@ -282,4 +288,18 @@ def test_a_fold_that_no_model_within_the_errors_has_is_not_possible():
     branch = along_force(1.2)
     assert not branch.special_points
     assert not branch.possible_points
-    assert "no bifurcation" in str(branch)
+    assert "; no bifurcation" in str(branch)
+    assert "of its own" not in str(branch)
+
+
+@pytest.mark.slow
+def test_a_search_that_fails_does_not_read_as_no_bifurcation():
+    known, fit = along_force(1.02), lightly_damped(1.02)
+    errors = coefficient_errors(fit)
+    # The branch of every other model is that of the fitted one, so that none of them has the folds.
+    points, undecided = find_possible_points(frozen(known), errors, lambda _: known)
+    assert not points
+    assert undecided > 0
+    words = str(dataclasses.replace(known, possible_points=points, undecided=undecided))
+    assert "no bifurcation of its own" in words
+    assert "whether isolators within the errors have bifurcations was not found out at" in words
