@@ -23,6 +23,10 @@ class RESULTS(diffrax.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
         "much. It grazes a stop or turns where friction all but holds it. Try more steps in `Integrator`, "
         "or a drive a little beside this one."
     )
+    gone = (
+        "Followed from the known orbit, the branch of this isolator does not reach the drive: it turns back "
+        "at a fold before it, or lies too far away. Ask `continue_branch` what is there."
+    )
     sticks = (
         "Dry friction holds the mass for the whole period: it may rest anywhere within the friction, so that "
         "no orbit is isolated and there are no multipliers. Raise the drive."

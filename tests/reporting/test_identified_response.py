@@ -31,6 +31,10 @@ def test_the_page_and_the_markdown_have_both_pictures(found, written):
     for content in (page, text):
         assert "Response of the identified model" in content
         assert "no fold, so no jump" in content
+        assert (
+            "models drawn within the errors of the coefficients agree" in content
+            or "with probability" in content
+        )
     assert {"report_response_of_the_model.png", "report_transmissibility_of_the_model.png"} <= {
         one.name for one in written.iterdir()
     }

@@ -5,12 +5,17 @@ import functools
 from typing import NamedTuple
 
 import diffrax
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.stats import norm
 
 import isojax as ij
+from isojax._implicit import frozen
+from isojax.models import coefficient_errors
+from isojax.stability.branch._possible_points import find_possible_points
 
 TURN = 2.0 * np.pi
 HALF = norm.ppf(0.975)
@@ -107,6 +112,8 @@ def test_cusps_have_the_error_of_their_scaling(branch):
     assert float(cusp.band.standard_error["amplitude"]) == pytest.approx(wanted, rel=1e-6)
     assert abs(float(cusp.band.standard_error["frequency"])) < 1e-6 * SHARE * float(cusp.frequency)
     assert " ± " in str(cusp)
+    assert not any(bool(one) for one in cusp.band.curved.values())
+    np.testing.assert_allclose(float(cusp.band.upper["amplitude"] - cusp.amplitude), HALF * wanted, rtol=1e-6)
     assert ij.plot.fold_curve(folds).axes[0].containers
 
 
@@ -175,7 +182,11 @@ def lightly_damped(share, error=0.03):
 
 def force_at_folds(damping):
     """Of the one-harmonic solution, in the order of the branch."""
-    d, loss = OMEGA**2 - 1.0, (damping * OMEGA) ** 2
+    return force_at_folds_of(OMEGA, damping)
+
+
+def force_at_folds_of(omega, damping):
+    d, loss = omega**2 - 1.0, (damping * omega) ** 2
     y = (2.0 * d + np.array([[-1.0], [1.0]]) * np.sqrt(d**2 - 3.0 * loss)) / 3.0
     return np.sqrt(4.0 * y / 3.0 * ((y - d) ** 2 + loss))
 
@@ -213,6 +224,7 @@ def test_a_fold_beside_its_cusp_has_the_probability_and_the_force_of_the_closed_
     words = str(branch)
     assert ("no bifurcation of its own" in words) == (share > 1.0)
     assert ("possible fold: probability 0.2" in words) == (share > 1.0)
+    assert (" at 0.17507 Hz; where there is one, 95% of its amplitude lies in" in words) == (share > 1.0)
     assert ("exists with probability 0.7" in words) == (share < 1.0)
 
 
@@ -227,6 +239,46 @@ def test_a_fold_is_found_again_on_its_own_branch_or_nowhere():
         assert np.isnan(float(ij.find_again(first, _damped(share)).amplitude))
 
 
+@pytest.mark.slow
+def test_an_orbit_is_found_again_on_its_own_piece_of_the_branch_or_nowhere(branch):
+    """Newton's method alone went past the fold to the motion of twice the size."""
+    fold, rest = float(branch.special_points[0].amplitude), float(branch.special_points[1].amplitude)
+    # By one harmonic the lower fold force is within a few parts in a thousand.
+    lower, upper = np.sort(force_at_folds_of(1.6, 0.2).ravel())
+    assert (rest, fold) == pytest.approx((lower, upper), rel=0.02)
+    force = 0.99 * fold
+    orbit = ij.find_periodic_orbit(DUFFING, ij.Harmonic(force, 1.6 / TURN))
+    limit = (fold / force) ** 2  # the fold force goes with k^(-1/2)
+    springs = limit * np.array([0.9, 0.97, 0.998, 1.002, 1.03, 1.1])
+
+    def amplitude(spring):
+        return ij.find_again(orbit, DUFFING.replace(cubic_stiffness__coefficient=spring)).amplitude
+
+    found = np.asarray(jax.vmap(amplitude)(jnp.asarray(springs)))
+    assert np.isfinite(found).tolist() == [True] * 3 + [False] * 3
+    # By one harmonic k F^2 = 4 y / 3 ((y - d)^2 + (c w)^2) with y = 3 k a^2 / 4, and the least y is of the
+    # piece. Beside the fold it moves with the root of the distance, so that one harmonic is too coarse there.
+    d, loss = 1.6**2 - 1.0, 0.32**2
+    for spring, size in zip(springs[:2], found, strict=False):
+        roots = np.roots([1.0, -2.0 * d, d**2 + loss, -0.75 * spring * force**2])
+        least = np.min(roots.real[np.abs(roots.imag) < 1e-9])
+        assert size == pytest.approx(np.sqrt(4.0 * least / 3.0 / spring), rel=0.02)
+    gone = ij.find_again(orbit, DUFFING.replace(cubic_stiffness__coefficient=springs[3]))
+    assert gone.result == ij.RESULTS.gone
+    assert np.isnan(np.asarray(gone.floquet.multipliers)).all()
+    assert "turns back at a fold" in " ".join(str(gone).split())
+
+
+def test_an_orbit_is_found_again_far_away_where_there_is_but_one():
+    """The receptance of a linear isolator, from and to its resonance and under drives of other sizes."""
+    known = ij.find_periodic_orbit(LINEAR, ij.Harmonic(1.0, 5.0 / TURN))
+    for spring, force, rate in ((50.0, 1.0, 5.0), (80.0, 0.01, 5.0), (50.0, 1.0, 8.0), (45.0, -30.0, 4.0)):
+        model = LINEAR.replace(linear_stiffness__coefficient=spring)
+        found = ij.find_again(known, model, amplitude=force, frequency=rate / TURN)
+        wanted = abs(force) / abs(spring - 2.0 * rate**2 + 0.8j * rate)
+        assert float(found.amplitude) == pytest.approx(wanted, rel=1e-6)
+
+
 def _damped(share):
     return DUFFING.replace(linear_damping__coefficient=share * TURNING)
 
@@ -236,4 +288,18 @@ def test_a_fold_that_no_model_within_the_errors_has_is_not_possible():
     branch = along_force(1.2)
     assert not branch.special_points
     assert not branch.possible_points
-    assert "no bifurcation" in str(branch)
+    assert "; no bifurcation" in str(branch)
+    assert "of its own" not in str(branch)
+
+
+@pytest.mark.slow
+def test_a_search_that_fails_does_not_read_as_no_bifurcation():
+    known, fit = along_force(1.02), lightly_damped(1.02)
+    errors = coefficient_errors(fit)
+    # The branch of every other model is that of the fitted one, so that none of them has the folds.
+    points, undecided = find_possible_points(frozen(known), errors, lambda _: known)
+    assert not points
+    assert undecided > 0
+    words = str(dataclasses.replace(known, possible_points=points, undecided=undecided))
+    assert "no bifurcation of its own" in words
+    assert "whether isolators within the errors have bifurcations was not found out at" in words

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import isojax as ij
 from isojax import RESULTS
@@ -43,6 +44,26 @@ def test_a_linear_isolator_has_the_response_and_the_errors_of_the_closed_form(ex
         np.testing.assert_allclose(curve.standard_error[name], error, rtol=1e-2, atol=1e-4 * error.max())
     assert curve.stable.all()
     assert not curve.folds
+
+
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_the_probability_of_a_fold_is_that_of_the_closed_form(share):
+    """x'' + c x' + x + x^3 = F sin(w t) folds over w by one harmonic where c lies below a value c0.
+
+    There w^2 - 1 = sqrt(3) c0 w and F^2 = 32 (w^2 - 1)^3 / 81.
+    """
+    rate = 1.1
+    turning = (rate**2 - 1.0) / (np.sqrt(3.0) * rate)
+    force = np.sqrt(32.0 * (rate**2 - 1.0) ** 3 / 81.0)
+    damper = ij.LinearDamping(share * turning)
+    model = ij.Isolator(1.0, (LinearStiffness(1.0), damper, ij.CubicStiffness(1.0)))
+    fit = FitAt(
+        model, ("linear_damping.coefficient",), np.array([[(0.03 * turning) ** 2]]), RESULTS.successful
+    )
+    found = ij.response_bands(fit, [0.5 * force, force, 2.0 * force], (0.95 / 6.2832, 1.4 / 6.2832))
+    few, near, all_of_them = found.fold_probability
+    assert (few, all_of_them) == (0.0, 1.0)
+    assert near == pytest.approx(norm.cdf((1.0 - share) / 0.03), abs=4.0 * found.fold_probability_error[1])
 
 
 def test_folds_and_their_intervals_are_those_of_continuation(paper):

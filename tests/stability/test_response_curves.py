@@ -347,11 +347,31 @@ def test_the_band_of_a_linear_transmissibility_is_that_of_its_closed_form():
     np.testing.assert_allclose(width, 2.0 * norm.ppf(0.975) * expected, rtol=1e-6)
 
 
+def test_the_band_of_a_transmissibility_at_its_peak_is_curved():
+    """At resonance it falls whichever way the stiffness goes: its slope says nothing."""
+    fit = uncertain(LINEAR, linear_stiffness__coefficient=1.0)
+    band = ij.transmissibility(LINEAR, 3.0, np.array([0.4, 5.0 / TURN, 1.5]), fit=fit).band
+    assert np.asarray(band.curved["magnitude"]).tolist() == [False, True, False]
+    assert "curved at 1 of 3 points" in str(band)
+    springs = np.random.default_rng(3).normal(50.0, 1.0, 100_000)
+    exact = np.abs(springs + 4j) / np.abs(springs - 50.0 + 4j)
+    ends = [float(np.asarray(end["magnitude"])[1]) for end in (band.lower, band.upper)]
+    np.testing.assert_allclose(ends, np.quantile(exact, [0.025, 0.975]), rtol=0.02)
+
+
 def test_the_band_of_a_backbone_is_that_of_free_vibration():
     backbone = ij.backbone_curve(LINEAR, SIZES[:2], fit=LOOSE)
     expected = 0.05 / (2.0 * math.sqrt(50.0 * 2.0) * TURN)
     np.testing.assert_allclose(backbone.band.standard_error["natural_frequency"], expected, rtol=1e-8)
     assert ij.plot.backbone(backbone).axes[0].patches
+    assert not np.any(backbone.band.curved["natural_frequency"])
+    # Of a stiffness known to 35 % the frequency, its root, is not normal.
+    loose = uncertain(LINEAR, linear_stiffness__coefficient=17.5)
+    wide = ij.backbone_curve(LINEAR, SIZES[:2], fit=loose).band
+    assert np.all(wide.curved["natural_frequency"])
+    ends = [np.asarray(end["natural_frequency"])[0] for end in (wide.lower, wide.upper)]
+    stiffness = norm.ppf([0.025, 0.975], 50.0, 17.5)
+    np.testing.assert_allclose(ends, np.sqrt(stiffness / 2.0) / TURN, rtol=0.04)
 
 
 @pytest.mark.slow

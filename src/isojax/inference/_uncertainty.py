@@ -20,6 +20,10 @@ from ..models import (
 )
 from ._evaluate import NOT_FINITE, evaluate
 
+_NEAR = 2.0
+"""Standard errors of a probability within which the confidence asked for counts as reached or missed by
+chance."""
+
 
 @shown
 class UncertainQuantity(NamedTuple):
@@ -31,14 +35,18 @@ class UncertainQuantity(NamedTuple):
             the draws that have the quantity.
         interval: lower and upper end, first axis; where `curved`, quantiles of the draws. Where
             `may_not_exist`, that of the values it has where it exists; elsewhere draws without it count as
-            lying outside. NaN where too few draws have it.
+            lying outside. So it jumps where `probability` passes `confidence`: just above, it holds almost
+            all values that the draws have; just below, the confidence of them. NaN where too few draws have
+            it.
         confidence: chance that the interval, or "none" where `may_not_exist`, is meant to hold the truth.
         curved: where the quantity bends so much within the error of the coefficients that an end of the
-            interval by the delta method differs from that by draws by more than a tenth of its width.
+            interval by the delta method differs from that by draws by more than a tenth of its width, and by
+            more than the count of draws explains.
         draws: the quantity at coefficients drawn from their normal distribution, draw first; NaN where it
             does not exist.
         failed: share of the draws that gave no finite number.
-        reason: why most of them failed; "" where none did.
+        reason: why most of them failed, or why the quantity failed at the fitted coefficients; "" where none
+            did.
         weights: of the fits that the answer rests on, in their order.
         probability: that the quantity exists, by the share of the draws that have it.
         probability_error: standard error of that share, by the count of draws.
@@ -71,7 +79,15 @@ class UncertainQuantity(NamedTuple):
         return f"{self.confidence:.0%} interval, {len(self.draws)} draws{several}{bent}{lost}"
 
     def _lines(self) -> list[str]:
-        return [f"Draws without a value: {self.reason}"] if self.failed else []
+        who = "Draws" if self.failed else "The fit"
+        lines = [f"{who} without a value: {self.reason}"] if self.reason else []
+        near = np.abs(self.probability - self.confidence) <= _NEAR * self.probability_error
+        if np.any(near & (self.probability < 1.0)):
+            lines.append(
+                f"Whether the probability reaches {self.confidence:.0%}, at which the interval jumps, takes "
+                "more draws to say"
+            )
+        return lines
 
     def _rows(self) -> list[Row]:
         flat = [
@@ -123,8 +139,8 @@ def uncertainty(
         fit: a fit, a saved one, or what ends with one: an extension, a closed loop.
         quantity: function of an isolator that gives real numbers: one, or an array. It must be differentiable
             by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one; `find_again`
-            lets it go through folds and orbits. A draw where it raises counts as one without it; at the
-            fitted coefficients it may be NaN, but must not raise.
+            lets it go through folds and orbits. Where it is NaN or raises, at a draw or at the fitted
+            coefficients, it does not exist.
         confidence: chance that the interval is to hold the truth.
         draws: how many; at least 100.
         seed: of the draws.
@@ -185,7 +201,7 @@ def uncertainty(
         known.curved,
         drawn,
         float(1.0 - finite.mean()),
-        "" if finite.all() else next((part[3] for part in parts if part[3]), NOT_FINITE),
+        next((part[3] for part in parts if part[3]), "" if finite.all() else NOT_FINITE),
         tuple(weights.tolist()),
         known.probability,
         known.probability_error,
@@ -204,12 +220,32 @@ def _carried(
     def at(steps: Float[Array, " step"]) -> Array:
         return 1.0 * jnp.asarray(quantity(errors.moved(steps)))  # a count that fails is NaN as well
 
-    value, change = errors.carry(quantity)
-    if jnp.iscomplexobj(value):
-        raise ValueError(f"Argument `quantity` must give real numbers, but gave {brief(value)}.")
-    error = np.asarray(np.linalg.norm(np.asarray(change), axis=-1))
+    missing, known = "", None
+    try:
+        known = errors.carry(quantity)
+    except Exception as problem:
+        missing = _why_missing(quantity, errors)
+        if not missing:
+            raise problem
+    if known is not None and jnp.iscomplexobj(known[0]):
+        raise ValueError(f"Argument `quantity` must give real numbers, but gave {brief(known[0])}.")
     drawn, raised = evaluate(at, errors.draw(draws, seed), progress)
-    return np.asarray(value, dtype=float), error, np.asarray(drawn, dtype=float), raised
+    if known is None:
+        known = np.full(drawn.shape[1:], np.nan), np.full((*drawn.shape[1:], errors.steps), np.nan)
+    value, change = (np.asarray(one, dtype=float) for one in known)
+    error = np.asarray(np.linalg.norm(change, axis=-1))
+    return value, error, np.asarray(drawn, dtype=float), raised or missing
+
+
+def _why_missing(quantity: Callable[[Isolator], Any], errors: CoefficientErrors) -> str:
+    """Say why a quantity has no value at the fitted coefficients; "" if only JAX cannot go through it."""
+    if not callable(quantity):
+        return ""
+    try:
+        quantity(errors.moved(jnp.zeros(errors.steps)))
+    except Exception as problem:  # what a fold is asked for where there is none may raise anything
+        return f"{type(problem).__name__}: {problem}"
+    return ""
 
 
 def _evidence(fits: list[Any]) -> Float[np.ndarray, " fit"]:

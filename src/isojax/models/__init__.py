@@ -16,6 +16,7 @@ from ._band import Band as Band
 from ._band import CurveBeside as CurveBeside
 from ._band import band_across as band_across
 from ._band import band_around as band_around
+from ._band import draw_coefficients as draw_coefficients
 from ._band import find_band as find_band
 from ._band import find_band_across as find_band_across
 from ._coefficient_errors import CoefficientErrors as CoefficientErrors

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -13,7 +14,7 @@ from .._show import Row, brief, shown
 from ._coefficient_errors import CoefficientErrors
 from ._credible_set import credible_set
 from ._isolator import Isolator
-from ._second_order import expanded
+from ._second_order import expanded, expansion_nodes
 from ._shifted_curve import shifts_across
 
 CONFIDENCE = 0.95
@@ -23,12 +24,18 @@ HALF_WIDTH = -float(ndtri(0.5 * (1.0 - CONFIDENCE)))
 """Of such an interval, in standard errors."""
 
 
+_DRAWS, _SEED = 1000, 0
+"""Draws of the coefficients: those of `uncertainty`, where nothing else is asked for."""
+
+
 @shown
 class Band(eqx.Module):
     """The band around a curve, point by point: the error of the coefficients.
 
     It is that of the delta method. Where draws were taken beside it and the two differ by more than a tenth
-    of the interval, the band is curved there, and its ends are quantiles of the draws.
+    of the interval, the band is curved there, and its ends are quantiles of the draws. Draws of a curve are
+    those of its expansion to second order; where that is not known, the band to first order stands, and
+    counts as curved.
 
     A curve that may fold back, in the plane of frequency and amplitude, moves across itself: the ends of the
     band then lie on either side of each point, and both coordinates have one.
@@ -87,6 +94,7 @@ def find_band(
     curve: Callable[[Isolator], Float[Array, "quantity ..."]],
     *,
     drawn: Float[np.ndarray, "draw quantity ..."] | None = None,
+    others: Callable[[Isolator], Float[Array, "quantity ..."]] | None = None,
 ) -> Band:
     """Carry the error of a fit into quantities of its model.
 
@@ -95,12 +103,39 @@ def find_band(
         names: of the quantities.
         curve: gives these quantities for an isolator, differentiable by `jax.jacfwd`.
         drawn: the quantities at coefficients drawn from their distribution, NaN where they do not exist.
+        others: in place of `drawn`, gives the quantities of isolators beside the fitted one, under `jax.jit`.
 
     Returns:
         The band.
     """
     values, change = (np.asarray(one) for one in errors.carry(curve))
-    return band_around(names, values, change, drawn=drawn)
+    if others is None:
+        return band_around(names, values, change, drawn=drawn)
+    nodes = jnp.asarray(expansion_nodes(errors.steps))
+    beside = np.asarray(jax.lax.map(lambda steps: others(errors.moved(steps)), nodes))
+    drawn = values + expanded(beside - values, draw_coefficients(errors))
+    sizes = np.linalg.norm(change, axis=-1)
+    known = credible_set(values, sizes, drawn, CONFIDENCE)
+    straight = values + HALF_WIDTH * np.stack([-sizes, sizes])
+    # Where the quantities of another model were not found, the band to first order stands, and is in doubt.
+    sure = np.isfinite(known.interval).all(axis=0)
+    error, (lower, upper) = (
+        np.where(sure, known.standard_error, sizes),
+        np.where(sure, known.interval, straight),
+    )
+    return _named(names, error, lower, upper, known.curved)
+
+
+def draw_coefficients(errors: CoefficientErrors) -> Float[np.ndarray, "draw step"]:
+    """Give the draws that stand beside bands, in standard deviations.
+
+    Args:
+        errors: of the coefficients.
+
+    Returns:
+        The steps.
+    """
+    return errors.draw(_DRAWS, _SEED)
 
 
 def band_around(

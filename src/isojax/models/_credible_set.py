@@ -5,11 +5,18 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import ndtri
+from scipy.stats import norm
 
 from .._show import shown
 
 _BEND = 0.1
 """Share of an interval by which delta method and draws may differ."""
+
+_BY_CHANCE = 3.0
+"""Standard errors of an end of the interval, by the count of draws, up to which the two differ by chance."""
+
+_ROUNDING = 1e-6
+"""Share of the value up to which the two differ by the tolerance of a search."""
 
 _DRAWS_BEYOND = 2
 """Draws that an interval must leave out at least, one at either end: else they do not show its ends."""
@@ -26,9 +33,10 @@ class CredibleSet(NamedTuple):
         interval: lower and upper end, first axis. Where "none" is improbable, so that the interval alone can
             hold the truth with the confidence asked for, its share of the draws times their probability is
             that confidence. Elsewhere "none" belongs to the set, and the interval is that of the draws that
-            have the quantity.
+            have the quantity. So the interval jumps where the probability passes the confidence: just above,
+            it holds almost all of these draws; below, the confidence of them.
         curved: whether an end by the delta method differs from that by draws by more than a tenth of the
-            interval; its ends are then quantiles of the draws.
+            interval, and by more than the count of draws explains; its ends are then quantiles of the draws.
     """
 
     probability: Float[np.ndarray, "..."]
@@ -55,7 +63,8 @@ def credible_set(
     Returns:
         The set. Ends are NaN where too few draws have the quantity to tell them.
 
-    Source: Box & Tiao 1973, Bayesian Inference in Statistical Analysis, sec. 2.8 (regions of given content).
+    Source: Box & Tiao 1973, Bayesian Inference in Statistical Analysis, sec. 2.8 (regions of given content);
+        David & Nagaraja 2003, Order Statistics, sec. 10.2 (error of a quantile).
     """
     count, held = len(drawn), np.sum(np.isfinite(drawn), axis=0)
     share, share_error = existence(drawn)
@@ -67,8 +76,11 @@ def credible_set(
     straight = np.stack([value - spread, value + spread])
     ends = _quantiles(drawn, tail)
     ends = np.where(alone | (held * (1.0 - confidence) >= _DRAWS_BEYOND), ends, np.nan)
+    # Of a quantity that does not bend the draws are normal, and with them the error of their quantiles.
+    chance = np.sqrt(tail * (1.0 - tail) / np.maximum(held, 1)) / norm.pdf(ndtri(tail)) * error
     with np.errstate(invalid="ignore"):
-        curved = ~(np.max(np.abs(ends - straight), axis=0) <= _BEND * 2.0 * spread)
+        allowed = np.maximum(np.maximum(_BEND * 2.0 * spread, _BY_CHANCE * chance), _ROUNDING * np.abs(value))
+        curved = ~(np.max(np.abs(ends - straight), axis=0) <= allowed)
     return CredibleSet(
         share,
         share_error,

@@ -147,9 +147,9 @@ def _at_conditions(fit: Estimated, campaign: Campaign) -> tuple[Estimated, tuple
 
 
 def _fold_words(bands: ResponseBands) -> str:
-    """Say where the response jumps."""
-    unit, words = drive_unit(bands.model.excitation), []
-    for amplitude in bands.amplitudes:
+    """Say where the response jumps, and how probable folds are."""
+    unit, jumps, chances = drive_unit(bands.model.excitation), [], []
+    for amplitude, share in zip(bands.amplitudes, bands.fold_probability, strict=True):
         folds = [fold for one in bands.curves if one.amplitude == amplitude for fold in one.folds]
         if folds:
             places = [
@@ -158,14 +158,20 @@ def _fold_words(bands: ResponseBands) -> str:
                 )
                 for one in sorted(folds)
             ]
-            words.append(f"at {quantity(amplitude, unit)} at {' and '.join(places)}")
-    if not words:
-        return (
+            jumps.append(f"at {quantity(amplitude, unit)} at {' and '.join(places)}")
+        if 0.0 < share < 1.0:
+            chances.append(f"{typeset_number(share, 2)} at {quantity(amplitude, unit)}")
+    if jumps:
+        words = f"The response jumps (folds) {'; '.join(jumps)}."
+    else:
+        words = (
             "At these drive amplitudes the fitted model has one steady response per frequency: "
-            "no fold, so no jump. The chance that the true isolator has one is not worked out here; "
-            "isojax.continue_branch does that with fit=."
+            "no fold, so no jump."
         )
-    return f"The response jumps (folds) {'; '.join(words)}."
+    if chances:
+        listed = ", ".join(chances)
+        return f"{words} Within the errors of the coefficients, it folds with probability {listed}."
+    return f"{words} All models drawn within the errors of the coefficients agree."
 
 
 def _captions(bands: ResponseBands, measured: tuple[MeasuredResponse, ...]) -> tuple[str, str]:

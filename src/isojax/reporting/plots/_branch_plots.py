@@ -296,6 +296,7 @@ def _missing_words(branches: Sequence[Branch]) -> str:
     bent = [one.band.curved_part for one in branches if one.band is not None]
     words += [f"band {one}, and rough there" for one in bent if one]
     words += [f"possible {point.in_doubt}" for one in branches for point in one.possible_points]
+    words += [one.undecided_part for one in branches]
     return "".join(f"\n{one}" for one in dict.fromkeys(words) if one)
 
 

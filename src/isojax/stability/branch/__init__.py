@@ -7,8 +7,8 @@ the branch does not reach) with _orbit_search and _orbit_starts; _criticality (w
 orbit bifurcates), _locating and _special_points (what is found along a branch) with _bifurcation_system
 (its exact equations) and _extended_system (their solution); then _branch_switching, _codimension_two with
 _orbit_curve, _bifurcation_curves and _curve_special_points, _moved_point (where a bifurcation goes when
-the model moves), _possible_points (what the model lacks and others within its errors have), _branch_bands
-(errors of a fit) with _drive_words, and _nearest_folds.
+the model moves) with _moved_orbit (where an orbit goes), _possible_points (what the model lacks and others
+within its errors have), _branch_bands (errors of a fit) with _drive_words, and _nearest_folds.
 """
 
 from ._bifurcation_curves import CodimensionTwoPoint as CodimensionTwoPoint
@@ -28,6 +28,7 @@ from ._continuation import continue_branch as continue_branch
 from ._continuation import tracing_steps as tracing_steps
 from ._criticality import BifurcationKind as BifurcationKind
 from ._curve_special_points import find_codimension_two_again as find_codimension_two_again
+from ._moved_orbit import find_orbit_again as find_orbit_again
 from ._nearest_folds import NearestFolds as NearestFolds
 from ._nearest_folds import find_nearest_folds as find_nearest_folds
 from ._parameter_family import ParameterFamily as ParameterFamily

@@ -161,7 +161,10 @@ class SpecialPoint(eqx.Module):
     def in_doubt(self) -> str:
         """How probable a bifurcation is that the fitted model lacks, and where it lies if it exists."""
         kind, name = self.kind.replace("_", " "), self.family.names[0]
-        chance = f"{kind}: probability {number(self.probability)}"
+        held = {"amplitude": self.amplitude, "frequency": self.frequency}
+        units = {one: typeset_unit(unit_of(self.family.model, one)) for one in held}
+        at = ", ".join(f"{number(float(held[one]))} {units[one]}" for one in held if one != name)
+        chance = f"{kind}: probability {number(self.probability)} at {at}"
         if self.band is None or not np.isfinite(float(self.band.lower["value"])):
             return chance
         unit = typeset_unit(unit_of(self.family.model, name))
@@ -235,6 +238,8 @@ class Branch(eqx.Module):
         possible_points: bifurcations that the model has not, but others within the errors of the fit have,
             each at the nearest such model, with its probability; `find_again` starts from there as from a
             special point. Empty without a fit.
+        undecided: places where models within the errors of the fit should have a bifurcation, by their first
+            derivatives, but none was found: whether the true isolator has one is not known.
     """
 
     model: Isolator
@@ -254,6 +259,7 @@ class Branch(eqx.Module):
     events: tuple[BranchEvent, ...] = ()
     band: Band | None = None
     possible_points: tuple[SpecialPoint, ...] = ()
+    undecided: int = eqx.field(static=True, default=0)
 
     @property
     def connection(self) -> Literal["none", "bifurcation", "unknown"]:
@@ -289,10 +295,19 @@ class Branch(eqx.Module):
             return f"{self.parameter} {span} only, dry friction holds the mass beyond"
         return f"NOT WHOLE: the search stopped at {self.parameter} {number(values[-1])}"
 
+    @property
+    def undecided_part(self) -> str:
+        """Where bifurcations were sought within the errors of the fit in vain, in words; "" if nowhere."""
+        if not self.undecided:
+            return ""
+        places = "1 place" if self.undecided == 1 else f"{self.undecided} places"
+        return f"whether isolators within the errors have bifurcations was not found out at {places}"
+
     def _headline(self) -> str:
         kinds = [point.kind.replace("_", " ") for point in self.special_points]
         special = ", ".join(f"{kinds.count(kind)} × {kind}" for kind in dict.fromkeys(kinds))
-        none = "no bifurcation of its own" if self.possible_points else "no bifurcation"
+        doubt = self.possible_points or self.undecided
+        none = "no bifurcation of its own" if doubt else "no bifurcation"
         words = f"along {self.parameter}, {self.points._headline()}; {special or none}"
         return f"{self.missing_part}; {words}" if self.missing_part else words
 
@@ -305,6 +320,7 @@ class Branch(eqx.Module):
     def _lines(self) -> list[str]:
         lines = [f"  {point._headline()}" for point in self.special_points]
         lines += [f"  possible {point.in_doubt}" for point in self.possible_points]
+        lines += [f"  {self.undecided_part}"] if self.undecided else []
         if self.searched is None:
             return lines
         beside = [f"  beside it {other._in_words()}" for other in self.others]

@@ -17,6 +17,7 @@ from ...models import (
     CurveBeside,
     Isolator,
     band_around,
+    draw_coefficients,
     existence,
     expansion_nodes,
     find_band,
@@ -36,9 +37,6 @@ from ._tracing import branch_points, lanes_of
 _NAMES = ("value", "amplitude", "frequency")
 """Of a special point."""
 
-_DRAWS, _SEED = 1000, 0
-"""Draws of the coefficients: those of `uncertainty`, where nothing else is asked for."""
-
 
 def with_bands(branch: Branch, errors: CoefficientErrors) -> Branch:
     """Give a branch, its special points and the branches beside it their bands.
@@ -51,7 +49,7 @@ def with_bands(branch: Branch, errors: CoefficientErrors) -> Branch:
         The same branch.
     """
     branch = frozen(branch)
-    curve, beside = _curve(branch), CurveBeside(_curves_beside(branch, errors), _draws(errors))
+    curve, beside = _curve(branch), CurveBeside(_curves_beside(branch, errors), draw_coefficients(errors))
     return dataclasses.replace(
         branch,
         band=find_band_across(errors, ("value", "response"), curve, beside),
@@ -78,7 +76,7 @@ def with_bands_at(
             found = find_codimension_two_again(point, isolator)
             return jnp.stack([found.amplitude, found.frequency])
 
-        band = find_band(errors, ("amplitude", "frequency"), moved)
+        band = find_band(errors, ("amplitude", "frequency"), moved, others=moved)
         return dataclasses.replace(point, band=band)
 
     return tuple(one(point) if is_successful(point.result) else point for point in frozen(points))
@@ -124,7 +122,7 @@ def _moved_far(
             here = dataclasses.replace(family, model=model).driven(amplitude, frequency)
 
             def point(guess: Array, normal: Array) -> Array:
-                found = corrected(here, guess, normal, method=method, scale=scale, test=0)
+                found = corrected(here, guess, normal, method=method, scale=scale, test=_rise)
                 orbit = orbit_at(here, method, scale, found.unknown, found.tangent)
                 return jnp.stack([orbit.value, orbit.response]) * jnp.where(found.sound, 1.0, jnp.nan)
 
@@ -134,6 +132,10 @@ def _moved_far(
         return jax.vmap(lane, out_axes=1)(*drives, scale, unknowns, tangents)
 
     return jax.lax.map(curve, models)
+
+
+def _rise(_: Array, __: Array, tangent: Array) -> Array:
+    return tangent[-1]
 
 
 def _point_with_band(branch: Branch, point: SpecialPoint, errors: CoefficientErrors) -> SpecialPoint:
@@ -180,10 +182,6 @@ def with_probability(point: SpecialPoint, errors: CoefficientErrors) -> SpecialP
     return dataclasses.replace(point, band=band, probability=share, probability_error=error)
 
 
-def _draws(errors: CoefficientErrors) -> Float[np.ndarray, "draw step"]:
-    return errors.draw(_DRAWS, _SEED)
-
-
 def _kind_of(point: SpecialPoint) -> BifurcationKind | None:
     return next((name for name in get_args(BifurcationKind) if name == point.kind), None)
 
@@ -196,7 +194,7 @@ def _drawn(
     point: SpecialPoint, kind: BifurcationKind, errors: CoefficientErrors
 ) -> Float[np.ndarray, "draw quantity"]:
     """Give a bifurcation at coefficients drawn from their distribution; NaN where it does not exist."""
-    models = jax.vmap(errors.moved)(jnp.asarray(_draws(errors)))
+    models = jax.vmap(errors.moved)(jnp.asarray(draw_coefficients(errors)))
     return np.asarray(_found_at(frozen(point), kind, models))
 
 

@@ -191,10 +191,10 @@ def continue_branch(
         other = dataclasses.replace(frozen(family), model=isolator)
         return assemble(other, method, *follow_branches(other, method, begin, stride), batched, step)
 
-    possible = find_possible_points(frozen(branch), errors, again)
+    possible, undecided = find_possible_points(frozen(branch), errors, again)
     branch = with_bands(branch, errors)
     possible = tuple(with_probability(point, errors) for point in possible)
-    return dataclasses.replace(branch, possible_points=possible)
+    return dataclasses.replace(branch, possible_points=possible, undecided=undecided)
 
 
 def _largest(scale: Float[Array, "branch state"], followed: Followed) -> float:

@@ -1,9 +1,9 @@
-"""Where a bifurcation of a branch goes when the model moves: along the branch of the other model, or nowhere.
+"""Where a point of a branch goes when the model moves: along the branch of the other model, or nowhere.
 
-Newton's method on the equations of a bifurcation alone may end anywhere once the bifurcation is gone, and
-near where a pair of them vanishes it may miss what is there. Here the known orbit first moves across its
+Newton's method on the equations of a bifurcation, or of an orbit, alone may end anywhere once that is gone,
+and near where a pair of them vanishes it may miss what is there. Here the known orbit first moves across its
 branch to that of the other model, which is smooth also where bifurcations vanish. The new branch is then
-followed both ways, and the bifurcation is where its test function changes sign as it did at the known one.
+followed both ways, and the point is where its test function changes sign as it did at the known one.
 """
 
 import functools
@@ -14,7 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen
 from ..orbit import ShootingMethod, state_scale, trajectory, value_and_jacobian
@@ -27,7 +27,7 @@ from ._parameter_family import ParameterFamily
 _STAGES = 4
 """Models between the known and the other one, through which the orbit is moved."""
 
-_STEPS = 0.02 * np.minimum(1.06 ** np.arange(40), 3.0)
+STEPS = 0.02 * np.minimum(1.06 ** np.arange(40), 3.0)
 """Steps along the branch either way, over the size of motion and range: the further, the longer."""
 
 _CORRECTIONS = 4
@@ -42,8 +42,16 @@ _FOUND_WITHIN = 1e-6
 _STRAIGHT = 0.8
 """Cosine of the turn of the tangent in one step below which the branch counts as lost."""
 
+_REACH = 0.75
+"""How far a parabola through three points is read, over the gaps between them: beyond the half, so that a
+zero in the middle of a gap is not lost between two parabolas."""
+
 _SIDESTEP = 2e-3
 """Distance along the known branch at which the sense of its test function's change is read."""
+
+
+Test = Callable[[Array, Array, Array], Array]
+"""Gives what vanishes at a point from its unknown, the derivative of its map and its tangent."""
 
 
 class Place(NamedTuple):
@@ -72,31 +80,87 @@ def moved_guess(point: SpecialPoint, kind: BifurcationKind, family: ParameterFam
     setting = known.at(shares)
     path = trajectory(setting.model, method.integrator, setting.drive, tuple(point.y0), turns=method.turns)
     scale = state_scale(path)
+
+    def test(_: Array, matrix: Array, tangent: Array) -> Array:
+        return critical_values(matrix, tangent)[TEST_OF[kind]]
+
+    move = Move(known, family, method, scale, scale, test)
     origin = jnp.concatenate([point.y0 / scale, shares])
-    place = functools.partial(corrected, method=method, scale=scale, test=TEST_OF[kind])
-    _, slope = value_and_jacobian(lambda u: known.open_end(method, scale, u), origin)
-    # Null vector of the slope: the way along the branch.
-    across = jnp.linalg.svd(slope)[2][-1]
-    aside = jax.vmap(lambda side: place(known, origin + side * _SIDESTEP * across, across).test)
-    behind, ahead = aside(jnp.array([-1.0, 1.0]))
-    sense = jnp.sign(ahead - behind)
-
-    def nearer(here: Array, share: Array) -> tuple[Array, Place]:
-        between = jax.tree.map(
-            lambda old, new: old + share * (new - old) if eqx.is_inexact_array(old) else new, known, family
-        )
-        found = place(between, here, across)
-        return found.unknown, found
-
-    _, stages = jax.lax.scan(nearer, origin, jnp.arange(1.0, _STAGES + 1.0) / _STAGES)
-    moved = jax.tree.map(lambda own: own[-1], stages)
-    there = functools.partial(place, family)
-    line = jax.tree.map(
-        lambda here, ways: jnp.concatenate([ways[0, ::-1], here[None], ways[1]]), moved, _walk(there, moved)
-    )
-    found = _zero(there, line, sense)
+    across = move.across(origin)
+    place, line = move.line(origin, across, STEPS)
+    found = zero_along(place, line, STEPS, move.sense(origin, across)).unknown
     states = scale.shape[0]
     return PointGuess(found[:states] * scale, found[states:])
+
+
+class Move(NamedTuple):
+    """From the branch of one family to that of another.
+
+    Attributes:
+        known: isolators and drives of the known point.
+        family: the other ones.
+        method: how the orbits are closed.
+        scale: size of each state at the known point.
+        there: size of each state on the other branch.
+        test: vanishes at the point.
+    """
+
+    known: ParameterFamily
+    family: ParameterFamily
+    method: ShootingMethod
+    scale: Float[Array, " state"]
+    there: Float[Array, " state"]
+    test: Test
+
+    def across(self, origin: Float[Array, " unknown"]) -> Float[Array, " unknown"]:
+        """Give the unit tangent of the known branch at the known point, on which the parameter rises."""
+        _, slope = value_and_jacobian(lambda u: self.known.open_end(self.method, self.scale, u), origin)
+        along = jnp.linalg.svd(slope)[2][-1]  # null vector of the slope
+        return along * jnp.where(along[-1] < 0.0, -1.0, 1.0)
+
+    def sense(self, origin: Float[Array, " unknown"], across: Float[Array, " unknown"]) -> Float[Array, ""]:
+        """Give the sign of the change of the test function along the known branch at the known point."""
+        place = functools.partial(corrected, self.known, method=self.method, scale=self.scale, test=self.test)
+        aside = jax.vmap(lambda side: place(origin + side * _SIDESTEP * across, across).test)
+        behind, ahead = aside(jnp.array([-1.0, 1.0]))
+        return jnp.sign(ahead - behind)
+
+    def line(
+        self,
+        origin: Float[Array, " unknown"],
+        across: Float[Array, " unknown"],
+        steps: Float[np.ndarray, " step"],
+    ) -> tuple[Callable[[Array, Array], Place], Place]:
+        """Follow the other branch both ways from where the known point moves to.
+
+        Args:
+            origin: the known point: scaled state and share.
+            across: tangent of the known branch there.
+            steps: along the branch, either way.
+
+        Returns:
+            What gives a point of the other branch from a guess and the normal of a plane through it; and the
+            branch, its first axis from back to front, with the moved point in the middle.
+        """
+        place = functools.partial(corrected, method=self.method, test=self.test)
+
+        def nearer(here: Array, share: Array) -> tuple[Array, Place]:
+            between, scale = jax.tree.map(
+                lambda old, new: old + share * (new - old) if eqx.is_inexact_array(old) else new,
+                (self.known, self.scale),
+                (self.family, self.there),
+            )
+            found = place(between, here, across, scale=scale)
+            return found.unknown, found
+
+        _, stages = jax.lax.scan(nearer, origin, jnp.arange(1.0, _STAGES + 1.0) / _STAGES)
+        moved = jax.tree.map(lambda own: own[-1], stages)
+        own = functools.partial(place, self.family, scale=self.there)
+        ways = _walk(own, moved, steps)
+        line = jax.tree.map(
+            lambda here, both: jnp.concatenate([both[0, ::-1], here[None], both[1]]), moved, ways
+        )
+        return own, line
 
 
 def corrected(
@@ -106,7 +170,7 @@ def corrected(
     *,
     method: ShootingMethod,
     scale: Float[Array, " state"],
-    test: int,
+    test: Test,
 ) -> Place:
     """Give the point of a branch in the plane through a guess, its tangent on the side of the normal.
 
@@ -116,7 +180,7 @@ def corrected(
         normal: of the plane.
         method: how the orbits are closed.
         scale: size of each state.
-        test: which of `critical_values` is read.
+        test: gives what is read there.
 
     Returns:
         The point.
@@ -136,11 +200,11 @@ def corrected(
     found, slope, last = jax.lax.fori_loop(0, _CORRECTIONS, newton, begin)
     ahead = jnp.linalg.solve(jnp.concatenate([slope, normal[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
     ahead = ahead / jnp.linalg.norm(ahead)
-    value = critical_values(slope[:, :states] + jnp.eye(states), ahead)[test]
+    value = test(found, slope[:, :states] + jnp.eye(states), ahead)
     return Place(found, ahead, value, last < _FOUND_WITHIN)
 
 
-def _walk(place: Callable[[Array, Array], Place], start: Place) -> Place:
+def _walk(place: Callable[[Array, Array], Place], start: Place, steps: Float[np.ndarray, " step"]) -> Place:
     """Follow a branch from a point, back and forward, which is the first axis; tangents point forward."""
 
     def way(side: Array) -> Place:
@@ -150,20 +214,34 @@ def _walk(place: Callable[[Array, Array], Place], start: Place) -> Place:
             found = found._replace(sound=found.sound & here.sound & straight)
             return found, found
 
-        return jax.lax.scan(step, start, jnp.asarray(_STEPS))[1]
+        return jax.lax.scan(step, start, jnp.asarray(steps))[1]
 
     return jax.vmap(way)(jnp.array([-1.0, 1.0]))
 
 
-def _zero(
-    place: Callable[[Array, Array], Place], line: Place, sense: Float[Array, ""]
-) -> Float[Array, " unknown"]:
+def zero_along(
+    place: Callable[[Array, Array], Place],
+    line: Place,
+    steps: Float[np.ndarray, " step"],
+    sense: Float[Array, ""],
+    within: Bool[Array, " place"] | None = None,
+) -> Place:
     """Give where the test function passes zero in a sense, nearest to the middle of a line; NaN if nowhere.
 
     Through each three points a parabola is laid, which also shows a pair of zeros between two of them; from
     its zero the secant method goes on along the branch.
+
+    Args:
+        place: gives a point of the branch from a guess and a normal.
+        line: points of the branch.
+        steps: between these, from the middle either way.
+        sense: sign of the change of the test function.
+        within: next to which points of the line the zero may lie; all if omitted.
+
+    Returns:
+        The point.
     """
-    ends = np.concatenate([[0.0], np.cumsum(_STEPS)])
+    ends = np.concatenate([[0.0], np.cumsum(steps)])
     along = jnp.asarray(np.concatenate([-ends[:0:-1], ends]))
     gaps, here = jnp.diff(along), line.test[1:-1]
     rates = jnp.diff(line.test) / gaps
@@ -175,7 +253,8 @@ def _zero(
         slope * sense > 0.0, -2.0 * here / (slope + sense * root), (sense * root - slope) / (2.0 * bend)
     )
     sound = line.sound[:-2] & line.sound[1:-1] & line.sound[2:]
-    good = sound & (shift >= -0.5 * gaps[:-1]) & (shift <= 0.5 * gaps[1:])
+    sound = sound if within is None else sound & within[1:-1]
+    good = sound & (shift >= -_REACH * gaps[:-1]) & (shift <= _REACH * gaps[1:])
     best = jnp.argmin(jnp.where(good, jnp.abs(along[1:-1] + shift), jnp.inf))
     start = jax.tree.map(lambda own: own[best + 1], line)
     rate = slope[best] + 2.0 * bend[best] * shift[best]
@@ -184,8 +263,9 @@ def _zero(
         old, length, rate = carry
         new = place(old.unknown + length * old.tangent, old.tangent)
         change = (new.test - old.test) / jnp.where(length == 0.0, 1.0, length)
-        rate = jnp.where(change * sense > 0.0, change, rate)
+        # Of no step the change is rounding.
+        rate = jnp.where((change * sense > 0.0) & (length != 0.0), change, rate)
         return new, -new.test / rate, rate
 
     begin = start, jnp.where(good[best], shift[best], jnp.nan), rate
-    return jax.lax.fori_loop(0, _SECANTS, secant, begin)[0].unknown
+    return jax.lax.fori_loop(0, _SECANTS, secant, begin)[0]

@@ -52,7 +52,7 @@ class _Dip(NamedTuple):
 
 def find_possible_points(
     branch: Branch, errors: CoefficientErrors, again: Callable[[Isolator], Branch]
-) -> tuple[SpecialPoint, ...]:
+) -> tuple[tuple[SpecialPoint, ...], int]:
     """Find bifurcations that the branch of a fitted model lacks, at the nearest model that has them.
 
     Args:
@@ -61,7 +61,8 @@ def find_possible_points(
         again: follows the same branch for another isolator.
 
     Returns:
-        They, each at another model: that of its `family`.
+        They, each at another model: that of its `family`. And the places where to first order there is one
+        within reach, or nobody knows, but none was found at the models tried.
 
     Source: Hasofer & Lind 1974, J. Eng. Mech. Div. ASCE 100:111 (the nearest point at which a limit is
     reached).
@@ -71,16 +72,19 @@ def find_possible_points(
     curves = _Curves(*lanes)
     tests = np.asarray(_tests(family, method, *curves))
     found: list[SpecialPoint] = []
+    undecided = 0
     dips = _dips(tests)
     for first in range(0, len(dips), _TRIED_AT_ONCE):
         some = dips[first : first + _TRIED_AT_ONCE]
         values, slopes = _with_slopes(branch, method, curves, some, errors)
         for dip, value, slope in zip(some, values, slopes, strict=True):
             size = float(np.linalg.norm(slope))
-            if size > 0.0 and abs(value) <= _FARTHEST_MODEL * size:
-                way = -np.sign(value) * slope / size
-                found += _new_points(branch, errors, again, dip, (abs(value) / size, way))
-    return tuple(found)
+            if size == 0.0 or abs(value) > _FARTHEST_MODEL * size:
+                continue
+            way = -np.sign(value) * slope / size
+            new = _new_points(branch, errors, again, dip, (abs(value) / size, way)) if size > 0.0 else []
+            found, undecided = found + new, undecided + (not new)
+    return tuple(found), undecided
 
 
 class _Curves(NamedTuple):

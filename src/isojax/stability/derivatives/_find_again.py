@@ -3,11 +3,9 @@
 from typing import Any, TypeVar, get_args
 
 import jax
-import numpy as np
 from jax.core import Tracer
 
 from ..._types import Scalar, as_float64, check_float64
-from ...excitations import Harmonic
 from ...models import Isolator, Modelled, as_isolator
 from ..branch import (
     BifurcationKind,
@@ -16,9 +14,10 @@ from ..branch import (
     SpecialPoint,
     find_bifurcation_again,
     find_codimension_two_again,
+    find_orbit_again,
 )
 from ..map import StabilityMap, found_again
-from ..orbit import Orbit, find_periodic_orbit
+from ..orbit import Orbit, closed_by_half
 from ..response import Resonance, Transmissibility, resonance_near, transmissibility_again
 
 Answer = TypeVar(
@@ -37,9 +36,9 @@ def find_again(
 
     From the known one by Newton's method, so that the shape of the answer is known beforehand: `jax.jit`,
     `jax.vmap`, `jax.jacfwd` and `jax.grad` go through, also where those that found it in the first place
-    refuse. A bifurcation of a branch is sought along the branch of the other model, so that it is found where
-    it is, and nothing else where it is gone. An orbit is not: past its fold the search may end on another
-    orbit in place of NaN, so ask `uncertainty` for the fold where one is near.
+    refuse. An orbit, or a bifurcation of a branch, is sought along the branch of the other model, so that it
+    is found where it is, and nothing else where it is gone: past its fold an orbit is NaN, not the one to
+    which the motion jumps.
 
     Args:
         answer: an orbit; a special or possible point of a branch, such as a fold; a special point of a curve
@@ -71,7 +70,7 @@ def find_again(
     isolator = as_isolator(model)
     check_float64()
     finders: dict[type, Any] = {
-        Orbit: _orbit,
+        Orbit: find_orbit_again,
         SpecialPoint: _special_point,
         CodimensionTwoPoint: _codimension_two,
         StabilityMap: _map,
@@ -90,21 +89,6 @@ def find_again(
         )
     drive = [None if value is None else as_float64(value) for value in (amplitude, frequency)]
     return finders[type(answer)](answer, isolator, *drive)
-
-
-def _orbit(orbit: Orbit, model: Isolator, amplitude: Any, frequency: Any) -> Orbit:
-    own = orbit.excitation
-    drive = Harmonic(
-        own.amplitude if amplitude is None else amplitude, own.frequency if frequency is None else frequency
-    )
-    return find_periodic_orbit(
-        model, drive, start=orbit.y0, periods=orbit.periods, symmetric=_closed_by_half(orbit)
-    )
-
-
-def _closed_by_half(orbit: Orbit) -> bool:
-    """Say whether an orbit was closed with the half-period map: then alone has it multipliers over it."""
-    return bool(np.all(np.isfinite(np.asarray(orbit.floquet.half_period_multipliers))))
 
 
 def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequency: Any) -> SpecialPoint:
@@ -153,8 +137,9 @@ def _resonance(resonance: Resonance, model: Isolator, amplitude: Any, frequency:
         )
     orbit = resonance.orbit
     push = as_float64(orbit.excitation.amplitude if amplitude is None else amplitude)
-    half = _closed_by_half(orbit)
-    return resonance_near(model, push, orbit.y0, resonance.frequency, half, resonance.integrator)
+    return resonance_near(
+        model, push, orbit.y0, resonance.frequency, closed_by_half(orbit), resonance.integrator
+    )
 
 
 def _transmissibility(

@@ -37,6 +37,7 @@ from ._kink_crossings import advance_across_kinks as advance_across_kinks
 from ._known_numbers import refuse_traced as refuse_traced
 from ._known_numbers import refuse_transformed as refuse_transformed
 from ._orbit import Orbit as Orbit
+from ._orbit import closed_by_half as closed_by_half
 from ._orbit import find_periodic_orbit as find_periodic_orbit
 from ._period_map import period_map as period_map
 from ._period_map import trajectory as trajectory

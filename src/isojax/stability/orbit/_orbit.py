@@ -201,6 +201,18 @@ def _sought(
     return method, solution, jnp.asarray(stiff)
 
 
+def closed_by_half(orbit: Orbit) -> bool:
+    """Say whether an orbit was closed with the half-period map: then alone has it multipliers over it.
+
+    Args:
+        orbit: of known numbers.
+
+    Returns:
+        Whether it was.
+    """
+    return bool(np.all(np.isfinite(np.asarray(orbit.floquet.half_period_multipliers))))
+
+
 def _solve(
     model: Isolator,
     drive: Harmonic,

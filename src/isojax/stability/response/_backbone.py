@@ -132,9 +132,8 @@ def backbone_curve(
     if errors is None:
         return curve
     names = ("natural_frequency", "frequency", "force")
-    return eqx.tree_at(
-        lambda one: one.band, curve, find_band(errors, names, quantities), is_leaf=lambda x: x is None
-    )
+    band = find_band(errors, names, quantities, others=quantities)
+    return eqx.tree_at(lambda one: one.band, curve, band, is_leaf=lambda x: x is None)
 
 
 def _steps(

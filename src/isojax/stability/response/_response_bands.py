@@ -26,6 +26,7 @@ from ...models import (
     Isolator,
     band_across,
     coefficient_errors,
+    existence,
 )
 from ..orbit import ascending, integrator_for, margin_beside_folds
 from ._imposed_motion import ImposedMotions, impose_motions
@@ -41,6 +42,12 @@ _GRID_FREQUENCIES = 25
 
 _FINE = 800, 300
 """Frequencies and displacements among which contours are sought, so that they resolve light damping."""
+
+_DRAWN = 200, 300
+"""Frequencies and displacements among which folds of drawn models are counted."""
+
+_DRAWS, _SEED = 400, 0
+"""Models drawn for that."""
 
 _FEWEST_OF_CONTOUR = 3
 """Points of a contour that is kept."""
@@ -106,6 +113,9 @@ class ResponseBands(NamedTuple):
         frequencies: lowest and highest [Hz].
         curves: by drive amplitude; several where a response is detached, or leaves the band of frequencies.
         lost: share of the orbits of the grid that were not found; the curves have gaps there.
+        fold_probability: of each amplitude, that the response folds between the frequencies: the share of
+            models drawn from the fit whose response does.
+        fold_probability_error: standard error of that share, by the count of models.
     """
 
     model: Isolator
@@ -113,6 +123,8 @@ class ResponseBands(NamedTuple):
     frequencies: tuple[float, float]
     curves: tuple[ResponseCurve, ...]
     lost: float
+    fold_probability: tuple[float, ...]
+    fold_probability_error: tuple[float, ...]
 
     def _headline(self) -> str:
         folds = sum(len(one.folds) for one in self.curves)
@@ -180,7 +192,8 @@ def response_bands(
     curves = tuple(curve for force in forces for curve in surface.curves(float(force)))
     lost = 1.0 - float(np.mean(motions.closed))
     band = float(ends[0]), float(ends[-1])
-    return ResponseBands(errors.model, tuple(map(float, forces)), band, curves, lost)
+    chances = surface.fold_probabilities(forces, errors.draw(_DRAWS, _SEED))
+    return ResponseBands(errors.model, tuple(map(float, forces)), band, curves, lost, *chances)
 
 
 class _Size(NamedTuple):
@@ -260,6 +273,28 @@ class _Surface:
             self._curve(amplitude, np.asarray(line).T) for line in lines if len(line) >= _FEWEST_OF_CONTOUR
         ]
 
+    def fold_probabilities(
+        self, amplitudes: Float[np.ndarray, " level"], draws: Float[np.ndarray, "draw step"]
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Give the share of drawn models whose response folds at each amplitude, and its standard error.
+
+        At an imposed motion the drive goes with the coefficients to first order. Where it falls as the
+        displacement grows, there are further orbits under drives of these amplitudes.
+        """
+        fine = [np.linspace(axis[0], axis[-1], count) for axis, count in zip(self.axes, _DRAWN, strict=True)]
+        parts = np.array([part(*fine) for part in self.tables[0]])
+        tables = parts[::2] + 1j * parts[1::2]
+        known = self.known(*fine) >= 0.999
+        known = known[:, :-1] & known[:, 1:]
+        folds = np.full((len(draws), len(amplitudes)), np.nan)
+        for row, steps in zip(folds, draws, strict=True):
+            drive = np.abs(tables[0] + np.tensordot(steps, tables[1:], axes=1))
+            low, high = _falling(np.log(drive) + fine[1], known)
+            inside = (low[:, None] < np.log(amplitudes)) & (np.log(amplitudes) < high[:, None])
+            row[inside.any(axis=0)] = 1.0
+        share, error = existence(folds)
+        return tuple(share.tolist()), tuple(error.tolist())
+
     def _curve(self, amplitude: float, at: Float[np.ndarray, "2 point"]) -> ResponseCurve:
         for _ in range(_POLISHING):
             drive = self._size(0, at)
@@ -303,3 +338,33 @@ class _Surface:
             CurveFold(middle, height, share, (low, high))
             for middle, height, share, low, high in np.transpose(columns).tolist()
         )
+
+
+def _falling(
+    height: Float[np.ndarray, "frequency displacement"], known: Bool[np.ndarray, "frequency piece"]
+) -> tuple[Float[np.ndarray, " gap"], Float[np.ndarray, " gap"]]:
+    """Give between which heights a surface falls along displacement, from each frequency to the next.
+
+    Args:
+        height: at the nodes.
+        known: between which displacements it is known.
+
+    Returns:
+        The least and the largest; infinite the wrong way round where it rises throughout.
+    """
+    middle = 0.5 * (height[:, :-1] + height[:, 1:])
+    slope = np.where(known, np.diff(height, axis=1), np.inf)
+    falls = slope < 0.0
+    low = np.min(np.where(falls, height[:, 1:], np.inf), axis=1)
+    high = np.max(np.where(falls, height[:, :-1], -np.inf), axis=1)
+    # The falling part begins between two frequencies where the least slope passes zero.
+    steepest = np.argmin(slope, axis=1)
+    rows = np.arange(len(height))
+    least, there = slope[rows, steepest], middle[rows, steepest]
+    least = np.where(np.isfinite(least), least, 0.0)
+    begins = least[:-1] * least[1:] < 0.0
+    share = least[:-1] / np.where(begins, least[:-1] - least[1:], 1.0)
+    tip = there[:-1] + share * (there[1:] - there[:-1])
+    low = np.minimum(np.minimum(low[:-1], low[1:]), np.where(begins, tip, np.inf))
+    high = np.maximum(np.maximum(high[:-1], high[1:]), np.where(begins, tip, -np.inf))
+    return low, high

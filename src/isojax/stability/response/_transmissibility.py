@@ -147,8 +147,16 @@ def transmissibility(
     def curve(isolator: Isolator) -> Array:
         return jnp.abs(_of_orbits(isolator, force, orbits).ratio)[None]
 
-    band = None if errors is None else find_band(errors, ("magnitude",), curve)
-    return dataclasses.replace(_of_orbits(model, force, orbits), band=band)
+    known = _of_orbits(model, force, orbits)
+    if errors is None:
+        return known
+
+    still = frozen(known)
+
+    def others(isolator: Isolator) -> Array:
+        return transmissibility_again(still, isolator).magnitude[None]
+
+    return dataclasses.replace(known, band=find_band(errors, ("magnitude",), curve, others=others))
 
 
 def transmissibility_again(
