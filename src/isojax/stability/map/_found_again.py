@@ -26,9 +26,9 @@ from ..orbit import (
     value_and_jacobian,
     with_overtones,
 )
-from ._map import StabilityMap
 from ._map_method import Lane, MapMethod, kinks_between
 from ._nodes import half_peak_to_peak
+from ._stability_map import StabilityMap
 
 _CELL_CLOSED_TO, _MOST_CELL_STEPS = 1e-9, 12
 """Largest last step of Newton's method, over the size of the motion, and steps after which a cell fails."""
