@@ -98,6 +98,38 @@ def test_map_of_the_linear_isolator_moves_as_its_receptance_in_every_cell():
                 assert found == pytest.approx(decay, rel=1e-4, abs=1e-4 / value)
 
 
+@pytest.mark.slow
+def test_derivatives_read_off_a_large_map_are_those_of_the_receptance_within_their_error():
+    forces, band = np.linspace(50.0, 100.0, 60), np.linspace(3.0, 9.0, 60)
+    sens = ij.sensitivity(ij.stability_map(linear(), forces, band), parameters=tuple(LETTERS))
+    assert sens.error is not None
+    assert sens.error < 1e-6
+    # Over the resonance at 5.6 Hz; the sum of the multipliers also follows the damped frequency.
+    numbers = {"k": STIFFNESS, "c": DAMPING, "m": MASS, "force": forces[:, None], "f": band[None, :]}
+
+    def two_multipliers(k, c, m, force, f):
+        turn = np.sqrt(k / m - (c / (2 * m)) ** 2) / f
+        return np.exp(-c / (2 * m * f)) * 2 * np.cos(turn) + 0.0 * force
+
+    found = {
+        "response": sens.derivatives["response"],
+        "sum": sens.derivatives["multipliers"].sum(axis=-1).real,
+    }
+    for place, (letter, _) in enumerate(LETTERS.values()):
+        for name, function in (("response", receptance), ("sum", two_multipliers)):
+            # Fourth-order differences, whose own error is far below.
+            step = 1e-3 * numbers[letter]
+
+            def moved(times, letter=letter, function=function, step=step):
+                return function(**(numbers | {letter: numbers[letter] + times * step}))
+
+            exact = (8 * (moved(1) - moved(-1)) - (moved(2) - moved(-2))) / (12 * step)
+            exact = np.broadcast_to(exact, (60, 60))
+            size = np.maximum(np.abs(exact), np.median(np.abs(exact)))
+            off = np.abs(np.asarray(found[name])[place] - exact)
+            assert np.all(off <= 2e-6 * size), (letter, name)
+
+
 @pytest.fixture(scope="module")
 def paper() -> ij.Isolator:
     return ij.paper.y_direction()

@@ -11,9 +11,10 @@ from jaxtyping import Int
 
 from ..orbit import Sine
 from ._batched_newton import CELLS_TOGETHER, FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
+from ._grids import LEAST_SLOPE
 from ._map_method import Lane
 from ._starts import Candidates
-from ._surface import LEAST_SLOPE, MapWindow
+from ._surface import MapWindow
 
 _MARGIN = 1.25
 """On the largest error of a sample: the worst cell of a map is seldom in it."""

@@ -84,14 +84,26 @@ class StabilityMap(eqx.Module):
     @property
     def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
         """State of each orbit at t = 0 of the recorded drive, by integration from `start`."""
-        force = jnp.broadcast_to(self.amplitudes[:, None], self.spectral_radius.shape).ravel()
-        frequency = jnp.broadcast_to(self.frequencies, self.spectral_radius.shape).ravel()
-        state = tuple(self.start.reshape(force.size, -1).T)
-        sine, cosine = self.direction.reshape(force.size, 2).T * force[None]
-        lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel())
+        return self.states_at_zero(np.arange(self.spectral_radius.size)).reshape(self.start.shape)
+
+    def states_at_zero(self, cells: Int[np.ndarray, " cell"]) -> Float[Array, "cell state"]:
+        """Give the states of some orbits at t = 0 of the recorded drive.
+
+        Args:
+            cells: places in the flattened map.
+
+        Returns:
+            The states, in the order of the places.
+        """
+        shape = self.spectral_radius.shape
+        force = jnp.broadcast_to(self.amplitudes[:, None], shape).ravel()[cells]
+        frequency = jnp.broadcast_to(self.frequencies, shape).ravel()[cells]
+        state = tuple(self.start.reshape(self.spectral_radius.size, -1)[cells].T)
+        sine, cosine = self.direction.reshape(self.spectral_radius.size, 2)[cells].T * force[None]
+        lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel()[cells])
         steps = jnp.asarray(self.integrator.steps_a_period(self.model))
         method = MapMethod(self.integrator, self.symmetric, None, steps)
-        return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)
+        return jnp.stack(states_at_zero(self.model, method, lane), axis=-1)
 
     def _headline(self) -> str:
         count, radius = np.asarray(self.count), np.asarray(self.spectral_radius)
