@@ -174,7 +174,10 @@ def _directions(cells: _Cells) -> Directions:
 
     amplitude, frequency = (np.array([float(name == own) for name in cells.names]) for own in DRIVE)
     slopes = jax.tree.map(lambda leaf: leaf if np.any(leaf) else None, jax.jacfwd(numbers_of)(cells.at))
-    return Directions(slopes, frequency, amplitude)
+    scale = np.abs(np.array(cells.at))
+    for name, axis in zip(DRIVE, (cells.smap.amplitudes, cells.smap.frequencies), strict=True):
+        scale[[place for place, own in enumerate(cells.names) if own == name]] = np.median(np.asarray(axis))
+    return Directions(slopes, frequency, amplitude, np.where(scale == 0.0, 1.0, scale))
 
 
 def _read_off(
@@ -189,7 +192,8 @@ def _read_off(
     together = found_together(smap)
     if smap.start.shape[-1] != 2 or smap.model.harmonics or together.sum() <= fewest_nodes(smap):
         return None
-    tables = SlopeTables(smap, _directions(cells))
+    directions = _directions(cells)
+    tables = SlopeTables(smap, directions)
     left = int(together.sum())
     while left > tables.next_count():
         slopes = tables.doubled()
@@ -197,14 +201,19 @@ def _read_off(
         left = int(together.sum()) - read.size
         if left > tables.next_count() or not read.size:
             continue
-        error = _sampled_error(cells, slopes, read)
+        error = _sampled_error(cells, slopes, read, directions.scale)
         if error <= _GOAL:
             return read, slopes.values[..., read], error
         left = int(together.sum())
     return None
 
 
-def _sampled_error(cells: _Cells, slopes: CellSlopes, read: Int[np.ndarray, " cell"]) -> float:
+def _sampled_error(
+    cells: _Cells,
+    slopes: CellSlopes,
+    read: Int[np.ndarray, " cell"],
+    scale: Float[np.ndarray, " parameter"],
+) -> float:
     """Give the largest relative error of a sample: by the estimated error, next to folds, and evenly."""
     count = min(_SAMPLED // 3, read.size)
     steep = np.abs(slopes.steepness[read])
@@ -219,5 +228,5 @@ def _sampled_error(cells: _Cells, slopes: CellSlopes, read: Int[np.ndarray, " ce
     known = np.stack(
         [exact["response"], moved.sum(axis=-1).real, (moved * roots[:, ::-1]).sum(axis=-1).real], axis=1
     )
-    error = relative_error(slopes.values[..., some], known, np.ones(some.size, bool))
+    error = relative_error(slopes.values[..., some], known, np.ones(some.size, bool), scale)
     return _MARGIN * float(error.max()) if np.isfinite(error).all() else math.inf

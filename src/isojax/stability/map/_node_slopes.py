@@ -26,11 +26,13 @@ class Directions(NamedTuple):
             moves.
         frequency: of the frequency of the drive.
         amplitude: of its amplitude.
+        scale: size of each parameter, by which changes by different ones are compared.
     """
 
     model: Isolator
     frequency: Float[np.ndarray, " parameter"]
     amplitude: Float[np.ndarray, " parameter"]
+    scale: Float[np.ndarray, " parameter"]
 
 
 class NodeSlopes(NamedTuple):

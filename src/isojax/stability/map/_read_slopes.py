@@ -25,6 +25,9 @@ _ROOM = 1.2
 _SAME_DRIVE = 1e-4
 """Relative difference of the drive of a cell from that read off, beyond which they are two orbits."""
 
+_LEAST_SHARE = 1e-4
+"""Share of the largest change by a relative change of any parameter, below which one counts as this."""
+
 _CELLS_AT_ONCE = 16384
 """Cells read at once; bounds the memory."""
 
@@ -119,8 +122,8 @@ class SlopeTables:
         coarse_slopes = along[:TABLES] @ spline_slope_matrix(logarithms[::2], logarithms).T
         exact, _ = total_slopes(tables, fine, self.directions.amplitude)
         known, _ = total_slopes(coarse, coarse_slopes, self.directions.amplitude)
-        error = relative_error(known, exact, np.isfinite(self.grid.error)) / GAIN
-        return np.where(np.isfinite(self.grid.error) & np.isfinite(error), error, np.inf)
+        error = relative_error(known, exact, np.isfinite(self.grid.error), self.directions.scale)
+        return np.where(np.isfinite(self.grid.error) & np.isfinite(error), error / GAIN, np.inf)
 
     def _read(
         self,
@@ -196,6 +199,7 @@ def relative_error(
     known: Float[np.ndarray, "parameter 3 ..."],
     exact: Float[np.ndarray, "parameter 3 ..."],
     counted: np.ndarray,
+    scale: Float[np.ndarray, " parameter"],
 ) -> Float[np.ndarray, "..."]:
     """Give the largest error of derivatives, each over its size, or its median where that is larger.
 
@@ -203,12 +207,16 @@ def relative_error(
         known: derivatives.
         exact: the same, with less error.
         counted: places of which the median is.
+        scale: size of each parameter.
 
     Returns:
         The error of each place.
     """
     size = np.abs(exact)
     usual = np.nanmedian(size[..., counted], axis=-1) if counted.any() else np.ones(size.shape[:2])
+    # What hardly moves beside what the other parameters move is compared with these.
+    moved = usual * scale[:, None]
+    usual = np.maximum(moved, _LEAST_SHARE * moved.max(axis=0)) / scale[:, None]
     size = np.maximum(size, usual.reshape(*usual.shape, *(1,) * (size.ndim - 2)))
     gap = np.abs(known - exact)
     # What does not move at all is known as well as may be.
