@@ -4,17 +4,22 @@ Run: python benchmarks/first_calls.py
 
 Prints seconds of the import, then wall time and processor time of the first call and of the second, which
 compiles nothing; PASS or FAIL against ten seconds of wall time, and the functions that took longest to
-compile. Ends with code 1 if any fails. Run it on quiet cores: compiling is work of the processor.
+compile. Then the wall time of notebook 02 from top to bottom, with its kernel and all that compiles, against
+two minutes. Ends with code 1 if any fails. Run it on quiet cores: compiling is work of the processor.
 """
 
 import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 LIMIT = 10.0
 """Wall time that a first call may take [s]."""
+
+NOTEBOOK, NOTEBOOK_LIMIT = "02_the_papers_map.ipynb", 120.0
+"""Notebook that is run, and the wall time that it may take [s]."""
 
 SHOWN = 4
 """Functions whose compile time is printed."""
@@ -75,11 +80,24 @@ def time_case(case: str) -> None:
     print(f"  {len(compiled)} functions compiled in {total:.1f} s, longest: {longest}", flush=True)
 
 
+def time_notebook() -> None:
+    """Print the time of a notebook, run as the tests run it."""
+    root = Path(__file__).parents[1]
+    sys.path.insert(0, str(root / "tests"))
+    from run_notebook import executed
+
+    begun = time.perf_counter()
+    executed(root / "notebooks" / NOTEBOOK)
+    seconds = time.perf_counter() - begun
+    verdict = "PASS" if seconds <= NOTEBOOK_LIMIT else "FAIL"
+    print(f"notebook {NOTEBOOK}: {seconds:.0f} s  {verdict}")
+
+
 def main() -> int:
     """Run each case in a process of its own."""
     environment = {name: value for name, value in os.environ.items() if name != "JAX_COMPILATION_CACHE_DIR"}
     failed = 0
-    for case in CASES:
+    for case in (*CASES, NOTEBOOK):
         done = subprocess.run(
             [sys.executable, __file__, case], env=environment, capture_output=True, text=True, check=True
         )
@@ -90,6 +108,6 @@ def main() -> int:
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        time_case(sys.argv[1])
+        time_notebook() if sys.argv[1] == NOTEBOOK else time_case(sys.argv[1])
     else:
         sys.exit(main())

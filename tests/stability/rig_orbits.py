@@ -5,11 +5,13 @@ so that its map over a period is that of the sharp laws.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from isojax import rig
+from isojax.rig._force_pieces import ForcePiece
 from isojax.rig._motion_equation import EquationOfMotion
 from isojax.rig._solver import PlantIntegrator
 
@@ -44,7 +46,7 @@ def after_a_period(plant: rig.Plant, amplitude: float, frequency: float, y0: np.
     """Give the state of a plant one drive period later.
 
     Args:
-        plant: the plant; of its instruments, those of the drive are left out.
+        plant: the plant; of its instruments, those that change the shape of the drive act.
         amplitude: F0 [N].
         frequency: f [Hz].
         y0: state at t = 0.
@@ -53,10 +55,14 @@ def after_a_period(plant: rig.Plant, amplitude: float, frequency: float, y0: np.
         The state.
     """
     period = 1.0 / frequency
-    drive = rig.Tones(0.0, period, 0.0, (amplitude,), (2.0 * math.pi * frequency,), (0.0,))
+    drive: Sequence[ForcePiece] = [
+        rig.Tones(0.0, period, 0.0, (amplitude,), (2.0 * math.pi * frequency,), (0.0,))
+    ]
+    for instrument in plant.instruments:
+        drive = instrument.acting(drive, frequency)
     integrator = PlantIntegrator(EquationOfMotion(plant), TOLERANCE)
     integrator._largest[:] = np.maximum(np.abs(y0), 1e-3 * np.abs(y0).max() * _units(y0, frequency))
-    path = integrator.run([drive], y0)
+    path = integrator.run(drive, y0)
     start, size, state, coefficients, _, _ = path._steps[-1]
     return np.asarray(state) + coefficients[0] * (period - start) / size
 

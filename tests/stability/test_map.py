@@ -1,5 +1,6 @@
 """Maps against single orbits and the table of folds; cut, killed, resumed and spread they stay the same."""
 
+import json
 import os
 import socket
 import subprocess
@@ -12,7 +13,7 @@ import pytest
 
 from isojax import Harmonic, Isolator, elements, find_periodic_orbit, paper, stability_map
 from isojax._results import RESULTS
-from isojax.stability.map._batched_newton import FOUND, Found
+from isojax.stability.map._batched_newton import FOUND, NOT_CONVERGED, CellSolver, Found, blanked
 from isojax.stability.map._empty_cells import Cells, without_repeats
 from isojax.stability.map._starts import Candidates
 from isojax.stability.map._surface import MapWindow
@@ -96,6 +97,25 @@ def test_cells_that_cannot_be_read_off_are_solved_for_themselves():
         np.testing.assert_allclose(smap.multipliers[row, column], exact, atol=smap.error + 1e-9)
 
 
+def test_orbits_of_the_sample_that_finer_steps_do_not_find_are_counted_and_not_kept(small, monkeypatch):
+    improve = CellSolver.improve
+
+    def loses_one(self, method, lanes, count, limit=None):
+        found = improve(self, method, lanes, count, limit)
+        return found if limit is None else blanked(found, np.array([0]), NOT_CONVERGED)
+
+    monkeypatch.setattr(CellSolver, "improve", loses_one)
+    smap = stability_map(small.model, FORCES, BAND)
+    assert smap.unconfirmed == 1
+    assert "finer steps did not find 1 of the sampled orbits" in repr(smap)
+    row, column = np.argwhere(~np.asarray(smap.split))[0]
+    # Left empty it would count as not accurate; a single orbit, split for itself, is found in its place.
+    exact = find_periodic_orbit(smap.model, Harmonic(float(FORCES[row]), float(BAND[column])))
+    found = np.asarray(smap.multipliers[row, column])
+    np.testing.assert_allclose(found, np.asarray(exact.floquet.multipliers), atol=1e-9)
+    assert small.unconfirmed == 0
+
+
 def test_the_size_of_an_offset_motion_is_half_its_whole_range():
     law = (elements.LinearStiffness(1.0), elements.LinearDamping(0.05), elements.QuadraticStiffness(0.2))
     smap = stability_map(Isolator(1.0, law), [0.05, 0.1, 0.2], [0.06, 0.1, 0.2])
@@ -136,6 +156,11 @@ def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
     other = paper.y_direction().replace(mass=801.0)
     with pytest.raises(ValueError, match="which holds the chunks of another map"):
         stability_map(other, many, BAND, checkpoint=tmp_path, **arguments)
+    label = tmp_path / "map.json"
+    older = json.loads(label.read_text(encoding="utf-8"))
+    label.write_text(json.dumps(older | {"code": "0"}), encoding="utf-8")
+    with pytest.raises(ValueError, match="chunks that other code computed"):
+        stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
 
 
 def test_the_size_of_the_chunks_changes_no_number():
@@ -163,6 +188,19 @@ def test_bad_arguments_are_refused_with_what_was_expected(arguments, words):
     with pytest.raises(ValueError, match="Argument") as caught:
         stability_map(paper.y_direction(), **{**default, **arguments})
     assert str(caught.value) == words
+
+
+@pytest.mark.parametrize("name", ["amplitudes", "frequencies"])
+@pytest.mark.parametrize("transformed", [jax.jit, jax.vmap, jax.jacfwd])
+def test_a_map_of_traced_axes_says_what_to_use(name, transformed):
+    model, axes = paper.y_direction(), {"amplitudes": FORCES, "frequencies": BAND}
+
+    def radius(axis):
+        return stability_map(model, **(axes | {name: axis})).spectral_radius
+
+    given = jnp.asarray(axes[name])
+    with pytest.raises(ValueError, match=rf"Argument `{name}` must hold plain .*find_again\(orbit, model"):
+        transformed(radius)(given[None] if transformed is jax.vmap else given)
 
 
 SCRIPT = """

@@ -98,6 +98,45 @@ def test_map_of_the_linear_isolator_moves_as_its_receptance_in_every_cell():
                 assert found == pytest.approx(decay, rel=1e-4, abs=1e-4 / value)
 
 
+@pytest.mark.slow
+def test_derivatives_read_off_a_large_map_are_those_of_the_receptance_within_their_error():
+    forces, band = np.linspace(50.0, 100.0, 60), np.linspace(3.0, 9.0, 60)
+    # With so many steps that only the reading is in error.
+    smap = ij.stability_map(linear(), forces, band, integrator=ij.Integrator(steps_per_period=512))
+    sens = ij.sensitivity(smap, parameters=tuple(LETTERS))
+    assert sens.error is not None
+    assert sens.error <= 2e-5
+    # Over the resonance at 5.6 Hz; the sum of the multipliers also follows the damped frequency.
+    numbers = {"k": STIFFNESS, "c": DAMPING, "m": MASS, "force": forces[:, None], "f": band[None, :]}
+
+    def two_multipliers(k, c, m, force, f):
+        turn = np.sqrt(k / m - (c / (2 * m)) ** 2) / f
+        return np.exp(-c / (2 * m * f)) * 2 * np.cos(turn) + 0.0 * force
+
+    found = {
+        "response": sens.derivatives["response"],
+        "sum": sens.derivatives["multipliers"].sum(axis=-1).real,
+    }
+    for name, function in (("response", receptance), ("sum", two_multipliers)):
+        exact = []
+        for letter in numbers:
+            # Fourth-order differences, whose own error is far below.
+            step = 1e-3 * numbers[letter]
+
+            def moved(times, letter=letter, function=function, step=step):
+                return function(**(numbers | {letter: numbers[letter] + times * step}))
+
+            slope = (8 * (moved(1) - moved(-1)) - (moved(2) - moved(-2))) / (12 * step)
+            exact.append(np.broadcast_to(slope, (60, 60)))
+        # Each over its size, its median, or the least share of what a relative change of another moves.
+        scale = np.array([np.median(value) for value in numbers.values()])[:, None, None]
+        moves = np.abs(exact) * scale
+        usual = np.median(moves, axis=(1, 2), keepdims=True)
+        size = np.maximum(np.maximum(moves, usual), 1e-4 * usual.max()) / scale
+        off = np.abs(np.asarray(found[name]) - exact) / size
+        assert off.max() <= sens.error + 1e-7, name
+
+
 @pytest.fixture(scope="module")
 def paper() -> ij.Isolator:
     return ij.paper.y_direction()

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...stability import FoldCurve, StabilityMap
-from ...stability.map import chance_words
+from ...stability.map import chance_words, unconfirmed_words
 from ..plots import drive_unit, quantity
 from ._map_files import result_codes
 
@@ -54,6 +54,8 @@ def map_summary(
         lines.append(
             ("error", f"{smap.error:.1e} in |µ|, from a sample of cells; {steps} steps a period{missed}")
         )
+        if smap.unconfirmed:
+            lines.append(("not confirmed", unconfirmed_words(smap)))
     if smap.probability_stable is not None:
         lines.append(("chances", chance_words(smap)))
     if folds is not None:

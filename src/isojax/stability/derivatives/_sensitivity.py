@@ -30,6 +30,9 @@ class Sensitivity(eqx.Module):
         values: the quantities, by name.
         derivatives: of each quantity, parameter first [unit of the quantity over unit of the parameter].
         standard_errors: of each quantity, from the covariance of the parameters; None without one.
+        error: of the derivatives of a map that were read off tables, at most, from a sample of cells: of the
+            response and of sum and product of the multipliers, each over its size, or over its median where
+            that is larger. None where all were found orbit by orbit.
     """
 
     parameters: tuple[str, ...] = eqx.field(static=True)
@@ -38,6 +41,7 @@ class Sensitivity(eqx.Module):
     values: Mapping[str, Array]
     derivatives: Mapping[str, Array]
     standard_errors: Mapping[str, Array] | None
+    error: float | None
 
     def by(self, quantity: str, parameter: str) -> Array:
         """Give one derivative.
@@ -157,11 +161,11 @@ def sensitivity(
             )
     matrix = _covariance(names, covariance, covariance_of)
     at = jnp.stack([jnp.asarray(entries[name][1], dtype=float) for name in names])
-    values, slopes = of.slopes(names, at)
+    values, slopes, error = of.slopes(names, at)
     errors = None
     if matrix is not None:
         errors = {name: _standard_error(slope, jnp.asarray(matrix)) for name, slope in slopes.items()}
-    return Sensitivity(names, tuple(entries[name][0] for name in names), at, values, slopes, errors)
+    return Sensitivity(names, tuple(entries[name][0] for name in names), at, values, slopes, errors, error)
 
 
 def _covariance(

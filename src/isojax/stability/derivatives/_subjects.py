@@ -8,14 +8,26 @@ from jaxtyping import Array
 
 from ...models import Isolator
 from ..branch import CodimensionTwoPoint, SpecialPoint
-from ..map import StabilityMap, found_again
+from ..map import StabilityMap
 from ..orbit import Orbit
 from ..response import Resonance
 from ._find_again import find_again
+from ._map_slopes import map_slopes
 from ._parameter_values import DRIVE, differentiate, drive_values, with_values
 
-Derivatives = tuple[Mapping[str, Array], Mapping[str, Array]]
-"""Quantities by name, and their derivatives, parameter first."""
+
+class Derivatives(NamedTuple):
+    """Quantities and their derivatives.
+
+    Attributes:
+        values: the quantities, by name.
+        slopes: their derivatives, parameter first.
+        error: largest relative error of derivatives that were read off tables; None where none were.
+    """
+
+    values: Mapping[str, Array]
+    slopes: Mapping[str, Array]
+    error: float | None = None
 
 
 class Subject(NamedTuple):
@@ -65,22 +77,14 @@ def _of_answer(answer: Any, model: Isolator, drive: tuple[Array, Array], solved:
             found = find_again(answer, with_values(model, names, numbers), **given)
             return {name: quantity(found) for name, quantity in _QUANTITIES[type(answer)].items()}
 
-        return differentiate(quantities, at)
+        return Derivatives(*differentiate(quantities, at))
 
     return Subject(model, drive, solved, slopes)
 
 
 def _of_map(smap: StabilityMap) -> Subject:
     def slopes(names: tuple[str, ...], at: Array) -> Derivatives:
-        def quantities(numbers: Array) -> dict[str, Array]:
-            # Each cell has a drive of its own, which a parameter changes by as much in all.
-            more = (jnp.zeros(()), jnp.zeros(()))
-            found = found_again(
-                smap, with_values(smap.model, names, numbers), *drive_values(names, numbers, more)
-            )
-            return {name: quantity(found) for name, quantity in _QUANTITIES[StabilityMap].items()}
-
-        return differentiate(quantities, jnp.where(jnp.isnan(at), 0.0, at))
+        return Derivatives(*map_slopes(smap, names, at))
 
     return Subject(smap.model, (jnp.asarray(jnp.nan), jnp.asarray(jnp.nan)), (), slopes)
 
@@ -91,11 +95,6 @@ _QUANTITIES: dict[type, dict[str, Callable[[Any], Array]]] = {
         "amplitude": lambda orbit: orbit.amplitude,
         "multipliers": lambda orbit: orbit.floquet.multipliers,
         "spectral_radius": lambda orbit: orbit.floquet.spectral_radius,
-    },
-    StabilityMap: {
-        "response": lambda smap: smap.response,
-        "multipliers": lambda smap: smap.multipliers,
-        "spectral_radius": lambda smap: smap.spectral_radius,
     },
     SpecialPoint: {"value": lambda point: point.value, "y0": lambda point: point.y0},
     CodimensionTwoPoint: {
@@ -108,7 +107,7 @@ _QUANTITIES: dict[type, dict[str, Callable[[Any], Array]]] = {
         "spectral_radius": lambda resonance: resonance.orbit.floquet.spectral_radius,
     },
 }
-"""What is differentiated of each result."""
+"""What is differentiated of each result, but of a map."""
 
 
 def _of_function(function: Callable[[Isolator], Mapping[str, Array] | Array], model: Isolator) -> Subject:
@@ -117,7 +116,7 @@ def _of_function(function: Callable[[Isolator], Mapping[str, Array] | Array], mo
             given = function(with_values(model, names, numbers))
             return given if isinstance(given, Mapping) else {"value": jnp.asarray(given)}
 
-        return differentiate(quantities, at)
+        return Derivatives(*differentiate(quantities, at))
 
     return Subject(model, None, (), slopes)
 

@@ -68,6 +68,26 @@ class Found(NamedTuple):
     code: Int[np.ndarray, " candidate"]
 
 
+def blanked(found: Found, places: Int[np.ndarray, " orbit"], code: int) -> Found:
+    """Give orbits without some, whose numbers are NaN.
+
+    Args:
+        found: the orbits.
+        places: of those that are left out.
+        code: why.
+
+    Returns:
+        The orbits.
+    """
+    if not places.size:
+        return found
+    found = Found(*(np.array(values) for values in found))
+    found.code[places] = code
+    for values in (found.states, found.multipliers, found.radius, found.response):
+        values[places] = np.nan
+    return found
+
+
 def newton_step(
     model: Isolator, method: MapMethod, lane: Lane
 ) -> tuple[State, State, Float[Array, "state state"]]:

@@ -23,7 +23,7 @@ from ._sought import Sought
 from ._surface import Surface
 
 if TYPE_CHECKING:
-    from ._map import StabilityMap
+    from ._stability_map import StabilityMap
 
 _REACH = 3.0**0.5
 """Standard deviations of the maps either way: the nodes of Gauss and Hermite."""

@@ -12,6 +12,7 @@ import numpy as np
 from jax.experimental import multihost_utils
 
 from ..._cores import usable_cores
+from ..._kept import package_digest
 from ..._progress import Counted
 from ...models import write_whole
 from ._aligned import aligned
@@ -119,18 +120,22 @@ def claim_folder(folder: Path, identity: str) -> None:
         identity: word for this very map.
 
     Raises:
-        ValueError: if it belongs to another map.
+        ValueError: if it belongs to another map, or its chunks were computed by other code.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    label = folder / "map.json"
+    label, own = folder / "map.json", {"identity": identity, "code": package_digest()}
     if not label.exists():
         if any(folder.glob("*.npz")):
             raise ValueError(f"Argument `checkpoint` names {folder}, which holds chunks of no known map.")
-        write_whole(label, json.dumps({"identity": identity}) + "\n")
+        write_whole(label, json.dumps(own) + "\n")
         return
-    held = json.loads(label.read_text(encoding="utf-8")).get("identity")
-    if held != identity:
-        raise ValueError(
-            f"Argument `checkpoint` names {folder}, which holds the chunks of another map ({held}, not "
-            f"{identity}). Give an empty folder, or delete this one."
-        )
+    held = json.loads(label.read_text(encoding="utf-8"))
+    for key, words in (
+        ("identity", "the chunks of another map"),
+        ("code", "chunks that other code computed: other versions or sources of isojax, JAX or NumPy"),
+    ):
+        if held.get(key) != own[key]:
+            raise ValueError(
+                f"Argument `checkpoint` names {folder}, which holds {words} ({held.get(key)}, not "
+                f"{own[key]}). Give an empty folder, or delete this one."
+            )

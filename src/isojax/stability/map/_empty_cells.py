@@ -8,7 +8,15 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
 from ...models import Integrator, Isolator
-from ._batched_newton import FOUND, NO_FURTHER_ORBIT, NOT_CONVERGED, Found, padded, states_at_zero
+from ._batched_newton import (
+    FOUND,
+    NO_FURTHER_ORBIT,
+    NOT_CONVERGED,
+    Found,
+    blanked,
+    padded,
+    states_at_zero,
+)
 from ._map_error import lanes_of
 from ._map_method import MapMethod
 from ._single_orbits import single_orbits
@@ -135,12 +143,7 @@ def without_repeats(
         alike = run[:-apart] == run[apart:]
         alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= _SAME * scale[apart:], axis=1)
         gone.append(np.maximum(order[:-apart], order[apart:])[alike])
-    left_out = np.concatenate(gone)
-    found = Found(*(np.array(values) for values in found))
-    found.code[left_out] = NO_FURTHER_ORBIT
-    for values in (found.states, found.multipliers, found.radius, found.response):
-        values[left_out] = np.nan
-    return Cells(candidates, found, split)
+    return Cells(candidates, blanked(found, np.concatenate(gone), NO_FURTHER_ORBIT), split)
 
 
 def _blocks(count: int) -> list[np.ndarray]:

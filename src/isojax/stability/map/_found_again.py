@@ -26,9 +26,9 @@ from ..orbit import (
     value_and_jacobian,
     with_overtones,
 )
-from ._map import StabilityMap
 from ._map_method import Lane, MapMethod, kinks_between
 from ._nodes import half_peak_to_peak
+from ._stability_map import StabilityMap
 
 _CELL_CLOSED_TO, _MOST_CELL_STEPS = 1e-9, 12
 """Largest last step of Newton's method, over the size of the motion, and steps after which a cell fails."""
@@ -37,7 +37,7 @@ _CELLS_AT_ONCE, _SINGLE_ORBITS_AT_ONCE = 8192, 256
 """Cells computed at once, so that they stay in the cache: by one integration each, or as single orbits."""
 
 
-class _Cells(NamedTuple):
+class FoundCells(NamedTuple):
     """Orbits of some cells, cell first: see `StabilityMap`."""
 
     start: Float[Array, "cell state"]
@@ -74,38 +74,10 @@ def found_again(
         The map. An orbit that the map lacks is not looked for.
     """
     shape, states = smap.spectral_radius.shape, smap.start.shape[-1]
-    cells = smap.spectral_radius.size
-    force = jnp.broadcast_to(smap.amplitudes[:, None], shape).ravel() + more_force
-    frequency = jnp.broadcast_to(smap.frequencies, shape).ravel() + more_frequency
     held = np.isfinite(np.asarray(smap.spectral_radius).ravel())
-    with jax.ensure_compile_time_eval():
-        smooth = has_continuous_slopes(smap.model)
-    together = held & np.asarray(smap.split).ravel() & smooth
-    start, direction = smap.start.reshape(cells, states), smap.direction.reshape(cells, 2)
-    phases = smap.phases.reshape(cells, -1)
-    blank = _Cells(
-        jnp.full(start.shape, jnp.nan),
-        jnp.full(direction.shape, jnp.nan),
-        jnp.full(phases.shape, jnp.nan),
-        jnp.full((cells, states), jnp.nan + 0j),
-        jnp.full(cells, jnp.nan),
-        jnp.zeros(cells, bool),
-    )
-    steps = jnp.asarray(smap.integrator.steps_a_period(smap.model))
-    method = MapMethod(smap.integrator, smap.symmetric, smap.sides, steps)
-    kinks = kinks_between(smap.sides)
-    places = np.flatnonzero(together)
-    if places.size:
-        own = (start[places], direction[places], phases[places], force[places], frequency[places])
-        blank = _put(blank, places, _close(model, method, kinks, *own))
-    places = np.flatnonzero(held & ~together)
-    if places.size:
-        y0 = smap.y0.reshape(cells, states)[places]
-        found = _single(model, y0, force[places], frequency[places])
-        # Where kinks are passed is of no interest: they are not split at.
-        blank = _put(blank, places, found._replace(phases=phases[places]))
-    radius = modulus(blank.multipliers[:, 0]).reshape(shape)
-    good = blank.found.reshape(shape)
+    found = cells_again(smap, model, np.arange(held.size), more_force, more_frequency)
+    radius = modulus(found.multipliers[:, 0]).reshape(shape)
+    good = found.found.reshape(shape)
     # A place that held no orbit holds none now.
     ending = functools.partial(_ending, len(shape) == 3)
     for _ in shape:
@@ -116,11 +88,11 @@ def found_again(
         amplitudes=smap.amplitudes + more_force,
         frequencies=smap.frequencies + more_frequency,
         spectral_radius=radius,
-        multipliers=blank.multipliers.reshape(*shape, states),
-        start=blank.start.reshape(smap.start.shape),
-        direction=blank.direction.reshape(smap.direction.shape),
-        phases=blank.phases.reshape(smap.phases.shape),
-        response=blank.response.reshape(shape),
+        multipliers=found.multipliers.reshape(*shape, states),
+        start=found.start.reshape(smap.start.shape),
+        direction=found.direction.reshape(smap.direction.shape),
+        phases=found.phases.reshape(smap.phases.shape),
+        response=found.response.reshape(shape),
         count=jnp.sum(good, axis=0) if len(shape) == 3 else good.astype(int),
         result=ending(good, jnp.asarray(held).reshape(shape)),
         probability_stable=None,
@@ -130,6 +102,72 @@ def found_again(
     )
 
 
+def found_together(smap: StabilityMap) -> Bool[np.ndarray, " cell"]:
+    """Say of which cells of a map, flattened, the orbits are found again by one compiled step for all.
+
+    Args:
+        smap: the map.
+
+    Returns:
+        True there; the others are found as single orbits, or hold none.
+    """
+    with jax.ensure_compile_time_eval():
+        smooth = has_continuous_slopes(smap.model)
+    held = np.isfinite(np.asarray(smap.spectral_radius))
+    return (held & np.asarray(smap.split) & smooth).ravel()
+
+
+def cells_again(
+    smap: StabilityMap,
+    model: Isolator,
+    cells: Int[np.ndarray, " cell"],
+    more_force: Float[Array, ""] | float,
+    more_frequency: Float[Array, ""] | float,
+) -> FoundCells:
+    """Find the orbits of some cells again; see `found_again`.
+
+    Args:
+        smap: the map.
+        model: the isolator; traced or not.
+        cells: their places in the flattened map.
+        more_force: by how much the drive is larger [N, or m/s^2 for base excitation].
+        more_frequency: by how much its frequency is larger [Hz].
+
+    Returns:
+        The orbits; not found where the map holds none.
+    """
+    shape, states = smap.spectral_radius.shape, smap.start.shape[-1]
+    force = jnp.broadcast_to(smap.amplitudes[:, None], shape).ravel()[cells] + more_force
+    frequency = jnp.broadcast_to(smap.frequencies, shape).ravel()[cells] + more_frequency
+    held = np.isfinite(np.asarray(smap.spectral_radius).ravel())[cells]
+    together = found_together(smap)[cells]
+    start, direction = smap.start.reshape(-1, states)[cells], smap.direction.reshape(-1, 2)[cells]
+    phases = smap.phases.reshape(smap.spectral_radius.size, smap.phases.shape[-1])[cells]
+    steps = jnp.asarray(smap.integrator.steps_a_period(smap.model))
+    method = MapMethod(smap.integrator, smap.symmetric, smap.sides, steps)
+    kinks = kinks_between(smap.sides)
+    if together.all():
+        return _close(model, method, kinks, start, direction, phases, force, frequency)
+    found = FoundCells(
+        jnp.full(start.shape, jnp.nan),
+        jnp.full(direction.shape, jnp.nan),
+        jnp.full(phases.shape, jnp.nan),
+        jnp.full((cells.size, states), jnp.nan + 0j),
+        jnp.full(cells.size, jnp.nan),
+        jnp.zeros(cells.size, bool),
+    )
+    places = np.flatnonzero(together)
+    if places.size:
+        own = (start[places], direction[places], phases[places], force[places], frequency[places])
+        found = _put(found, places, _close(model, method, kinks, *own))
+    places = np.flatnonzero(held & ~together)
+    if places.size:
+        single = _single(model, smap.states_at_zero(cells[places]), force[places], frequency[places])
+        # Where kinks are passed is of no interest: they are not split at.
+        found = _put(found, places, single._replace(phases=phases[places]))
+    return found
+
+
 def _ending(coexisting: bool, good: Bool[Array, ""], held: Bool[Array, ""]) -> RESULTS:
     failed = RESULTS.not_converged
     if coexisting:
@@ -137,7 +175,7 @@ def _ending(coexisting: bool, good: Bool[Array, ""], held: Bool[Array, ""]) -> R
     return RESULTS.where(good, RESULTS.promote(diffrax.RESULTS.successful), failed)
 
 
-def _put(cells: _Cells, places: np.ndarray, found: _Cells) -> _Cells:
+def _put(cells: FoundCells, places: np.ndarray, found: FoundCells) -> FoundCells:
     return jax.tree.map(lambda all_of, some: all_of.at[places].set(some), cells, found)
 
 
@@ -151,10 +189,10 @@ def _close(
     phases: Float[Array, "cell crossing"],
     force: Float[Array, " cell"],
     frequency: Float[Array, " cell"],
-) -> _Cells:
+) -> FoundCells:
     states = start.shape[1]
 
-    def one(cell: tuple[Array, ...]) -> _Cells:
+    def one(cell: tuple[Array, ...]) -> FoundCells:
         start, direction, phases, push, rate = cell
         size = jnp.abs(start[0])
         inner = jnp.where(start[2:] == 0.0, size, jnp.abs(start[2:]))
@@ -198,7 +236,7 @@ def _close(
         found = (size <= method.integrator.map_tolerance) & jnp.all(jnp.isfinite(matrix))
         blank = jnp.where(found, 1.0, jnp.nan)
         way_of_drive = jnp.stack([jnp.cos(real[1]), jnp.sin(real[1])])
-        return _Cells(
+        return FoundCells(
             state * blank,
             way_of_drive * blank,
             real[states:] * blank,
@@ -258,14 +296,14 @@ def _single(
     y0: Float[Array, "cell state"],
     force: Float[Array, " cell"],
     frequency: Float[Array, " cell"],
-) -> _Cells:
-    def one(cell: tuple[Array, Array, Array]) -> _Cells:
+) -> FoundCells:
+    def one(cell: tuple[Array, Array, Array]) -> FoundCells:
         start, push, rate = cell
         orbit = find_periodic_orbit(model, Harmonic(push, rate), start=start)
         drive = recorded_sine(model, jnp.ones(()), rate).fundamental
         blank = jnp.where(orbit.result == RESULTS.successful, 1.0, jnp.nan)
         direction = jnp.stack([drive.sine, jnp.asarray(drive.cosine)]) * blank
         roots, good = orbit.floquet.multipliers, jnp.isfinite(blank)
-        return _Cells(orbit.y0, direction, jnp.zeros(0), roots, orbit.amplitude, good)
+        return FoundCells(orbit.y0, direction, jnp.zeros(0), roots, orbit.amplitude, good)
 
     return jax.lax.map(one, (y0, force, frequency), batch_size=_SINGLE_ORBITS_AT_ONCE)

@@ -1,7 +1,7 @@
 """Stability over a whole plane of drive amplitude and frequency."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +10,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float, Int
+from jaxtyping import Float
 
-from ..._results import RESULTS, cell_results
-from ..._show import number, shown
+from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import (
     EndsEstimated,
@@ -24,7 +23,7 @@ from ...models import (
     as_isolator,
     coefficient_errors,
 )
-from ..orbit import Sine, ascending, fewest_steps, integrator_for, is_odd, refuse_transformed
+from ..orbit import ascending, fewest_steps, integrator_for, is_odd, refuse_transformed
 from ._batched_newton import (
     FOUND,
     NO_FURTHER_ORBIT,
@@ -34,15 +33,15 @@ from ._batched_newton import (
     STICKS,
     CellSolver,
     Found,
-    states_at_zero,
+    blanked,
 )
-from ._chance import chance_words, find_chances, quasi_draws
+from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._empty_cells import Cells, fill_empty, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
-from ._map_method import Lane, MapMethod
 from ._single_orbits import SingleOrbits
 from ._sought import MapRun, Sought, seek
+from ._stability_map import StabilityMap
 from ._starts import Candidates, joined
 from ._surface import MapWindow
 from ._window_steps import check_steps, window_integrator
@@ -56,127 +55,12 @@ _INSTEAD = (
 )
 """What to use where JAX transforms the model of a map."""
 
-_ROWS, _COLUMNS = 12, 60
-"""Size of the map in characters."""
-
-
-@shown
-class StabilityMap(eqx.Module):
-    """Periodic orbits and their multipliers over drive amplitude and frequency.
-
-    With `coexisting` every array of a cell has an axis `orbit` in front, by rising displacement; places that
-    a cell does not fill are NaN.
-
-    Attributes:
-        model: the isolator.
-        amplitudes: drive amplitudes [N, or m/s^2 for base excitation].
-        frequencies: [Hz].
-        spectral_radius: largest modulus of the multipliers; stable below one.
-        multipliers: Floquet multipliers over one drive period.
-        start: state of each orbit at the phase at which it is largest.
-        direction: drive over its amplitude, sine and cosine part, with the phase counted from there.
-        phases: where each orbit passes kinks, counted from there.
-        sides: signs of the kinks on the pieces between, alike for all orbits that are split.
-        split: whether an orbit was split there; else it was integrated with four times the steps.
-        response: half the peak-to-peak displacement [m].
-        count: orbits found in each cell.
-        result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
-        error: of a multiplier at most, from a sample of cells against steps three times finer.
-        symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
-        integrator: steps a period that were taken.
-        probability_stable: chance that the cell holds no unstable orbit, coexisting ones included, where a
-            fit was given; NaN where the maps that it rests on do not reach.
-        probability_coexisting: chance that the cell holds several orbits, where a fit was given.
-        standard_errors: of `response` and `spectral_radius` of each orbit, where a fit was given; NaN where
-            orbits may appear or vanish.
-        chance_error: of a chance near a half, at most, on average over the map, where a fit was given: what a
-            map of one draw of all coefficients shows. Where it is large, map drawn models and count.
-    """
-
-    model: Isolator
-    amplitudes: Float[Array, " amplitude"]
-    frequencies: Float[Array, " frequency"]
-    spectral_radius: Float[Array, "*orbit amplitude frequency"]
-    multipliers: Complex[Array, "*orbit amplitude frequency multiplier"]
-    start: Float[Array, "*orbit amplitude frequency state"]
-    direction: Float[Array, "*orbit amplitude frequency 2"]
-    phases: Float[Array, "*orbit amplitude frequency crossing"]
-    sides: Float[Array, "piece kink"]
-    split: Bool[Array, "*orbit amplitude frequency"]
-    response: Float[Array, "*orbit amplitude frequency"]
-    count: Int[Array, "amplitude frequency"]
-    result: RESULTS = eqx.field(converter=cell_results)
-    error: float
-    symmetric: bool = eqx.field(static=True)
-    integrator: Integrator
-    probability_stable: Float[Array, "amplitude frequency"] | None = None
-    probability_coexisting: Float[Array, "amplitude frequency"] | None = None
-    standard_errors: Mapping[str, Float[Array, "*orbit amplitude frequency"]] | None = None
-    chance_error: float | None = None
-
-    @property
-    def stable(self) -> Array:
-        """Whether each orbit is stable; False where there is none."""
-        return self.spectral_radius < 1.0
-
-    @property
-    def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
-        """State of each orbit at t = 0 of the recorded drive, by integration from `start`."""
-        force = jnp.broadcast_to(self.amplitudes[:, None], self.spectral_radius.shape).ravel()
-        frequency = jnp.broadcast_to(self.frequencies, self.spectral_radius.shape).ravel()
-        state = tuple(self.start.reshape(force.size, -1).T)
-        sine, cosine = self.direction.reshape(force.size, 2).T * force[None]
-        lane = Lane(state, Sine(sine, cosine, frequency), (), self.response.ravel())
-        steps = jnp.asarray(self.integrator.steps_a_period(self.model))
-        method = MapMethod(self.integrator, self.symmetric, None, steps)
-        return jnp.stack(states_at_zero(self.model, method, lane), axis=-1).reshape(self.start.shape)
-
-    def _headline(self) -> str:
-        count, radius = np.asarray(self.count), np.asarray(self.spectral_radius)
-        found = radius[np.isfinite(radius)]
-        cells = {"with an unstable orbit": self._unstable}
-        if self._all_sought:
-            cells["with coexisting orbits"] = count > 1
-        cells["without any"] = count == 0
-        counted = ", ".join(f"{int(np.sum(which))} {words}" for words, which in cells.items())
-        largest = number(found.max()) if found.size else "unknown"
-        grid = " × ".join(map(str, count.shape))
-        return f"{grid} cells of amplitude and frequency, {counted}; largest |mu| {largest}"
-
-    @property
-    def _all_sought(self) -> bool:
-        return np.ndim(self.spectral_radius) > np.ndim(self.count)
-
-    @property
-    def _unstable(self) -> np.ndarray:
-        radius = np.asarray(self.spectral_radius)
-        return np.any((radius >= 1.0).reshape(-1, *radius.shape[-2:]), axis=0)
-
-    def _rows(self) -> list[str]:
-        return ["model", "amplitudes", "frequencies", "response", "symmetric", "error", "result"]
-
-    def _lines(self) -> list[str]:
-        count, unstable = np.asarray(self.count), self._unstable
-        marks = np.where(count == 0, "?", np.where(count > 1, "2", "."))
-        marks = np.where((count > 1) & (count < 10), count.astype(str), marks)
-        marks = np.where((count == 1) & unstable, "x", marks)
-        forces, band = np.asarray(self.amplitudes), np.asarray(self.frequencies)
-        rows = np.unique(np.linspace(0, forces.size - 1, min(_ROWS, forces.size)).round().astype(int))
-        columns = np.unique(np.linspace(0, band.size - 1, min(_COLUMNS, band.size)).round().astype(int))
-        drawn = [f"  {forces[row]:>10.4g} |{''.join(marks[row, columns])}" for row in rows[::-1]]
-        chances = chance_words(self)
-        legend = (
-            "  . one stable orbit, x one unstable orbit, 2 to 9 coexisting orbits, ? none found"
-            if self._all_sought
-            else "  the orbit of smallest motion in each cell: . stable, x unstable, ? none found"
-        )
-        return [
-            *drawn,
-            f"  {'F0':>10} +{'-' * columns.size}",
-            f"  {'f [Hz]':>10}  {band[0]:.4g} to {band[-1]:.4g}",
-            legend,
-            *([f"  with all orbits of a cell, {chances}"] if chances else []),
-        ]
+_INSTEAD_OF_AXES = (
+    "Make the map outside: `isojax.sensitivity(smap)` differentiates its cells by `drive.amplitude` and "
+    "`drive.frequency`, and `isojax.find_again(orbit, model, amplitude=..., frequency=...)` finds an orbit "
+    "again for any drive under jax.jit, jax.vmap, jax.jacfwd and jax.grad."
+)
+"""What to use where JAX transforms the drive of a map."""
 
 
 def stability_map(
@@ -223,10 +107,10 @@ def stability_map(
         The map. Where nothing converged the numbers are NaN and `result` says why.
 
     Raises:
-        ValueError: if JAX traces or differentiates the model (see `find_again`), a grid is empty, not
-            positive or not ascending, `reach` is below one, `chunk` is no positive count, the checkpoint
-            belongs to another map, or the fit failed, leaves a coefficient undetermined or is of another
-            model.
+        ValueError: if JAX traces or differentiates the model or a grid (see `find_again`), a grid is empty,
+            not positive or not ascending, `reach` is below one, `chunk` is no positive count, the checkpoint
+            is of another map or of other code, or the fit failed, leaves a coefficient undetermined or is of
+            another model.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Floquet multipliers as in Nayfeh & Balachandran 1995, ch. 3; the paper, section 5.
@@ -240,6 +124,8 @@ def stability_map(
     model = as_isolator(model)
     check_float64()
     refuse_transformed(model, _INSTEAD)
+    for name, axis in (("amplitudes", amplitudes), ("frequencies", frequencies)):
+        refuse_transformed(axis, _INSTEAD_OF_AXES, name)
     if integrator is not None:
         integrator = integrator_for(model, integrator)
     carried = None if fit is None else coefficient_errors(fit, model)
@@ -318,18 +204,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     if run.folder is not None:
         axes = forces, band, run.coexisting, window.reach
         claim_folder(run.folder, fingerprint(model, integrator, *axes, run.chunk))
-    parts, errors = [], [sought.reading_error]
-    for name, solver, candidates in sought.groups:
-        parts.append(run_chunks(solver, candidates, run.chunk, run.folder, name, run.progress))
-        if isinstance(solver, CellSolver):
-            errors.append(sampled_error(solver, candidates, parts[-1], window))
-        elif isinstance(solver, SingleOrbits):
-            errors.append(integrator.map_orbit_error)
-    lists = [group.candidates for group in sought.groups]
-    split = np.repeat(
-        [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
-    )
-    known = Cells(joined(lists), joined(parts), split)
+    known, errors, unconfirmed = _known_cells(sought, window, run)
     filled = fill_empty(model, integrator, half, window, known)
     candidates, found, split = without_repeats(model, integrator, half, window, filled)
     if np.sum(filled.found.code == FOUND) > np.sum(known.found.code == FOUND):
@@ -346,12 +221,33 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         frequencies=jnp.asarray(band),
         result=result,
         error=error,
+        unconfirmed=unconfirmed,
         sides=jnp.asarray(sought.surface.sides),
         symmetric=half,
         integrator=integrator,
         **fields,
     )
     return smap, sought
+
+
+def _known_cells(sought: Sought, window: MapWindow, run: MapRun) -> tuple[Cells, list[float], int]:
+    """Give the orbits of all groups, the errors of these, and how many of a sample finer steps deny."""
+    parts, errors, unconfirmed = [], [sought.reading_error], 0
+    for name, solver, candidates in sought.groups:
+        part = run_chunks(solver, candidates, run.chunk, run.folder, name, run.progress)
+        if isinstance(solver, CellSolver):
+            error, denied = sampled_error(solver, candidates, part, window)
+            part = blanked(part, denied, NOT_ACCURATE)
+            errors.append(error)
+            unconfirmed += denied.size
+        elif isinstance(solver, SingleOrbits):
+            errors.append(solver.method.integrator.map_orbit_error)
+        parts.append(part)
+    lists = [group.candidates for group in sought.groups]
+    split = np.repeat(
+        [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
+    )
+    return Cells(joined(lists), joined(parts), split), errors, unconfirmed
 
 
 def _endings() -> list[RESULTS]:

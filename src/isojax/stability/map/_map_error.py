@@ -1,17 +1,20 @@
 """How well a map is integrated, from a sample of its cells, and how many steps it takes."""
 
 import math
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Int
 
 from ..orbit import Sine
 from ._batched_newton import CELLS_TOGETHER, FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
+from ._grids import LEAST_SLOPE
 from ._map_method import Lane
 from ._starts import Candidates
-from ._surface import LEAST_SLOPE, MapWindow
+from ._surface import MapWindow
 
 _MARGIN = 1.25
 """On the largest error of a sample: the worst cell of a map is seldom in it."""
@@ -23,7 +26,23 @@ _FINER_STEPS = 3
 """Times the steps of a map with which its error is found."""
 
 
-def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, window: MapWindow) -> float:
+class SampledError(NamedTuple):
+    """What a sample of cells says of a map.
+
+    Attributes:
+        error: largest error of a multiplier, with a margin for the cells that the sample lacks; NaN where
+            there is no cell to compare.
+        unconfirmed: places of the sampled orbits that finer steps did not find, so that nothing is known of
+            their error.
+    """
+
+    error: float
+    unconfirmed: Int[np.ndarray, " orbit"]
+
+
+def sampled_error(
+    solver: CellSolver, candidates: Candidates, found: Found, window: MapWindow
+) -> SampledError:
     """Give the integration error of multipliers, from a sample of cells solved with steps three times finer.
 
     The distance of a multiplier from the finer ones is their characteristic polynomial there over its slope.
@@ -37,11 +56,11 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
         window: of the map.
 
     Returns:
-        The largest error, with a margin for the cells that the sample lacks; NaN where nothing was found.
+        The error, and the orbits of the sample that it says nothing of.
     """
     good = np.flatnonzero(found.code == FOUND)
     if not good.size:
-        return float("nan")
+        return SampledError(math.nan, good)
     picked = good[np.unique(np.linspace(0, good.size - 1, SAMPLED).astype(int))]
     method = solver.method.finer(_FINER_STEPS)
 
@@ -57,7 +76,9 @@ def sampled_error(solver: CellSolver, candidates: Candidates, found: Found, wind
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]
     ratio = np.prod(others, axis=-1) / np.maximum(np.prod(others, axis=-1), LEAST_SLOPE)
-    return _MARGIN * float(np.nanmax(nearest * ratio))
+    known = finer.code == FOUND
+    largest = float((nearest * ratio)[known].max()) if known.any() else math.nan
+    return SampledError(_MARGIN * largest, picked[~known])
 
 
 def solved_sample(solver: CellSolver, some: Candidates, limit: float | None = None) -> Found:
@@ -94,7 +115,7 @@ def steps_needed(solver: CellSolver, candidates: Candidates, window: MapWindow) 
         # Where the motion is too fast for the steps there is no orbit, and no error to go by.
         solver, taken = eqx.tree_at(lambda it: it.method, solver, solver.method.finer(2)), 2 * taken
         found = solved_sample(solver, some, FULLY_CLOSED)
-    error = sampled_error(solver, some, found, window)
+    error = sampled_error(solver, some, found, window).error
     if not error > 0.0:
         return integrator.steps_per_period
     return steps_for(taken, error, integrator.map_error)

@@ -79,8 +79,16 @@ class NodeOrbits(NamedTuple):
     closed: Bool[np.ndarray, " node"]
 
 
-def _in_blocks(work: Callable[..., Any], *values: np.ndarray) -> Any:
-    """Do the work on blocks of nodes, as many at once as there are cores."""
+def in_blocks(work: Callable[..., Any], *values: np.ndarray) -> Any:
+    """Do the work on blocks of nodes, as many at once as there are cores.
+
+    Args:
+        work: on as many nodes as one compiled batch holds.
+        *values: of the nodes, node first.
+
+    Returns:
+        What the work gives, of all nodes.
+    """
     count = values[0].shape[0]
 
     def one(begin: int) -> Any:
@@ -116,7 +124,7 @@ def node_starts(
         The orbits; where none was found the balance.
     """
     return NodeStarts(
-        *_in_blocks(
+        *in_blocks(
             lambda a, f: _starts(model, integrator, half, jnp.asarray(rest), a, f), amplitude, frequency
         )
     )
@@ -201,7 +209,7 @@ def closed_nodes(
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
         return _closed(model, method, kinks, jnp.asarray(rest), *map(jnp.asarray, rows))
 
-    return NodeOrbits(*_in_blocks(work, amplitude, frequency, start))
+    return NodeOrbits(*in_blocks(work, amplitude, frequency, start))
 
 
 @quick_jit
@@ -297,7 +305,7 @@ def node_responses(
     Returns:
         The sizes.
     """
-    return _in_blocks(
+    return in_blocks(
         lambda *rows: _responses(model, integrator, half, jnp.asarray(rest), *rows),
         amplitude,
         frequency,

@@ -125,12 +125,15 @@ def seek(
         # be no maxima: neither its numbers nor its order of kinks are those of the orbit.
         read, shared = np.zeros_like(read), np.zeros_like(shared)
     if read.any():
-        some = _chosen(candidates, _sample(surface, candidates, np.flatnonzero(read)))
+        places = _sample(surface, candidates, np.flatnonzero(read))
+        some = _chosen(candidates, places)
         # In the lanes of the map, which then compiles nothing more.
         by_reading = reader(some, max(lanes_of(int(np.count_nonzero(read)), run.chunk), SAMPLED))
-        error = sampled_error(split, some, by_reading, window)
-        if error > integrator.map_error:
-            own = sampled_error(split, some, solved_sample(split, some), window)
+        error, unconfirmed = sampled_error(split, some, by_reading, window)
+        # What finer steps do not find is solved for itself, and judged again.
+        read[places[unconfirmed]] = False
+        if not error <= integrator.map_error:
+            own = sampled_error(split, some, solved_sample(split, some), window).error
             if not error <= 2.0 * own:
                 read, error = np.zeros_like(read), math.nan
     if read.all():

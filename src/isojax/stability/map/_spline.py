@@ -64,6 +64,13 @@ def spline_pieces(nodes: Float[np.ndarray, " node"]) -> Pieces:
     return Pieces(breaks, unit.c, np.stack(own))
 
 
+def spline_slope_matrix(
+    nodes: Float[np.ndarray, " node"], places: Float[np.ndarray, " place"]
+) -> Float[np.ndarray, "place node"]:
+    """Give what turns values at nodes into a spline's slopes."""
+    return make_interp_spline(nodes, np.eye(nodes.size), k=SPLINE_DEGREE).derivative()(places)
+
+
 def spline_matrix(
     nodes: Float[np.ndarray, " node"], places: Float[np.ndarray, " place"]
 ) -> Float[np.ndarray, "place node"]:

@@ -11,21 +11,15 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
-from scipy.ndimage import distance_transform_edt, maximum_filter
+from scipy.ndimage import maximum_filter
 
 from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
-from ..orbit import integrator_for, integrator_over, response_amplitudes, rest_displacement
-from ._map_method import MapMethod
-from ._nodes import closed_nodes, node_responses, node_starts
-from ._shared_kinks import AROUND, SharedKinks, shared_kinks
+from ..orbit import is_odd, response_amplitudes, rest_displacement
+from ._grids import REFINEMENTS, Grid, filled, first_grid, node_at
+from ._nodes import node_responses
+from ._shared_kinks import AROUND
 from ._spline import spline_matrix, spline_pieces
-
-_FIRST_NODES = (49, 17)
-"""Displacement amplitudes and frequencies of the first grid; each further one halves the distances."""
-
-REFINEMENTS = 2
-"""Times at most that the distances of the nodes are halved."""
 
 _FEW = 0.002
 """Share of the nodes whose orbits may be left to Newton's method."""
@@ -39,15 +33,6 @@ _ROWS_BEYOND = 2
 
 PARTS = 8
 """Parts of a spline's piece between whose ends roots are sought."""
-
-_GAIN = 64.0
-"""How many times smaller a spline of degree five makes its error with nodes half as far apart, where the
-function is smooth; a sample of cells then says whether it is."""
-
-LEAST_SLOPE = 0.1
-"""Smallest slope of the characteristic polynomial that an error of a multiplier is divided by: where two
-multipliers all but coincide they separate like the square root of any error, and their distance would say
-more of the place than of the error."""
 
 
 class MapWindow(NamedTuple):
@@ -108,36 +93,22 @@ class Surface(NamedTuple):
         return np.einsum("ptk,pk->tp", own, share[:, None] ** np.arange(own.shape[-1]))
 
 
-class _Grid(NamedTuple):
-    """Orbits at the nodes of a grid.
-
-    Attributes:
-        logarithms: of the displacement amplitudes [m].
-        frequencies: [Hz].
-        tables: those of the surface, but the drive over the displacement amplitude.
-        error: of multipliers read off, by the nodes that the grid before lacked; infinite at open orbits.
-    """
-
-    logarithms: Float[np.ndarray, " displacement"]
-    frequencies: Float[np.ndarray, " frequency"]
-    tables: Float[np.ndarray, "table frequency displacement"]
-    error: Float[np.ndarray, "frequency displacement"]
-
-    def at(
-        self, logarithms: np.ndarray, frequencies: np.ndarray
-    ) -> Float[np.ndarray, "table frequency node"]:
-        """Give the tables elsewhere."""
-        rows, columns = (
-            spline_matrix(self.frequencies, frequencies),
-            spline_matrix(self.logarithms, logarithms),
-        )
-        return rows @ (self.tables @ columns.T)
-
-
 @quick_jit
 def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:
     rest = rest_displacement(model)
     return rest, response_amplitudes(model, frequencies, amplitudes, rest)
+
+
+def displacement_at_rest(model: Isolator) -> float:
+    """Give the displacement at rest [m].
+
+    Args:
+        model: the isolator.
+
+    Returns:
+        The displacement, from which those of a surface count.
+    """
+    return 0.0 if is_odd(model) else float(_forces(model, jnp.ones(1), jnp.array([1e-9]))[0])
 
 
 def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, float]:
@@ -189,16 +160,13 @@ def find_surface(
     """
     rest, low, high = displacements(model, window)
     ends = math.log(low), math.log(high)
-    start, kinks = _start_grid(model, integrator, half, rest, ends, window.frequencies)
-    steps = jnp.asarray(integrator.steps_a_period(model))
-    method = MapMethod(integrator, half, jnp.asarray(kinks.sides), steps)
-    ends, grid = _ends_needed(start, window), start
+    first = first_grid(model, integrator, half, rest, ends, window.frequencies)
+    start, kinks = first.grid, first.kinks
+    first = first._replace(ends=_ends_needed(start, window))
+    grid = start
     for level in range(1, 1 + REFINEMENTS):
-        nodes = _axes(ends, window.frequencies, level)
-        own = kinks.shared[np.ix_(_place(start.frequencies, nodes[1]), _place(start.logarithms, nodes[0]))]
-        rows = 1 if nodes[1] is window.frequencies else 2
-        grid = _closed_grid(model, method, rest, grid, nodes, rows, own)
-        if not own.any() or not _needs_doubling(grid, window, goal):
+        grid = first.finer(model, grid, level)
+        if not kinks.shared.any() or not _needs_doubling(grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
     tables = _with_responses(model, integrator, half, rest, grid)
@@ -216,53 +184,15 @@ def find_surface(
     force = np.sqrt(square)
     parts = np.linspace(pieces.breaks[:-1], pieces.breaks[1:], 2 * PARTS + 1, axis=1)[:, 1::2].ravel()
     shared = kinks.shared[
-        np.ix_(_place(start.frequencies, window.frequencies), _place(start.logarithms, parts))
+        np.ix_(node_at(start.frequencies, window.frequencies), node_at(start.logarithms, parts))
     ]
     around = maximum_filter(grid.error, [2 * reach + 1 for reach in AROUND])
-    error = around[np.ix_(_place(grid.frequencies, window.frequencies), _place(grid.logarithms, parts))]
+    error = around[np.ix_(node_at(grid.frequencies, window.frequencies), node_at(grid.logarithms, parts))]
     error = np.where(shared, error, np.inf)
     return Surface(rest, pieces.breaks, window.frequencies, polynomials, force, kinks.sides, shared, error)
 
 
-def _start_grid(
-    model: Isolator,
-    integrator: Integrator,
-    half: bool,
-    rest: float,
-    ends: tuple[float, float],
-    frequencies: Float[np.ndarray, " frequency"],
-) -> tuple[_Grid, SharedKinks]:
-    """Find orbits that are not split, without their invariants, and the kinks that most of them pass."""
-    logarithms, band = _axes(ends, frequencies, 0)
-    usual = integrator_over(model, integrator_for(model, None), np.exp(ends), frequencies)
-    frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
-    # Starts need no more steps where the map takes more, and what is compiled for one grid serves the next.
-    steps = min(integrator.steps_per_period, usual.steps_per_period)
-    coarse = integrator.with_steps(2 * (steps // 4 + 2))
-    starts = node_starts(model, coarse, half, rest, amplitude, frequency)
-    shape = len(band), len(logarithms)
-    kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
-    if model.slides:
-        # At its largest displacement such a motion jumps from law to law: nodes there cannot be closed.
-        kinks = kinks._replace(shared=np.zeros(shape, bool))
-    unknown = _filled(starts.unknown.T.reshape(-1, *shape)), np.moveaxis(kinks.phases, -1, 0)
-    tables = np.concatenate([*unknown, np.zeros((2, *shape)), np.ones((1, *shape))])
-    return _Grid(logarithms, band, tables, np.full(shape, np.inf)), kinks
-
-
-def _axes(ends: tuple[float, float], frequencies: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray]:
-    """Give logarithms of displacement amplitudes and frequencies of a grid."""
-    displacements, columns = (((count - 1) << level) + 1 for count in _FIRST_NODES)
-    if len(frequencies) <= columns:
-        return np.linspace(*ends, displacements), frequencies
-    # Denser at the ends, where a spline has fewest neighbours.
-    middle, reach = 0.5 * (frequencies[0] + frequencies[-1]), 0.5 * (frequencies[-1] - frequencies[0])
-    return np.linspace(*ends, displacements), middle - reach * np.cos(
-        np.pi * np.arange(columns) / (columns - 1)
-    )
-
-
-def _ends_needed(grid: _Grid, window: MapWindow) -> tuple[float, float]:
+def _ends_needed(grid: Grid, window: MapWindow) -> tuple[float, float]:
     """Give the least and largest logarithm of the displacements that the forces hold, with some room."""
     force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
     held = np.flatnonzero((force <= window.amplitudes[-1]).any(axis=0))
@@ -270,41 +200,8 @@ def _ends_needed(grid: _Grid, window: MapWindow) -> tuple[float, float]:
     return float(grid.logarithms[0]), float(grid.logarithms[last])
 
 
-def _place(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Give the node at or behind each place."""
-    return np.searchsorted(nodes, places).clip(0, len(nodes) - 1)
-
-
-def _closed_grid(
-    model: Isolator,
-    method: MapMethod,
-    rest: float,
-    coarse: _Grid,
-    nodes: tuple[np.ndarray, np.ndarray],
-    every: int,
-    shared: Bool[np.ndarray, "frequency node"],
-) -> _Grid:
-    """Close the orbits at other nodes that share the order of kinks; the others stay as the grid has them.
-
-    The error is that of a spline through every second displacement, and every so many frequencies.
-    """
-    tables, error = coarse.at(*nodes), np.full(shared.shape, np.inf)
-    if not shared.any():
-        return _Grid(*nodes, tables, error)
-    frequency, amplitude = np.meshgrid(nodes[1], np.exp(nodes[0]), indexing="ij")
-    found = closed_nodes(model, method, rest, amplitude[shared], frequency[shared], tables[:-3, shared].T)
-    closed = shared.copy()
-    closed[shared] = found.closed
-    tables[:-1, closed] = np.concatenate([found.unknown, found.invariants], axis=1)[found.closed].T
-    tables[-3:-1] = _filled(np.where(closed, tables[-3:-1], np.nan))
-    # At the frequencies of the map itself no spline is needed over them.
-    fewer = _Grid(nodes[0][::2], nodes[1][::every], tables[:, ::every, ::2], error)
-    error[closed] = _reading_error(fewer.at(*nodes), tables, nodes[0], method.half)[closed] / _GAIN
-    return _Grid(*nodes, tables, error)
-
-
 def _with_responses(
-    model: Isolator, integrator: Integrator, half: bool, rest: float, grid: _Grid
+    model: Isolator, integrator: Integrator, half: bool, rest: float, grid: Grid
 ) -> Float[np.ndarray, "table frequency displacement"]:
     """Give the tables of a grid with half the peak-to-peak displacements; without, of what slides."""
     if model.slides:
@@ -314,43 +211,12 @@ def _with_responses(
     sizes = node_responses(model, integrator, half, rest, amplitude.ravel(), frequency.ravel(), unknown)
     sizes = sizes.reshape(1, *amplitude.shape)
     # Of a motion that ran away there is none.
-    sizes = _filled(np.where(sizes < _LARGEST_RESPONSE, sizes, np.nan))
+    sizes = filled(np.where(sizes < _LARGEST_RESPONSE, sizes, np.nan))
     return np.concatenate([grid.tables[:-1], sizes])
 
 
-def _reading_error(
-    read: np.ndarray, tables: np.ndarray, logarithms: np.ndarray, half: bool
-) -> Float[np.ndarray, "frequency displacement"]:
-    """Give the error of multipliers that are read off tables at the same force, to first order."""
-    force, read_force = (np.log(np.hypot(own[0], own[1])) + logarithms for own in (tables, read))
-    half_trace, determinant = tables[-3:-1]
-    slopes = [np.gradient(values, logarithms, axis=1) for values in (force, half_trace, determinant)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        moved = (read_force - force) / slopes[0]
-        trace_error = read[-3] - half_trace - slopes[1] * moved
-        determinant_error = read[-2] - determinant - slopes[2] * moved
-        spread = np.sqrt((half_trace**2 - determinant).astype(complex))
-        worst = np.zeros(force.shape)
-        for sign in (1.0, -1.0):
-            root = half_trace + sign * spread
-            error = np.abs(determinant_error - 2.0 * root * trace_error) / np.maximum(
-                2.0 * np.abs(spread), LEAST_SLOPE
-            )
-            worst = np.maximum(worst, error * (2.0 * np.abs(root) if half else 1.0))
-    return np.where(np.isfinite(worst), worst, np.inf)
-
-
-def _needs_doubling(grid: _Grid, window: MapWindow, goal: float) -> bool:
+def _needs_doubling(grid: Grid, window: MapWindow, goal: float) -> bool:
     """Say whether more of the orbits that are asked for than a few cannot be read off."""
     force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
     asked = (force >= window.amplitudes[0]) & (force <= window.amplitudes[-1])
     return bool(asked.any() and np.mean(grid.error[asked] > goal) > _FEW)
-
-
-def _filled(tables: Float[np.ndarray, "table frequency displacement"]) -> np.ndarray:
-    """Give the nearest node's values where there are none: one such would spoil all splines."""
-    lost = ~np.isfinite(tables).all(axis=0)
-    if not lost.any() or lost.all():
-        return tables
-    nearest = distance_transform_edt(lost, return_distances=False, return_indices=True)
-    return tables[:, *np.asarray(nearest)]

@@ -24,18 +24,19 @@ def refuse_traced(*values: object) -> None:
         )
 
 
-def refuse_transformed(model: object, instead: str) -> None:
-    """Refuse a model that JAX traces or differentiates, where an answer is put together on the host.
+def refuse_transformed(values: object, instead: str, name: str = "model") -> None:
+    """Refuse numbers that JAX traces or differentiates, where an answer is put together on the host.
 
     Args:
-        model: pytree whose numbers must be plain ones.
+        values: pytree whose numbers must be plain ones.
         instead: what to use, a sentence.
+        name: of the argument.
 
     Raises:
         ValueError: if JAX transforms the function that this is called from.
     """
-    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(model)):
+    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(values)):
         raise ValueError(
-            "Argument `model` must hold plain numbers, because this answer is put together on the host, but "
-            f"JAX is tracing or differentiating it. {instead}"
+            f"Argument `{name}` must hold plain numbers, because this answer is put together on the host, "
+            f"but JAX is tracing or differentiating it. {instead}"
         )
