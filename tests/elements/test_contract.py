@@ -377,7 +377,8 @@ def closed(model):
 
     def improve(state, _):
         # One copy of the period map in the compiled code, which is most of this test's time.
-        end, matrix = jax.vmap(lambda one: jax.jvp(moved, (state,), (one,)), out_axes=(None, 1))(jnp.eye(state.size))
+        units = jnp.eye(state.size)
+        end, matrix = jax.vmap(lambda one: jax.jvp(moved, (state,), (one,)), out_axes=(None, 1))(units)
         step = jnp.linalg.solve(matrix - jnp.eye(state.size), end - state)
         return state - step, (matrix, (end - state)[:2])
 

@@ -85,7 +85,8 @@ def imposed_internal(
 
     def relaxed(internal: tuple[Lanes, ...], x: Lanes, v: Lanes) -> list[Lanes]:
         """Give `1 - gamma h J`, with the rate at which each internal state relaxes by itself for J."""
-        units = tuple(one.reshape(-1, *(1,) * zero.ndim) + 0.0 * zero for one in jnp.eye(len(internal)))
+        mapped = (len(internal), *zero.shape)
+        units = (jnp.broadcast_to(one.reshape(-1, *(1,) * zero.ndim), mapped) for one in jnp.eye(mapped[0]))
         moved = jax.vmap(lambda *unit: jax.jvp(lambda *s: rates(s, x, v), internal, unit)[1])(*units)
         slopes = [rate[own] for own, rate in enumerate(moved)]
         # What relaxes damps; nothing else makes a step unstable.
