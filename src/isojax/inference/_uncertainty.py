@@ -20,7 +20,7 @@ from ..models import (
 )
 from ._evaluate import NOT_FINITE, evaluate
 
-_NEAR = 2.0
+_UNDECIDED_WITHIN = 2.0
 """Standard errors of a probability within which the confidence asked for counts as reached or missed by
 chance."""
 
@@ -81,7 +81,7 @@ class UncertainQuantity(NamedTuple):
     def _lines(self) -> list[str]:
         who = "Draws" if self.failed else "The fit"
         lines = [f"{who} without a value: {self.reason}"] if self.reason else []
-        near = np.abs(self.probability - self.confidence) <= _NEAR * self.probability_error
+        near = np.abs(self.probability - self.confidence) <= _UNDECIDED_WITHIN * self.probability_error
         if np.any(near & (self.probability < 1.0)):
             lines.append(
                 f"Whether the probability reaches {self.confidence:.0%}, at which the interval jumps, takes "

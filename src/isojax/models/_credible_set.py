@@ -15,7 +15,7 @@ _BEND = 0.1
 _BY_CHANCE = 3.0
 """Standard errors of an end of the interval, by the count of draws, up to which the two differ by chance."""
 
-_ROUNDING = 1e-6
+_SEARCH_ROUNDING = 1e-6
 """Share of the value up to which the two differ by the tolerance of a search."""
 
 _DRAWS_BEYOND = 2
@@ -79,7 +79,9 @@ def credible_set(
     # Of a quantity that does not bend the draws are normal, and with them the error of their quantiles.
     chance = np.sqrt(tail * (1.0 - tail) / np.maximum(held, 1)) / norm.pdf(ndtri(tail)) * error
     with np.errstate(invalid="ignore"):
-        allowed = np.maximum(np.maximum(_BEND * 2.0 * spread, _BY_CHANCE * chance), _ROUNDING * np.abs(value))
+        allowed = np.maximum(
+            np.maximum(_BEND * 2.0 * spread, _BY_CHANCE * chance), _SEARCH_ROUNDING * np.abs(value)
+        )
         curved = ~(np.max(np.abs(ends - straight), axis=0) <= allowed)
     return CredibleSet(
         share,

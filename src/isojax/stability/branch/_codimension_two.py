@@ -242,7 +242,7 @@ def _between_resonances(whole: Whole, found: Polished) -> tuple[Whole, Polished]
     return whole.part(first, last, ended), jax.tree.map(lambda own: own[first : last + 1], found)
 
 
-_LOOKED_AT = 17
+_FREQUENCIES_TRIED = 17
 """Frequencies of a window at which states are looked at for how fast they are."""
 
 
@@ -303,7 +303,7 @@ def _steps_over(
     if not model.internal_states:
         # Nothing is faster than the resonance, near which bifurcations lie.
         return integrator
-    grid = np.meshgrid(window[0], np.linspace(*window[1], _LOOKED_AT), indexing="ij")
+    grid = np.meshgrid(window[0], np.linspace(*window[1], _FREQUENCIES_TRIED), indexing="ij")
     drives = [axis.ravel() for axis in grid]
     sizes = np.asarray(answer_sizes(model, *map(jnp.asarray, drives)))
     integrator, stiff = integrator_that_follows(model, integrator, sizes, drives[1])

@@ -34,7 +34,7 @@ from ._parameter_family import ParameterFamily
 _STEPS = 0.02 * 1.12 ** np.arange(48)
 """Steps along the branch either way, over the size of motion and drive: a resonance may move far."""
 
-_SAME_TO = 0.02
+_ON_BRANCH_TO = 0.02
 """Distance over the size of the motion up to which the orbit found is that of the branch, whose steps do not
 stop at kinks."""
 
@@ -132,7 +132,7 @@ def _own_piece(line: Place) -> Bool[Array, " place"]:
 @quick_jit
 def _only_near(orbit: Orbit, start: Float[Array, " state"], size: Float[Array, " state"]) -> Orbit:
     """Give an orbit where it is the one on the branch; NaN else."""
-    near = jnp.max(jnp.abs(frozen(orbit.y0) - start) / size) < _SAME_TO  # False of NaN
+    near = jnp.max(jnp.abs(frozen(orbit.y0) - start) / size) < _ON_BRANCH_TO  # False of NaN
     other = ~jnp.all(jnp.isfinite(start)) | jnp.isfinite(orbit.y0[0])
     gone = ~near & other & (orbit.result != RESULTS.sticks)
     blank = jnp.where(near, 1.0, jnp.nan)

@@ -42,7 +42,7 @@ _FOUND_WITHIN = 1e-6
 _STRAIGHT = 0.8
 """Cosine of the turn of the tangent in one step below which the branch counts as lost."""
 
-_REACH = 0.75
+_PARABOLA_READ = 0.75
 """How far a parabola through three points is read, over the gaps between them: beyond the half, so that a
 zero in the middle of a gap is not lost between two parabolas."""
 
@@ -254,7 +254,7 @@ def zero_along(
     )
     sound = line.sound[:-2] & line.sound[1:-1] & line.sound[2:]
     sound = sound if within is None else sound & within[1:-1]
-    good = sound & (shift >= -_REACH * gaps[:-1]) & (shift <= _REACH * gaps[1:])
+    good = sound & (shift >= -_PARABOLA_READ * gaps[:-1]) & (shift <= _PARABOLA_READ * gaps[1:])
     best = jnp.argmin(jnp.where(good, jnp.abs(along[1:-1] + shift), jnp.inf))
     start = jax.tree.map(lambda own: own[best + 1], line)
     rate = slope[best] + 2.0 * bend[best] * shift[best]

@@ -34,7 +34,7 @@ _SAME_TO = 1e-3
 _HELD = -1.0
 """Instead of the gap where friction holds the mass."""
 
-_UNSTABLE = 2.0
+_MAYBE_UNSTABLE = 2.0
 """Product of step and rate from which steps may be unstable: those of Runge and Kutta are from 2.7."""
 
 _MOST_STEPS = 1 << 12
@@ -143,7 +143,7 @@ class OrbitSearch(NamedTuple):
         if not open_ended.shares.size:
             return done, 0
         model, rates = self.family.model, self._pace(open_ended)[0]
-        unstable = rates > _UNSTABLE * self.integrator.steps_a_period(model)
+        unstable = rates > _MAYBE_UNSTABLE * self.integrator.steps_a_period(model)
         follows = [integrator_with(model, self.integrator, rate, _MOST_STEPS) for rate in rates[:, None]]
         again = unstable & np.array([not stiff for _, stiff in follows], bool)
         if not again.any():

@@ -29,7 +29,7 @@ from ._parameter_values import DRIVE, differentiate, drive_values, with_values
 _GOAL = 2e-5
 """Relative error of derivatives up to which they are read off."""
 
-_SAMPLED = 512
+_CERTIFYING_CELLS = 512
 """Cells whose derivatives are compared with those read off."""
 
 _MARGIN = 1.25
@@ -215,7 +215,7 @@ def _sampled_error(
     scale: Float[np.ndarray, " parameter"],
 ) -> float:
     """Give the largest relative error of a sample: by the estimated error, next to folds, and evenly."""
-    count = min(_SAMPLED // 3, read.size)
+    count = min(_CERTIFYING_CELLS // 3, read.size)
     steep = np.abs(slopes.steepness[read])
     picked = [
         np.argpartition(slopes.error[read], read.size - count)[read.size - count :],

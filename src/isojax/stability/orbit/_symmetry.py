@@ -17,7 +17,7 @@ what acts over less than the step between two of them shows along the motions th
 _VELOCITY_OVER_DISPLACEMENT = 30.0
 """Of the states that are tried [1/s]."""
 
-_ROUNDING = 1e-12
+_ODD_TO = 1e-12
 """Sum of the rates on both sides, over their size, up to which they are each other's opposites."""
 
 
@@ -99,5 +99,5 @@ def _turns(
     """Say whether rates and slopes change their sign with states and drive."""
     forth, back = map(np.asarray, _both_sides(model, jnp.asarray(states), jnp.asarray(drive)))
     defined = np.isfinite(forth) & np.isfinite(back)
-    apart = np.abs(np.where(defined, forth + back, 0.0)) > _ROUNDING * np.abs(np.where(defined, forth, 0.0))
+    apart = np.abs(np.where(defined, forth + back, 0.0)) > _ODD_TO * np.abs(np.where(defined, forth, 0.0))
     return not np.any(apart | (np.isfinite(forth) != np.isfinite(back)))
