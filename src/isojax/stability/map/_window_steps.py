@@ -11,6 +11,8 @@ _UNSTABLE = 4
 def window_integrator(model: Isolator, integrator: Integrator, window: MapWindow) -> Integrator:
     """Give an integrator with steps that follow the states of a model all over a window.
 
+    Motions beyond those that the drives need do not count: their laws may change many times faster.
+
     Args:
         model: the isolator.
         integrator: with steps enough for motions that change no faster than the drive.
@@ -19,7 +21,7 @@ def window_integrator(model: Isolator, integrator: Integrator, window: MapWindow
     Returns:
         The integrator.
     """
-    _, *sizes = displacements(model, window)
+    _, *sizes = displacements(model, window._replace(reach=1.0))
     return integrator_over(model, integrator, sizes, window.frequencies)
 
 
@@ -34,7 +36,7 @@ def check_steps(model: Isolator, integrator: Integrator, window: MapWindow) -> N
     Raises:
         ValueError: if they are.
     """
-    follows = window_integrator(model, integrator, window._replace(reach=1.0)).steps_per_period
+    follows = window_integrator(model, integrator, window).steps_per_period
     if follows > _UNSTABLE * integrator.steps_per_period:
         raise ValueError(
             f"Argument `integrator` must take at least {follows // _UNSTABLE} steps a drive period here, "
