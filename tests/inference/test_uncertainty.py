@@ -257,3 +257,29 @@ def test_what_cannot_be_carried_is_refused(wide, unchecked):
         ij.uncertainty(wide, lambda model: model[STIFFNESS], draws=10)
     with pytest.raises(ValueError, match="must have succeeded"):
         ij.uncertainty(wide._replace(result=ij.RESULTS.not_converged), lambda model: model[STIFFNESS])
+
+
+def test_an_interval_of_high_confidence_is_not_cut_at_the_outermost_draw(wide):
+    found = ij.uncertainty(wide, lambda model: model[STIFFNESS], confidence=0.9999, draws=1000)
+    half = float(np.diff(found.interval, axis=0).squeeze()) / 2.0
+    assert half == pytest.approx(norm.ppf(0.99995) * float(found.standard_error), rel=1e-9)
+    assert "99.99% interval" in str(found)
+
+
+def test_a_yes_or_no_has_a_probability(wide):
+    centre = float(wide.model[STIFFNESS])
+    found = ij.uncertainty(wide, lambda model: model[STIFFNESS] < centre, draws=4000)
+    assert np.mean(found.draws) == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda c: np.where(np.eye(len(c)) == 1.0, c, np.nan), "finite, symmetric covariance"),
+        (lambda c: c[:1], "a row and a column"),
+    ],
+)
+def test_a_covariance_that_is_none_is_refused(wide, change, words):
+    wrong = wide._replace(covariance=change(np.asarray(wide.covariance)))
+    with pytest.raises(ValueError, match=words):
+        ij.uncertainty(wrong, lambda model: model[STIFFNESS])

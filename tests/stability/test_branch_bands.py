@@ -269,6 +269,27 @@ def test_an_orbit_is_found_again_on_its_own_piece_of_the_branch_or_nowhere(branc
     assert "turns back at a fold" in " ".join(str(gone).split())
 
 
+@pytest.mark.slow
+def test_an_unstable_orbit_under_another_drive_is_the_unstable_one_or_gone(branch):
+    """In shares of the drive it went to the larger motion."""
+    values, states = np.asarray(branch.points.value), np.asarray(branch.points.y0)
+    fold, rest = (float(point.amplitude) for point in branch.special_points)
+    falling = np.flatnonzero(np.diff(values) < 0.0)
+    place = falling[falling.size // 2]
+    drive = ij.Harmonic(values[place], 1.6 / TURN)
+    orbit = ij.find_periodic_orbit(DUFFING, drive, start=states[place].tolist())
+    assert float(orbit.floquet.spectral_radius) > 1.0
+    forces = np.array([1.15 * rest, 0.5 * (rest + fold), 0.9 * fold, 1.3 * fold, 3.0 * fold])
+    found = np.asarray(
+        jax.vmap(lambda force: ij.find_again(orbit, DUFFING, amplitude=force).amplitude)(forces)
+    )
+    d, loss = 1.6**2 - 1.0, 0.32**2
+    for force, size in zip(forces[:3], found, strict=False):
+        _, middle, _ = np.sort(np.roots([1.0, -2.0 * d, d**2 + loss, -0.75 * force**2]).real)
+        assert size == pytest.approx(np.sqrt(4.0 * middle / 3.0), rel=0.03)
+    assert np.isnan(found[3:]).all()
+
+
 def test_an_orbit_is_found_again_far_away_where_there_is_but_one():
     """The receptance of a linear isolator, from and to its resonance and under drives of other sizes."""
     known = ij.find_periodic_orbit(LINEAR, ij.Harmonic(1.0, 5.0 / TURN))

@@ -80,8 +80,29 @@ def test_a_small_orbit_is_not_taken_for_one_of_a_branch_of_large_ones():
     unknowns = np.stack([0.0 * shares, 0.0 * shares, shares], axis=1)
     method = ShootingMethod(ij.Integrator(), 1, False)
     curve = Curve(method, np.ones(2), unknowns, np.tile([0.0, 0.0, 1.0], (51, 1)), 0)
-    assert curve.distance(0.513, np.array([0.006, 0.008])) == pytest.approx(1.0)
+    # What is smaller than a fifth of the branch counts as a fifth: its points are no closer than that allows.
+    assert curve.distance(0.513, np.array([0.006, 0.008])) == pytest.approx(0.05)
     assert curve.distance(0.513, np.array([3.0, 4.0])) == pytest.approx(1.0)
+
+
+def test_an_orbit_far_off_a_sharp_resonance_lies_on_the_branch_that_holds_it():
+    """The receptance of a linear isolator with Q = 200, its points as far apart as those of a branch."""
+
+    def unknown(share):
+        omega = 0.314 + 2.2 * share
+        motion = 0.005 / (1.0 - omega**2 + 0.005j * omega)
+        return np.stack([motion.real, -omega * motion.imag, share], axis=-1)
+
+    fine = np.linspace(0.0, 1.0, 2_000_001)
+    along = unknown(fine)
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(along, axis=0), axis=1))])
+    shares = np.interp(np.arange(0.0, arc[-1], 0.02), arc, fine)
+    tangents = (unknown(shares + 1e-7) - unknown(shares - 1e-7)) / 2e-7
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    method = ShootingMethod(ij.Integrator(), 1, False)
+    curve = Curve(method, np.ones(2), unknown(shares), tangents, 0)
+    between = np.random.default_rng(0).uniform(0.0, shares[-1], 300)
+    assert max(curve.distance(share, unknown(share)[:2]) for share in between) < 1e-3
 
 
 def test_the_motions_of_an_isola_return_under_scipy(beside_isola):

@@ -73,10 +73,10 @@ class UncertainQuantity(NamedTuple):
         bent = (
             f", curved in {np.count_nonzero(self.curved)} of {self.curved.size}" if self.curved.any() else ""
         )
-        lost = f", {self.failed:.0%} of the draws have no value" if self.failed else ""
+        lost = f", {self.failed:.2%} of the draws have no value" if self.failed else ""
         shares = ", ".join(f"{weight:.0%}" for weight in self.weights)
         several = f", of {len(self.weights)} fits weighed {shares}" if len(self.weights) > 1 else ""
-        return f"{self.confidence:.0%} interval, {len(self.draws)} draws{several}{bent}{lost}"
+        return f"{100.0 * self.confidence:g}% interval, {len(self.draws)} draws{several}{bent}{lost}"
 
     def _lines(self) -> list[str]:
         who = "Draws" if self.failed else "The fit"
@@ -84,8 +84,8 @@ class UncertainQuantity(NamedTuple):
         near = np.abs(self.probability - self.confidence) <= _UNDECIDED_WITHIN * self.probability_error
         if np.any(near & (self.probability < 1.0)):
             lines.append(
-                f"Whether the probability reaches {self.confidence:.0%}, at which the interval jumps, takes "
-                "more draws to say"
+                f"Whether the probability reaches {100.0 * self.confidence:g}%, at which the interval jumps, "
+                "takes more draws to say"
             )
         return lines
 
@@ -114,7 +114,7 @@ class UncertainQuantity(NamedTuple):
             return f"{span}; {chance}"
         if not np.isfinite(low):
             return f"{chance}: too few draws for an interval"
-        return f"{chance}; where it does, {self.confidence:.0%} lie in {span}"
+        return f"{chance}; where it does, {100.0 * self.confidence:g}% lie in {span}"
 
 
 def uncertainty(

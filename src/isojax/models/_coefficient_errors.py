@@ -16,6 +16,9 @@ from ._isolator import Isolator
 _NO_SHARE = 1e-12
 """Share of the largest eigenvalue of a correlation below which a direction is rounding."""
 
+_ROUGHLY = 1e-6
+"""By how much correlations may miss symmetry, and their eigenvalues zero, by rounding."""
+
 _DRAWN_AGAIN = 50
 """Times that draws outside the bounds of a coefficient are drawn again."""
 
@@ -119,7 +122,7 @@ class CoefficientErrors(NamedTuple):
                     "Argument `quantity` must give a number or an array, as of jnp.stack([...]), but gave "
                     f"one of type {type(given).__name__}."
                 )
-            value = jnp.asarray(given)
+            value = 1.0 * jnp.asarray(given)  # a yes or no is 1 or 0
             return value, value
 
         try:
@@ -203,6 +206,11 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
                 f"{', '.join(other) or 'its elements'}."
             )
     covariance = np.asarray(held.covariance, dtype=float)
+    if covariance.shape != (len(held.free),) * 2:
+        raise ValueError(
+            f"Argument `fit` must have a covariance with a row and a column for each of its {len(held.free)} "
+            f"free coefficients, but its shape is {covariance.shape}."
+        )
     variances = np.diag(covariance)
     negative = [name for name, one in zip(held.free, variances, strict=True) if one < 0.0]
     if negative:
@@ -218,7 +226,15 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
         )
     # Scaled before the roots are taken: stiffness in N/m and in N/m^3 differ by many orders.
     safe = np.where(size > 0.0, size, 1.0)
-    shares, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
+    correlation = covariance / np.outer(safe, safe)
+    if not np.all(np.isfinite(correlation)) or np.max(np.abs(correlation - correlation.T)) > _ROUGHLY:
+        raise ValueError("Argument `fit` must have a finite, symmetric covariance, but its entries are not.")
+    shares, vectors = np.linalg.eigh(correlation)
+    if shares.size and shares[0] < -_ROUGHLY:
+        raise ValueError(
+            "Argument `fit` must have a covariance without negative eigenvalues, but as correlations it has "
+            f"one of {shares[0]:.3g}."
+        )
     kept = shares > _NO_SHARE * shares.max(initial=0.0)
     root = safe[:, None] * vectors[:, kept] * np.sqrt(shares[kept])
     names = [entry.name for entry in listed]

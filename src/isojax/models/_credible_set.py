@@ -71,18 +71,22 @@ def credible_set(
     # "None" is left out of the set where the numbers alone can reach the confidence.
     alone = share > confidence
     content = np.where(alone, confidence / np.where(alone, share, 1.0), confidence)
-    tail = np.asarray(np.maximum(0.5 * (1.0 - content), 0.5 / count))
+    wanted = np.asarray(0.5 * (1.0 - content))
+    # Further out than the outermost draw nothing can be compared.
+    tail = np.asarray(np.maximum(wanted, 0.5 / count))
     spread = -ndtri(tail) * error
-    straight = np.stack([value - spread, value + spread])
     ends = _quantiles(drawn, tail)
-    ends = np.where(alone | (held * (1.0 - confidence) >= _DRAWS_BEYOND), ends, np.nan)
     # Of a quantity that does not bend the draws are normal, and with them the error of their quantiles.
     chance = np.sqrt(tail * (1.0 - tail) / np.maximum(held, 1)) / norm.pdf(ndtri(tail)) * error
     with np.errstate(invalid="ignore"):
         allowed = np.maximum(
             np.maximum(_BEND * 2.0 * spread, _BY_CHANCE * chance), _SEARCH_ROUNDING * np.abs(value)
         )
-        curved = ~(np.max(np.abs(ends - straight), axis=0) <= allowed)
+        curved = ~(np.max(np.abs(ends - np.stack([value - spread, value + spread])), axis=0) <= allowed)
+    ends = np.where(held * (1.0 - confidence) >= _DRAWS_BEYOND, ends, np.nan)
+    # Where "none" may be all that is left out, the tail of the numbers is not known more exactly than that.
+    reach = -ndtri(np.where(share < 1.0, tail, wanted)) * error
+    straight = np.stack([value - reach, value + reach])
     return CredibleSet(
         share,
         share_error,

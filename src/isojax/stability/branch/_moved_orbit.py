@@ -31,7 +31,7 @@ from ..orbit import (
 from ._moved_point import Move, Place, zero_along
 from ._parameter_family import ParameterFamily
 
-_STEPS = 0.02 * 1.12 ** np.arange(48)
+_STEPS = 0.02 * 1.16 ** np.arange(56)
 """Steps along the branch either way, over the size of motion and drive: a resonance may move far."""
 
 _ON_BRANCH_TO = 0.02
@@ -91,10 +91,9 @@ def _moved_start(
         turns=method.turns,
     )
     scale = state_scale(path)
-    # In shares of the drive, and states in shares of it: where the model is linear, both stay as they are.
     unit = jnp.where(old.amplitude == 0.0, 1.0, old.amplitude)
-    grown = jnp.where(drive.amplitude * old.amplitude > 0.0, drive.amplitude / unit, 1.0)
-    wanted = drive.amplitude / (grown * unit)
+    # The model moves first, under the drive as it was; another amplitude is sought along the branch.
+    wanted = drive.amplitude / unit
 
     names = ("amplitude",)
 
@@ -105,13 +104,13 @@ def _moved_start(
     def test(unknown: Array, _: Array, __: Array) -> Array:
         return unknown[-1] - wanted
 
-    families = family(orbit.model, old, unit), family(model, drive, grown * unit)
-    move = Move(*families, method, scale, grown * scale, test)
+    families = family(orbit.model, old, unit), family(model, drive, unit)
+    move = Move(*families, method, scale, scale, test)
     origin = jnp.concatenate([orbit.y0 / scale, (old.amplitude / unit)[None]])
     across = move.across(origin)
     place, line = move.line(origin, across, _STEPS)
     found = zero_along(place, line, _STEPS, jnp.asarray(1.0), _own_piece(line))
-    return found.unknown[:-1] * grown * scale, jnp.abs(grown) * scale
+    return found.unknown[:-1] * scale, scale * jnp.maximum(jnp.abs(wanted), 1.0)
 
 
 def _own_piece(line: Place) -> Bool[Array, " place"]:

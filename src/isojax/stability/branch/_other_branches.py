@@ -23,7 +23,7 @@ _NEAR_A_BRANCH, _ON_A_BRANCH = 5e-3, 1e-3
 """Distance from a branch, over the size of the orbit, below which it lies on the branch: found by coarse
 steps, and by the steps of the branch. Coarse steps were seen to miss by up to 1e-3."""
 
-_SMALLEST = 1e-3
+_SMALLEST = 0.2
 """Size of an orbit, over that of the branch, below which it counts as this large: the points of the branch
 are solved for to a share of the branch's size."""
 

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
+from ..._quantities import DRIVE_UNITS
 from ..._show import Row, brief, shown
 from ..._types import check_float64
 from ...models import Isolator
@@ -151,7 +152,9 @@ def sensitivity(
     of = as_subject(subject, model)
     entries = {entry.name: (entry.spec.unit, entry.value) for entry in list_parameters(of.model)}
     if of.drive is not None:
-        entries |= zip(DRIVE, zip(("N", "Hz"), of.drive, strict=True), strict=True)
+        entries |= zip(
+            DRIVE, zip((DRIVE_UNITS[of.model.excitation], "Hz"), of.drive, strict=True), strict=True
+        )
     entries = {name: entry for name, entry in entries.items() if name not in of.solved}
     names = tuple(entries) if parameters is None else tuple(parameters)
     for name in (*names, *(covariance_of or ())):

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.ndimage import maximum_filter
 
+from ._found_again import found_together
 from ._grids import GAIN, REFINEMENTS, FirstGrid, Grid, axes_of, filled, first_grid, node_at
 from ._node_slopes import TABLES, Directions, node_slopes
 from ._shared_kinks import AROUND
@@ -65,7 +66,9 @@ class SlopeTables:
             directions: the parameters.
         """
         rest = displacement_at_rest(smap.model)
-        sizes = np.asarray(smap.start)[..., 0] - rest
+        # Cells that were found as single orbits keep another state than that at the largest displacement.
+        together = found_together(smap).reshape(smap.split.shape)
+        sizes = np.asarray(smap.start)[..., 0][together] - rest
         ends = math.log(np.nanmin(sizes) / _ROOM), math.log(np.nanmax(sizes) * _ROOM)
         self.smap, self.directions, self.level = smap, directions, 0
         self.first: FirstGrid = first_grid(
