@@ -151,6 +151,12 @@ def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
     assert 2 <= len(stamps) < len(after)
     assert {name: after[name] for name in stamps} == stamps
     same(resumed, whole, tolerance=0.0)
+    damaged = tmp_path / min(stamps)
+    kept = damaged.read_bytes()
+    damaged.write_bytes(kept[:100])
+    with pytest.raises(ValueError, match=f"{damaged.name} is damaged"):
+        stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
+    damaged.write_bytes(kept)
     with pytest.raises(ValueError, match="which holds the chunks of another map"):
         stability_map(paper.y_direction(), 1.01 * many, BAND, checkpoint=tmp_path, **arguments)
     other = paper.y_direction().replace(mass=801.0)
@@ -160,6 +166,9 @@ def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
     older = json.loads(label.read_text(encoding="utf-8"))
     label.write_text(json.dumps(older | {"code": "0"}), encoding="utf-8")
     with pytest.raises(ValueError, match="chunks that other code computed"):
+        stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
+    label.write_text("{", encoding="utf-8")
+    with pytest.raises(ValueError, match="map.json is damaged"):
         stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
 
 

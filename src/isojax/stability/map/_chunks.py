@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import zipfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -74,8 +75,7 @@ def run_chunks(
         if place % processes != own:
             return
         if path is not None and kept[place]:
-            with np.load(path) as finished:
-                part = Found(*(finished[field] for field in Found._fields))
+            part = _read(path)
         else:
             part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
             if path is not None:
@@ -129,7 +129,13 @@ def claim_folder(folder: Path, identity: str) -> None:
             raise ValueError(f"Argument `checkpoint` names {folder}, which holds chunks of no known map.")
         write_whole(label, json.dumps(own) + "\n")
         return
-    held = json.loads(label.read_text(encoding="utf-8"))
+    try:
+        held = json.loads(label.read_text(encoding="utf-8"))
+    except ValueError as problem:
+        raise ValueError(
+            f"Argument `checkpoint` must name the folder of a map, but {label} is damaged ({problem}). "
+            "Delete the folder."
+        ) from problem
     for key, words in (
         ("identity", "the chunks of another map"),
         ("code", "chunks that other code computed: other versions or sources of isojax, JAX or NumPy"),
@@ -139,3 +145,15 @@ def claim_folder(folder: Path, identity: str) -> None:
                 f"Argument `checkpoint` names {folder}, which holds {words} ({held.get(key)}, not "
                 f"{own[key]}). Give an empty folder, or delete this one."
             )
+
+
+def _read(path: Path) -> Found:
+    """Read a finished chunk."""
+    try:
+        with np.load(path) as finished:
+            return Found(*(finished[field] for field in Found._fields))
+    except (zipfile.BadZipFile, EOFError, KeyError, ValueError, OSError) as problem:
+        raise ValueError(
+            f"Argument `checkpoint` must hold whole chunks, but {path} is damaged ({problem}). Delete this "
+            "file; its cells are then found again."
+        ) from problem
