@@ -168,7 +168,7 @@ def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
     with pytest.raises(ValueError, match="chunks that other code computed"):
         stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
     label.write_text("{", encoding="utf-8")
-    with pytest.raises(ValueError, match="map.json is damaged"):
+    with pytest.raises(ValueError, match=r"map\.json is damaged"):
         stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
 
 

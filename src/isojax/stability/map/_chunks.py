@@ -150,7 +150,7 @@ def claim_folder(folder: Path, identity: str) -> None:
 def _read(path: Path) -> Found:
     """Read a finished chunk."""
     try:
-        with np.load(path) as finished:
+        with np.load(io.BytesIO(path.read_bytes())) as finished:
             return Found(*(finished[field] for field in Found._fields))
     except (zipfile.BadZipFile, EOFError, KeyError, ValueError, OSError) as problem:
         raise ValueError(
