@@ -128,3 +128,11 @@ def test_the_covariance_at_a_pressure_is_that_of_the_sum_of_both_coefficients():
 def test_what_is_no_fit_has_none_at_a_pressure():
     with pytest.raises(ValueError, match="`fit` must be a fit, or end with one, but is of type SimpleNames"):
         fit_at(SimpleNamespace(after=None), pressure=2e5)
+
+
+def test_a_response_is_drawn_at_one_pressure():
+    fitted = FitAt(MODEL, ("linear_stiffness.coefficient",), np.array([[9e6]]), ij.RESULTS.successful)
+    with pytest.raises(
+        ValueError, match=r"`fit` must be at one pressure.*isojax.fit_at\(fit, pressure=...\)"
+    ):
+        ij.response_bands(fitted, [50.0], (4.0, 7.0))

@@ -227,7 +227,10 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
     # Scaled before the roots are taken: stiffness in N/m and in N/m^3 differ by many orders.
     safe = np.where(size > 0.0, size, 1.0)
     correlation = covariance / np.outer(safe, safe)
-    if not np.all(np.isfinite(correlation)) or np.max(np.abs(correlation - correlation.T)) > _ROUGHLY:
+    if (
+        not np.all(np.isfinite(correlation))
+        or np.max(np.abs(correlation - correlation.T), initial=0.0) > _ROUGHLY
+    ):
         raise ValueError("Argument `fit` must have a finite, symmetric covariance, but its entries are not.")
     shares, vectors = np.linalg.eigh(correlation)
     if shares.size and shares[0] < -_ROUGHLY:

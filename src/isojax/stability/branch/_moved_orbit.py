@@ -105,7 +105,7 @@ def _moved_start(
         return unknown[-1] - wanted
 
     families = family(orbit.model, old, unit), family(model, drive, unit)
-    move = Move(*families, method, scale, scale, test)
+    move = Move(*families, method, scale, test)
     origin = jnp.concatenate([orbit.y0 / scale, (old.amplitude / unit)[None]])
     across = move.across(origin)
     place, line = move.line(origin, across, _STEPS)

@@ -27,7 +27,7 @@ from ._parameter_family import ParameterFamily
 _STAGES = 4
 """Models between the known and the other one, through which the orbit is moved."""
 
-STEPS = 0.02 * np.minimum(1.06 ** np.arange(40), 3.0)
+_STEPS = 0.02 * np.minimum(1.06 ** np.arange(40), 3.0)
 """Steps along the branch either way, over the size of motion and range: the further, the longer."""
 
 _CORRECTIONS = 4
@@ -84,11 +84,11 @@ def moved_guess(point: SpecialPoint, kind: BifurcationKind, family: ParameterFam
     def test(_: Array, matrix: Array, tangent: Array) -> Array:
         return critical_values(matrix, tangent)[TEST_OF[kind]]
 
-    move = Move(known, family, method, scale, scale, test)
+    move = Move(known, family, method, scale, test)
     origin = jnp.concatenate([point.y0 / scale, shares])
     across = move.across(origin)
-    place, line = move.line(origin, across, STEPS)
-    found = zero_along(place, line, STEPS, move.sense(origin, across)).unknown
+    place, line = move.line(origin, across, _STEPS)
+    found = zero_along(place, line, _STEPS, move.sense(origin, across)).unknown
     states = scale.shape[0]
     return PointGuess(found[:states] * scale, found[states:])
 
@@ -101,7 +101,6 @@ class Move(NamedTuple):
         family: the other ones.
         method: how the orbits are closed.
         scale: size of each state at the known point.
-        there: size of each state on the other branch.
         test: vanishes at the point.
     """
 
@@ -109,7 +108,6 @@ class Move(NamedTuple):
     family: ParameterFamily
     method: ShootingMethod
     scale: Float[Array, " state"]
-    there: Float[Array, " state"]
     test: Test
 
     def across(self, origin: Float[Array, " unknown"]) -> Float[Array, " unknown"]:
@@ -142,20 +140,20 @@ class Move(NamedTuple):
             What gives a point of the other branch from a guess and the normal of a plane through it; and the
             branch, its first axis from back to front, with the moved point in the middle.
         """
-        place = functools.partial(corrected, method=self.method, test=self.test)
+        place = functools.partial(corrected, method=self.method, scale=self.scale, test=self.test)
 
         def nearer(here: Array, share: Array) -> tuple[Array, Place]:
-            between, scale = jax.tree.map(
+            between = jax.tree.map(
                 lambda old, new: old + share * (new - old) if eqx.is_inexact_array(old) else new,
-                (self.known, self.scale),
-                (self.family, self.there),
+                self.known,
+                self.family,
             )
-            found = place(between, here, across, scale=scale)
+            found = place(between, here, across)
             return found.unknown, found
 
         _, stages = jax.lax.scan(nearer, origin, jnp.arange(1.0, _STAGES + 1.0) / _STAGES)
         moved = jax.tree.map(lambda own: own[-1], stages)
-        own = functools.partial(place, self.family, scale=self.there)
+        own = functools.partial(place, self.family)
         ways = _walk(own, moved, steps)
         line = jax.tree.map(
             lambda here, both: jnp.concatenate([both[0, ::-1], here[None], both[1]]), moved, ways

@@ -24,8 +24,8 @@ _NEAR_A_BRANCH, _ON_A_BRANCH = 5e-3, 1e-3
 steps, and by the steps of the branch. Coarse steps were seen to miss by up to 1e-3."""
 
 _SMALLEST = 0.2
-"""Size of an orbit, over that of the branch, below which it counts as this large: the points of the branch
-are solved for to a share of the branch's size."""
+"""Size of an orbit, over that of the branch, below which it counts as this large: between its points a branch
+with a sharp resonance is known to a share of its own size, not of the small orbits off it."""
 
 _AMONG = 33
 """Points between two of a branch at which the distance from it is taken, and again between two of these."""

@@ -2,9 +2,6 @@
 
 from typing import Any, TypeVar, get_args
 
-import jax
-from jax.core import Tracer
-
 from ..._types import Scalar, as_float64, check_float64
 from ...models import Isolator, Modelled, as_isolator
 from ..branch import (
@@ -17,7 +14,7 @@ from ..branch import (
     find_orbit_again,
 )
 from ..map import StabilityMap, found_again
-from ..orbit import Orbit, closed_by_half
+from ..orbit import Orbit, closed_by_half, is_traced
 from ..response import Resonance, Transmissibility, resonance_near, transmissibility_again
 
 Answer = TypeVar(
@@ -82,7 +79,7 @@ def find_again(
             "Argument `answer` must be an orbit, a special point of a branch or of a curve of bifurcations, "
             f"a resonance, a transmissibility or a map, but is of type {type(answer).__name__}."
         )
-    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(answer)):
+    if is_traced(answer):
         raise ValueError(
             "Argument `answer` must hold known numbers, but JAX is tracing it. Find it outside the function "
             "that JAX transforms."

@@ -46,11 +46,8 @@ _SHARE_OF_DOUBT = 1.0 / (2.0**1.5 * np.pi)
 `d / (s sqrt(2 pi))`, over `d` as a share of the integral of `P (1 - P)`, which is `s / sqrt(pi)`."""
 
 DRAWS = 512
-"""Draws of the coefficients, quasi-random."""
+"""Draws of the coefficients: quasi-random, so that chances scatter less than by independent ones."""
 
-_SCATTER = 0.013
-"""By how much a chance near a half scatters with that many, seen against 20,000 draws; it would be 0.022 of
-independent draws."""
 
 _IN_DOUBT = 0.05
 """Chance below which, or below which of the contrary, a cell counts as sure."""
@@ -351,6 +348,6 @@ def chance_words(smap: "StabilityMap") -> str:
     if error is not None and np.isfinite(error):
         words.append(
             f"a chance near a half is off by at most about {error:.2g}, "
-            f"and scatters by {_SCATTER} with the draws"
+            f"and its standard error by the count of draws is below {0.5 / DRAWS**0.5:.2g}"
         )
     return "; ".join(words)

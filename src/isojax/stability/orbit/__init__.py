@@ -34,6 +34,7 @@ from ._held import is_held as is_held
 from ._jacobian import value_and_jacobian as value_and_jacobian
 from ._kink_crossings import Crossings as Crossings
 from ._kink_crossings import advance_across_kinks as advance_across_kinks
+from ._known_numbers import is_traced as is_traced
 from ._known_numbers import refuse_traced as refuse_traced
 from ._known_numbers import refuse_transformed as refuse_transformed
 from ._orbit import Orbit as Orbit

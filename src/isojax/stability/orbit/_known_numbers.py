@@ -6,6 +6,18 @@ from jax.core import Tracer
 from ..._implicit import frozen
 
 
+def is_traced(values: object) -> bool:
+    """Say whether JAX traces or differentiates a number of a pytree.
+
+    Args:
+        values: the pytree.
+
+    Returns:
+        Whether it does any.
+    """
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(values))
+
+
 def refuse_traced(*values: object) -> None:
     """Refuse to work under a transformation that hides the numbers.
 
@@ -15,7 +27,7 @@ def refuse_traced(*values: object) -> None:
     Raises:
         ValueError: if a number is known to no one yet, as under `jax.jit` or `jax.vmap`.
     """
-    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(frozen(values))):
+    if is_traced(frozen(values)):
         raise ValueError(
             "Argument `model` must hold known numbers, because how many points a curve has depends on them, "
             "but it is being traced. Call outside jax.jit and jax.vmap (jax.jacfwd and jax.grad work); under "
@@ -35,7 +47,7 @@ def refuse_transformed(values: object, instead: str, name: str = "model") -> Non
     Raises:
         ValueError: if JAX transforms the function that this is called from.
     """
-    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(values)):
+    if is_traced(values):
         raise ValueError(
             f"Argument `{name}` must hold plain numbers, because this answer is put together on the host, "
             f"but JAX is tracing or differentiating it. {instead}"

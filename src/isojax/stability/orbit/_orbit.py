@@ -12,7 +12,6 @@ from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen, with_derivatives
-from ..._parameters import list_parameters
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS, is_successful
 from ..._show import amount, brief, declared_numbers, number, shown
@@ -25,6 +24,7 @@ from ._floquet import Floquet, multipliers, stable_words
 from ._half_range import half_range
 from ._harmonic_balance import harmonic_balance
 from ._held import is_held
+from ._known_numbers import is_traced
 from ._period_map import trajectory
 from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
@@ -159,7 +159,7 @@ def find_periodic_orbit(
     need_fundamental(still, drive.amplitude)
     odd = periods == 1 and (symmetric or (symmetric is None and start is None))
     # Of a model that is being traced nothing can be said; whoever asks for symmetric orbits then knows.
-    traced = any(isinstance(entry.value, Tracer) for entry in list_parameters(still))
+    traced = is_traced(still)
     half = odd and (bool(symmetric) if traced else is_odd(still))
     if symmetric and not half:
         raise ValueError("Argument `symmetric` must be False for a model that is not odd, but is True.")

@@ -3,12 +3,12 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters, replace_parameters
 from ..._quick_jit import quick_jit
 from ...models import Instant, Isolator
+from ._known_numbers import is_traced
 
 _SIZES = np.logspace(-8.0, 3.0, 133)
 """Displacements at which oddness is tried [m], twelve a decade: a stop on one side acts at all past its gap;
@@ -56,7 +56,7 @@ def is_odd(model: Isolator, up_to: float | None = None) -> bool:
         True if symmetric orbits may be sought with the half-period map; False for a model whose numbers are
         being traced, of which nothing can be said.
     """
-    if any(isinstance(entry.value, Tracer) for entry in list_parameters(model)):
+    if is_traced(model):
         return False
     if any(float(one.order) % 2.0 != 1.0 for one in model.harmonics):
         # An even harmonic is the same half a period later; an odd one turns with the drive.

@@ -8,7 +8,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen, with_derivatives
@@ -37,6 +36,7 @@ from ..orbit import (
     imposed_balance,
     integrator_for,
     integrator_that_follows,
+    is_traced,
     rest_displacement,
     trajectory,
     value_and_jacobian,
@@ -140,7 +140,7 @@ def _steps(
     model: Isolator, amplitudes: Float[Array, " point"], integrator: Integrator
 ) -> tuple[Integrator, bool]:
     """Give steps that follow the states of a model near resonance, and whether these are too fast."""
-    if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(model)):
+    if is_traced(model):
         return integrator, False
     frequencies = np.asarray(_near_resonance(model, amplitudes))
     known = np.isfinite(frequencies) & (frequencies > 0.0)

@@ -158,7 +158,8 @@ def response_bands(
         The curves.
 
     Raises:
-        ValueError: if the fit failed or leaves a coefficient undetermined, the amplitudes or frequencies are
+        ValueError: if the fit failed, leaves a coefficient undetermined or is at no one pressure or
+            temperature although its model follows it, the amplitudes or frequencies are
             not positive or do not ascend, or there are no two frequencies.
         RuntimeError: if JAX is not in 64-bit mode.
 
@@ -174,6 +175,12 @@ def response_bands(
     """
     check_float64()
     errors = coefficient_errors(fit)
+    if errors.model.conditions:
+        given = ", ".join(f"{name}=..." for name in errors.model.conditions)
+        raise ValueError(
+            f"Argument `fit` must be at one {' and '.join(errors.model.conditions)}, which a coefficient "
+            f"follows, such as isojax.fit_at(fit, {given})."
+        )
     forces, ends = (
         ascending(name, np.asarray(values, dtype=float))
         for name, values in (("amplitudes", amplitudes), ("frequencies", frequencies))
