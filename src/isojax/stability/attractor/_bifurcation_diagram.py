@@ -107,7 +107,8 @@ class BifurcationDiagram(eqx.Module):
         counts = zip(*np.unique(period, return_counts=True), strict=True)
         words = ", ".join(f"{count} of period {value}" for value, count in counts if value)
         runs = ", ".join(dict.fromkeys(self.runs))
-        settling, torus = np.asarray(self.settling), np.asarray(self.quasi_periodic)
+        settling, bounded = np.asarray(self.settling), np.isfinite(np.asarray(self.samples)[..., 0, 0])
+        torus = bounded & (period == 0) & ~np.asarray(self.chaotic) & ~settling
         more = f", {int(torus.sum())} quasi-periodic" if torus.any() else ""
         more += f", {int(settling.sum())} not settled yet" if settling.any() else ""
         return f"along {self.parameter} ({runs}): {words or 'no periodic motion'}{more}, {chaotic} chaotic"
