@@ -11,7 +11,7 @@ import pytest
 
 import isojax as ij
 from isojax._cli import main
-from isojax.reporting import map_dict
+from isojax.reporting import map_dict, map_summary
 
 PNG = b"\x89PNG\r\n\x1a\n"
 WINDOW = ["--amplitudes", "100", "400", "4", "--frequencies", "1.5", "3.5", "5"]
@@ -89,6 +89,39 @@ def test_a_map_as_json_holds_what_each_cell_says(z_map):
     assert said["folds"] is None
     lost = eqx.tree_at(lambda m: m.spectral_radius, z_map, z_map.spectral_radius.at[:, 0, 0].set(jnp.nan))
     assert map_dict(lost)["spectral_radius"][0][0] is None
+
+
+@pytest.mark.slow
+def test_the_summary_says_whose_errors_the_chances_hold_and_how_large_they_are(z_map):
+    shape = z_map.response.shape
+    errors = {
+        "response": 0.02 * z_map.response,
+        "spectral_radius": jnp.full(shape, 1e-3).at[0, 0, 0].set(0.5),
+    }
+    chances = jnp.ones(shape[1:]), jnp.zeros(shape[1:]), errors
+    known = eqx.tree_at(
+        lambda m: (m.probability_stable, m.probability_coexisting, m.standard_errors),
+        z_map,
+        chances,
+        is_leaf=lambda leaf: leaf is None,
+    )
+    text = map_summary(known, whose="of a further record")
+    words = "of a further record; response ± 2 % in the median cell, 2 % at most, |µ| ± 0.001 in the median"
+    assert words in text
+    assert "0.5 at most" in text
+    assert "their errors" not in map_summary(z_map, whose="of a further record")
+
+
+def test_a_further_record_needs_a_share_and_the_fit(z_file, z_map, tmp_path, capsys, monkeypatch):
+    command = ["map", z_file, *WINDOW, "--out", str(tmp_path / "out"), "--quiet"]
+    for share in ("-1", "much", "inf"):
+        with pytest.raises(SystemExit) as ended:
+            main([*command, "--next-record", share])
+        assert ended.value.code == 2
+        assert f"must be a share of 0 or above, such as 0.005, but is {share}" in capsys.readouterr().err
+    monkeypatch.setattr("isojax.stability.stability_map", lambda *_, **__: z_map)
+    assert main([*command, "--next-record"]) == 0
+    assert "The map has no chances: --next-record needs" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -194,6 +227,7 @@ def test_help_documents_every_option_and_the_exit_codes(capsys):
         "--folds",
         "--out",
         "--checkpoint",
+        "--next-record",
         "--pressure",
         "--temperature",
         "--json",

@@ -1,6 +1,8 @@
 """The words of the command line: commands, options, help."""
 
 import argparse
+import contextlib
+import math
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 
@@ -126,11 +128,11 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         "--next-record",
         nargs="?",
         const=0.0,
-        type=float,
+        type=_share,
         metavar="CALIBRATION",
         help="chances of what a further record shows: its own linear stiffness, which deviates as those of "
         "the fitted records do, and a force known to a share of CALIBRATION (0.005 is 0.5 %%); default: of "
-        "the mean over all records",
+        "the mean over all records; the summary says which, and gives the standard errors",
     )
     plane.add_argument("--out", default="isojax-map", metavar="DIR", help="default: ./isojax-map")
     plane.add_argument(
@@ -153,6 +155,14 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
     _shown(demo)
     demo.set_defaults(run=commands["close-loop"], campaign=campaign_folder(), anyway=False)
     return parser
+
+
+def _share(text: str) -> float:
+    """Read a share of 0 or above."""
+    with contextlib.suppress(ValueError):
+        if 0.0 <= float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"must be a share of 0 or above, such as 0.005, but is {text}")
 
 
 def _campaign(parser: argparse.ArgumentParser) -> None:

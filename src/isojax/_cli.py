@@ -260,7 +260,7 @@ def _map(asked: argparse.Namespace) -> int:
     from .records import CONDITIONS
 
     model = load_model(asked.model)
-    fit = _fit_beside(Path(asked.model), model, asked.next_record) if asked.chances else None
+    fit, whose = _fit_beside(Path(asked.model), model, asked.next_record) if asked.chances else (None, "")
     stated = {name: getattr(asked, name) for name in CONDITIONS if getattr(asked, name) is not None}
     model, fit = model.at(**stated), None if fit is None else fit_at(fit, **stated)
 
@@ -297,19 +297,23 @@ def _map(asked: argparse.Namespace) -> int:
         written = write_map(smap, folder, folds=folds)
         seconds["pictures"] = watch()
     console = _results(asked)
-    _say(console, map_summary(smap, folds=folds, seconds=seconds))
+    _say(console, map_summary(smap, folds=folds, seconds=seconds, whose=whose))
     _say(console, f"see {', '.join(str(folder / name) for name in written)}")
     _print_json(asked, lambda: map_dict(smap, folds))
     return 0 if np.any(np.asarray(smap.count)) else _NOT_CONVERGED
 
 
-def _fit_beside(path: Path, model: "Isolator", calibration: float | None) -> "SavedFit | NextRecord | None":
-    """Give the fit that was saved beside a model, where it is of this model and its errors can be carried;
-    with a calibration, that of a further record.
+def _fit_beside(
+    path: Path, model: "Isolator", calibration: float | None
+) -> "tuple[SavedFit | NextRecord | None, str]":
+    """Give the fit that was saved beside a model, where it is of this model and its errors can be carried,
+    and whose errors these are in words; with a calibration, that of a further record.
     """
     beside = path.with_name("fit.json")
     if not beside.exists():
-        return None
+        if calibration is not None:
+            print(f"The map has no chances: --next-record needs {beside}.", file=sys.stderr)
+        return None, ""
 
     from .identification import load_fit
     from .inference import next_record
@@ -319,11 +323,12 @@ def _fit_beside(path: Path, model: "Isolator", calibration: float | None) -> "Sa
         fit = load_fit(beside)
         coefficient_errors(fit, model)
         if calibration is not None:
-            return next_record(fit, calibration=calibration)
+            further = next_record(fit, calibration=calibration)
+            return further, further.words
     except ValueError as problem:
         print(f"The map has no chances: {beside} cannot serve. {problem}", file=sys.stderr)
-        return None
-    return fit
+        return None, ""
+    return fit, "of the mean over all fitted records"
 
 
 def _values(option: str, words: Sequence[str]) -> "np.ndarray":

@@ -33,11 +33,16 @@ class NextRecord(NamedTuple):
     scatter: float
     calibration: float
 
-    def _headline(self) -> str:
+    @property
+    def words(self) -> str:
+        """Whose errors these are, and what enlarges them."""
         return (
             f"of a further record: stiffness scatters by {100.0 * self.scatter:.2g} %, "
             f"force known to {100.0 * self.calibration:.2g} %"
         )
+
+    def _headline(self) -> str:
+        return self.words
 
     def _rows(self) -> list[Row]:
         errors = np.sqrt(np.diag(self.covariance))

@@ -17,6 +17,7 @@ def map_summary(
     *,
     folds: FoldCurve | None = None,
     seconds: Mapping[str, tuple[float, float]] | None = None,
+    whose: str = "",
 ) -> str:
     """Give what a map says: its grid, the orbits, where they are unstable or several, errors, time.
 
@@ -24,6 +25,7 @@ def map_summary(
         smap: the map.
         folds: around cells with several orbits.
         seconds: of each part of the work, compiling and running [s].
+        whose: errors the chances are made of, such as "of the mean over all records".
 
     Returns:
         The lines.
@@ -58,6 +60,7 @@ def map_summary(
             lines.append(("not confirmed", unconfirmed_words(smap)))
     if smap.probability_stable is not None:
         lines.append(("chances", chance_words(smap)))
+        lines.append(("their errors", "; ".join(filter(None, (whose, _error_words(smap))))))
     if folds is not None:
         lines.append(("folds", _fold_curve_words(folds, unit)))
     elif several.any():
@@ -68,6 +71,21 @@ def map_summary(
         lines.append((f"time, {name}", words))
     width = max(len(name) for name, _ in lines)
     return "\n".join(f"{name:<{width}}  {words}" for name, words in lines)
+
+
+def _error_words(smap: StabilityMap) -> str:
+    """Say how large the standard errors of response and largest multiplier are, given a fit."""
+    errors = smap.standard_errors or {}
+    sizes = {
+        "response": (100.0 * np.asarray(errors["response"]) / np.asarray(smap.response), " %"),
+        "|µ|": (np.asarray(errors["spectral_radius"]), ""),
+    }
+    known = {name: (size[np.isfinite(size)], unit) for name, (size, unit) in sizes.items()}
+    return ", ".join(
+        f"{name} ± {np.median(size):.2g}{unit} in the median cell, {size.max():.2g}{unit} at most"
+        for name, (size, unit) in known.items()
+        if size.size
+    )
 
 
 def _span(axis: np.ndarray, unit: str) -> str:
