@@ -1,5 +1,6 @@
 """Designs against their closed forms, against what cannot be met, and where quantities fail."""
 
+import re
 from typing import NamedTuple
 
 import jax
@@ -123,7 +124,24 @@ def test_what_cannot_be_met_is_named_with_by_how_much():
     # Equal misses over the limits: (2e6 - k) / 2e6 = (k - 1e6) / 1e6.
     assert both.values[0] == pytest.approx(4e6 / 3.0, rel=1e-3)
     assert len(both.missed) == 2
-    assert "not reached" in repr(both)
+    words = " ".join(repr(both).split())
+    assert "no point was found that keeps the constraints; the best one breaks " in words
+    assert re.search(r"stiffness ≥ 2e\+06 by 6\.6\d+e\+05 and stiffness ≤ 1e\+06 by 3\.3\d+e\+05", words)
+
+
+def test_a_limit_beyond_where_a_quantity_exists_is_missed_there():
+    def force(model):
+        return jnp.where(model[K] < 3e6, 1e-4 * model[K], jnp.nan)
+
+    found = ij.design(MODEL, None, at_least(force, 400.0, name="fold force"), free=WIDE, scan=8)
+    assert found.result == ij.RESULTS.infeasible
+    assert found.values[0] == pytest.approx(3e6, rel=1e-3)
+    assert found.stopped.startswith("fold force is not finite at linear_stiffness.coefficient = 3")
+    words = " ".join(repr(found).split())
+    assert (
+        "no point was found that keeps the constraints; the best one breaks fold force ≥ 400 by 100" in words
+    )
+    assert f"the search went no further because {found.stopped}" in words
 
 
 def _lost_below(edge, target):

@@ -58,12 +58,14 @@ def design(
         seed: of these.
 
     Returns:
-        The design. Where the limits cannot be kept, `result` is `RESULTS.infeasible`, and `missed` names the
-        constraints that stand in the way with by how much they are missed.
+        The design. Where no point is found that keeps the limits, `result` is `RESULTS.infeasible`, `missed`
+        names the constraints that the best one breaks with by how much, and `stopped` the quantity that fails
+        beyond it, as a fold that is gone.
 
     Raises:
         ValueError: if a bound, name or constraint is not what it must be, or a quantity is not finite at the
-            start, or wherever the search goes from where it stands: with the quantity and the coefficients.
+            start, or wherever the search goes from a point that keeps the limits: with the quantity and the
+            coefficients.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Kraft 1988, DFVLR-FB 88-28 (SLSQP).
@@ -108,7 +110,8 @@ def design(
         found, compared = _searched(task, start, scan, seed)
     except NotFinite as lost:
         raise ValueError(
-            f"Argument `model` must start where all quantities are finite and stay so, but {lost}."
+            "Argument `model` must start where every quantity exists and is finite, and stay there, but "
+            f"{lost}."
         ) from None
     ended = "successful" if found.converged else "not_converged"
     return Design(
@@ -122,6 +125,7 @@ def design(
         space.upper,
         found.objective,
         before,
+        found.stopped,
         tuple(_outcome(one, found) for one in limits),
         result_named(ended if found.feasible else "infeasible"),
         compared,

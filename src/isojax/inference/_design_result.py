@@ -84,6 +84,8 @@ class Design(NamedTuple):
         scan: the design compared with other coefficients.
         evaluations: of quantities, those of the scan included.
         retreats: how often a quantity failed on the way and the search went back.
+        stopped: which quantity fails next to the best point, and where, if no point keeps the limits and the
+            search ended at the failure; "" otherwise.
     """
 
     model: Isolator
@@ -101,6 +103,7 @@ class Design(NamedTuple):
     scan: Scan
     evaluations: int
     retreats: int
+    stopped: str
 
     @property
     def changes(self) -> Float[np.ndarray, " coefficient"]:
@@ -114,7 +117,7 @@ class Design(NamedTuple):
 
     def _headline(self) -> str:
         if self.missed:
-            return f"not reached, {'; '.join(self.missed)}"
+            return f"not reached: no point was found that keeps the constraints; {_broken(self.outcomes)}"
         how = "" if is_successful(self.result) else f", not converged: {RESULTS[self.result]}"
         return f"objective {number(self.objective_before)} → {number(self.objective)}{how}"
 
@@ -139,4 +142,12 @@ class Design(NamedTuple):
 
     def _lines(self) -> list[str]:
         back = f", {self.retreats} times back from where a quantity failed" if self.retreats else ""
-        return [f"  {self.scan.words}", f"  {self.evaluations} evaluations{back}"]
+        end = [f"  the search went no further because {self.stopped}"] if self.stopped else []
+        return [*end, f"  {self.scan.words}", f"  {self.evaluations} evaluations{back}"]
+
+
+def _broken(outcomes: tuple[Outcome, ...]) -> str:
+    """Say which constraints the best point breaks, and by how much."""
+    lost = [one for one in outcomes if not one.kept]
+    words = " and ".join(f"{one.constraint.words} by {number(-float(np.min(one.margins)))}" for one in lost)
+    return f"the best one breaks {words}"

@@ -72,6 +72,7 @@ class FoundDesign(NamedTuple):
         violation: largest miss of a limit, over the limit; 0 where all are kept.
         converged: whether it is a minimum of what was searched.
         retreats: how often a quantity failed on the way and the search went back.
+        stopped: which quantity failed next to it, and where, if that ended the search; "" otherwise.
     """
 
     at: Float[np.ndarray, " coordinate"]
@@ -79,6 +80,7 @@ class FoundDesign(NamedTuple):
     violation: float
     converged: bool
     retreats: int
+    stopped: str = ""
 
     @property
     def feasible(self) -> bool:
@@ -101,7 +103,8 @@ def search(task: Task, start: Float[np.ndarray, " coordinate"]) -> FoundDesign:
         Where it ended.
 
     Raises:
-        NotFinite: if a quantity fails at the start, or wherever the search goes from where it stands.
+        NotFinite: if a quantity fails at the start, or wherever the search goes from a point that keeps the
+            limits.
 
     Source: Kraft 1988, DFVLR-FB 88-28 (SLSQP).
     """
@@ -125,6 +128,9 @@ def _in_boxes(task: Task, start: Float[np.ndarray, " coordinate"], elastic: bool
         except NotFinite as lost:
             retreats += 1
             radius = 0.5 * min(radius, float(np.max(np.abs(lost.at - centre))))
+            if radius < _SMALLEST_BOX and elastic:
+                # What the limits ask for lies where a quantity does not exist: no point keeps them.
+                return FoundDesign(centre, *stand(task, centre), False, retreats, str(lost))
             if radius < _SMALLEST_BOX:
                 raise
             continue
