@@ -218,6 +218,11 @@ def test_fits_that_the_data_do_not_separate_are_mixed_by_their_evidence(wide):
     expected = [brentq(lambda x, q=q: share_below(x) - q, 0.0, 3.0 * centre) for q in (0.025, 0.975)]
     np.testing.assert_allclose(found.interval, expected, atol=0.05 * error)
     assert "of 2 fits weighed 80%, 20%" in str(found)
+    # Two laws are not one normal distribution, but no quantity bends for that.
+    assert not found.curved
+    assert ij.uncertainty([wide, other], lambda model: model[STIFFNESS] ** 8).curved
+    spread = np.hypot(error, 0.4 * centre / 3.0)  # of the mixture
+    assert float(found.standard_error) == pytest.approx(spread, rel=0.02)
 
 
 def test_fits_to_other_records_are_not_mixed(wide):

@@ -31,17 +31,17 @@ class UncertainQuantity(NamedTuple):
 
     Attributes:
         value: at the fitted coefficients, in the quantity's own shape; NaN where it does not exist there.
-        standard_error: by the delta method; where `curved`, and the interval is known, standard deviation of
-            the draws that have the quantity.
-        interval: lower and upper end, first axis; where `curved`, quantiles of the draws. Where
-            `may_not_exist`, that of the values it has where it exists; elsewhere draws without it count as
-            lying outside. So it jumps where `probability` passes `confidence`: just above, it holds almost
+        standard_error: by the delta method; of several fits, or where `curved`, and the interval is known,
+            standard deviation of the draws that have the quantity.
+        interval: lower and upper end, first axis; of several fits, or where `curved`, quantiles of the draws.
+            Where `may_not_exist`, that of the values it has where it exists; elsewhere draws without it count
+            as lying outside. So it jumps where `probability` passes `confidence`: just above, it holds almost
             all values that the draws have; just below, the confidence of them. NaN where too few draws have
             it.
         confidence: chance that the interval, or "none" where `may_not_exist`, is meant to hold the truth.
         curved: where the quantity bends so much within the error of the coefficients that an end of the
             interval by the delta method differs from that by draws by more than a tenth of its width, and by
-            more than the count of draws explains.
+            more than the count of draws explains; of several fits, where it does so of one of them.
         draws: the quantity at coefficients drawn from their normal distribution, draw first; NaN where it
             does not exist.
         failed: share of the draws that gave no finite number.
@@ -190,15 +190,16 @@ def uncertainty(
         raise ValueError(
             "Argument `quantity` must give finite numbers near the fitted coefficients, but gave none."
         )
-    # The delta method knows one law.
+    # The delta method knows one law: several are not one normal distribution, whether or not a law bends.
     straight = error if len(fits) == 1 else np.full_like(error, np.nan)
     known = credible_set(value, straight, drawn, confidence)
     return UncertainQuantity(
+    bent = [credible_set(*part[:3], confidence).curved for part in parts]
         value,
         known.standard_error,
         known.interval,
         confidence,
-        known.curved,
+        np.any(bent, axis=0),
         drawn,
         float(1.0 - finite.mean()),
         next((part[3] for part in parts if part[3]), "" if finite.all() else NOT_FINITE),
