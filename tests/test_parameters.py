@@ -10,6 +10,7 @@ from isojax import paper
 from isojax._parameters import (
     ParameterSpec,
     find_parameter,
+    full_names,
     list_parameters,
     own_parameters,
     parameter,
@@ -151,3 +152,17 @@ def test_replacing_is_differentiable():
 
     slopes = jax.jacfwd(acceleration)(jnp.asarray([800.0, 1e6]))
     np.testing.assert_allclose(slopes, [(1e3 - 100.0) / 800.0**2, -1e-3 / 800.0], rtol=1e-13)
+
+
+def test_a_parameter_is_named_once_by_name_or_symbol(unchecked):
+    model = Isolator(800.0, (LinearStiffness(1e6), CoulombFriction(10.0, 1e-3)))
+    names = ("coulomb_friction.force_level", "linear_stiffness.coefficient")
+    assert full_names(model, ("Fc", "k1")) == full_names(model, names) == names
+    assert full_names(model, "k1") == names[1:]
+    assert full_names(model, ("pressure", "k1"), "free", "pressure") == ("pressure", names[1])
+    with pytest.raises(ValueError, match=r"`free` must name linear_stiffness\.coefficient once, .* 'k1' and"):
+        full_names(model, ("k1", names[1]), "free")
+    with pytest.raises(ValueError, match="`free` must list names of parameters, but is 3"):
+        full_names(model, 3, "free")
+    with pytest.raises(ValueError, match=r"`name` must name linear_stiffness\.coefficient once"):
+        model.replace(k1=1.0, linear_stiffness__coefficient=2.0)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ._show import shown
+from ._show import brief, shown
 from ._types import Scalar, as_float64
 
 _Model = TypeVar("_Model", bound=eqx.Module)
@@ -181,16 +181,66 @@ def find_parameter(model: eqx.Module, name: str, argument: str = "name", *others
     Raises:
         ValueError: if the model has no such parameter, or several with the symbol.
     """
-    listed = list_parameters(model)
-    found = [place for place, entry in enumerate(listed) if entry.name == name]
-    found = found or [place for place, entry in enumerate(listed) if entry.spec.symbol == name]
+    symbols = {entry.name: entry.spec.symbol for entry in list_parameters(model)}
+    return list(symbols).index(find_name(symbols, name, argument, *others))
+
+
+def find_name(symbols: Mapping[str, str], given: str, argument: str, *others: str) -> str:
+    """Find the name in reports that a name or a symbol stands for.
+
+    Args:
+        symbols: of each parameter, by its name; "" where it has none.
+        given: such as `coulomb_friction.force`, or `k1`.
+        argument: of the caller, which messages name.
+        *others: names that the argument could hold as well.
+
+    Returns:
+        The name.
+
+    Raises:
+        ValueError: if there is no such parameter, or several have the symbol.
+    """
+    found = [name for name in symbols if name == given]
+    found = found or [name for name, symbol in symbols.items() if symbol and symbol == given]
     if len(found) == 1:
         return found[0]
     if found:
-        several = " and ".join(listed[place].name for place in found)
-        raise ValueError(f"Argument `{argument}` names {name!r}, the symbol of {several}: name one of them.")
-    known = ", ".join((*(f"{entry.name} ({entry.spec.symbol})" for entry in listed), *others))
-    raise ValueError(f"Argument `{argument}` must be one of {known}, but is {name!r}.")
+        several = " and ".join(found)
+        raise ValueError(f"Argument `{argument}` names {given!r}, the symbol of {several}: name one of them.")
+    both = (f"{name} ({symbol})" if symbol else name for name, symbol in symbols.items())
+    raise ValueError(f"Argument `{argument}` must be one of {', '.join((*both, *others))}, but is {given!r}.")
+
+
+def full_names(
+    model: eqx.Module, names: Iterable[str] | str, argument: str = "name", *others: str
+) -> tuple[str, ...]:
+    """Give the names in reports of parameters that a caller named, each once.
+
+    Args:
+        model: the model.
+        names: names in reports, or symbols; a single one may stand by itself.
+        argument: of the caller, which messages name.
+        *others: names beside the parameters, which stand for themselves.
+
+    Returns:
+        The names, in the order given.
+
+    Raises:
+        ValueError: if these are no names, or two of them are of one parameter.
+    """
+    names = (names,) if isinstance(names, str) else names
+    if not isinstance(names, Iterable):
+        raise ValueError(f"Argument `{argument}` must list names of parameters, but is {brief(names)}.")
+    symbols = {entry.name: entry.spec.symbol for entry in list_parameters(model)}
+    found = dict[str, str]()
+    for given in names:
+        name = given if given in others else find_name(symbols, given, argument, *others)
+        if name in found:
+            raise ValueError(
+                f"Argument `{argument}` must name {name} once, but does so as {found[name]!r} and {given!r}."
+            )
+        found[name] = given
+    return tuple(found)
 
 
 def to_physical(free: Float[Array, ""], spec: ParameterSpec, scale: Scalar | float) -> Float[Array, ""]:

@@ -11,6 +11,7 @@ from identification.test_scatter_mixture import PRIOR, UNIT, mean_of, reduced_of
 from isojax import plot, rig
 from isojax.elements import AddedMass, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.identification import fit, next_test
+from isojax.identification.experiment._test_plan import plan_of
 from isojax.identification.fitting._scatter_mixture import expect_uncertainty
 from isojax.models import Integrator, Isolator
 
@@ -193,7 +194,11 @@ def test_the_picture_has_a_bar_for_each_record_that_could_be_simulated(found):
         plot.next_test(found._replace(proposals=tuple(one for one in found.proposals if one.reason)))
 
 
-def test_mistakes_are_refused(fitted):
+def test_one_level_band_or_number_of_dwells_may_stand_alone():
+    assert plan_of(2.0, 60.0, (4.0, 6.0), 3, 1.2) == plan_of(2.0, [60.0], [(4.0, 6.0)], (3,), 1.2)
+
+
+def test_mistakes_are_refused(fitted, unchecked):
     with pytest.raises(ValueError, match="`seconds` must be positive"):
         next_test(fitted, seconds=0.0)
     with pytest.raises(ValueError, match="`levels` must hold positive"):
@@ -202,6 +207,19 @@ def test_mistakes_are_refused(fitted):
         next_test(fitted, bands=((7.0, 4.0),))
     with pytest.raises(ValueError, match="`dwells` must hold divisors of 12"):
         next_test(fitted, dwells=(5,))
+    for given, words in (
+        ({"bands": [(1.0, 2.0), (3.0,)]}, "0 < lowest < highest"),
+        ({"bands": 5.0}, "0 < lowest < highest"),
+        ({"dwells": 2.4}, "`dwells` must hold divisors of 12, but is 2.4"),
+        ({"levels": "60"}, "`levels` must hold positive numbers, but is '60'"),
+        ({"rivals": ("linear_damping",)}, "`rivals` must be a pair"),
+        ({"rivals": ("linear_damping", "linear_damping")}, "`rivals` must be a pair"),
+        ({"rivals": ("linear_damping", 3)}, "`rivals` must end with an element .* of type int"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            next_test(fitted, **given)
+    with pytest.raises(ValueError, match="`quantity` must depend on the fitted coefficients"):
+        next_test(fitted, lambda model: 3.0)
     with pytest.raises(ValueError, match="`farthest` must be positive"):
         next_test(fitted, farthest=0.0)
     with pytest.raises(ValueError, match="finite real numbers"):

@@ -204,13 +204,16 @@ def test_a_chance_is_kept_by_the_error_of_the_fit_which_grows_with_the_coefficie
         ij.design(MODEL, stiffness, limit, free=WIDE)
 
 
-def test_mistakes_are_refused():
+def test_mistakes_are_refused(unchecked):
     for free, words in (
         ({}, "at least one coefficient"),
         ({"k": (1.0, 2.0)}, "one of mass"),
         ({K: (3e6, 1e6)}, "two finite numbers"),
         ({K: (3e6, 4e6)}, "start within the bounds"),
         ({"mass": (-1.0, 900.0)}, "must bound mass within"),
+        ([K], r"must give the bounds of at least one coefficient, .* but is \['linear"),
+        ({K: 3e6}, "two finite numbers, the lower first, but is 3000000"),
+        ({"k1": (1e5, 1e7), K: (1e5, 1e7)}, r"name linear_stiffness\.coefficient once"),
     ):
         with pytest.raises(ValueError, match=words):
             ij.design(MODEL, stiffness, free=free)
@@ -222,5 +225,11 @@ def test_mistakes_are_refused():
         at_most(stiffness, np.nan)
     with pytest.raises(ValueError, match=r"between 0\.5 and 1"):
         at_most(stiffness, 1.0, chance=99.0)
+    with pytest.raises(ValueError, match=r"`subject_to` must hold constraints, .* of type function"):
+        ij.design(MODEL, stiffness, stiffness, free=WIDE)
+    with pytest.raises(ValueError, match=r"`objective` must be differentiable by `jax\.jacfwd`"):
+        ij.design(MODEL, lambda model: float(model[K]), free=WIDE)
+    with pytest.raises(ValueError, match="`quantity` must be a function of an isolator"):
+        at_most("k1", 1e6)
     with pytest.raises(ValueError, match="`scan` must be at least 2"):
         ij.design(MODEL, stiffness, free=WIDE, scan=0)

@@ -258,6 +258,10 @@ def test_what_cannot_be_carried_is_refused(wide, unchecked):
         ij.uncertainty(wide, lambda model: 1j * model[STIFFNESS])
     with pytest.raises(ValueError, match="`confidence` must lie between 0 and 1"):
         ij.uncertainty(wide, lambda model: model[STIFFNESS], confidence=95.0)
+    with pytest.raises(ValueError, match="`draws` must be a whole number, but is nan"):
+        ij.uncertainty(wide, lambda model: model[STIFFNESS], draws=float("nan"))
+    with pytest.raises(ValueError, match=r"`fit\.free` must be one of .*, but is 'k9'"):
+        ij.uncertainty(wide._replace(free=("k9", *wide.free[1:])), lambda model: model[STIFFNESS])
     with pytest.raises(ValueError, match="`draws` must be at least 100"):
         ij.uncertainty(wide, lambda model: model[STIFFNESS], draws=10)
     with pytest.raises(ValueError, match="must have succeeded"):

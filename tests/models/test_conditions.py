@@ -105,10 +105,14 @@ def test_what_has_no_pressure_says_how_to_give_one(ask):
             r"`temperature` must not be given.* follows pressure",
         ),
         (MODEL, {"pressure": 0.0}, r"`pressure` must be positive, but is 0"),
+        (MODEL, {"pressure": [2e5, 3e5]}, r"`pressure` must be one real number, but has shape \(2,\)"),
+        (MODEL, {"pressure": "2 bar"}, r"`pressure` must be one real number, but is '2 bar'"),
         (ij.Isolator(MASS, LAWS), {"pressure": 2e5}, r"`pressure` must not be given.* follows nothing"),
     ],
 )
-def test_a_condition_that_is_missing_unknown_or_not_positive_is_refused(model, conditions, message):
+def test_a_condition_that_is_missing_unknown_or_not_positive_is_refused(
+    model, conditions, message, unchecked
+):
     with pytest.raises(ValueError, match=message):
         model.at(**conditions)
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from .._given_numbers import given_chance, given_numbers
 from .._show import number, shown
 from ..models import Isolator
 
@@ -56,7 +57,8 @@ def at_most(
         The constraint.
 
     Raises:
-        ValueError: if a limit is not finite, or the chance does not lie between 0.5 and 1.
+        ValueError: if the quantity is no function, a limit is not finite, or the chance does not lie between
+            0.5 and 1.
 
     Example:
         >>> stiff = ij.inference.at_most(lambda model: model["linear_stiffness.coefficient"], 1e6, name="k1")
@@ -97,11 +99,14 @@ def at_least(
 def _constraint(
     quantity: Callable[[Isolator], Any], limit: Any, upper: bool, name: str | None, chance: float | None
 ) -> Constraint:
-    limits = np.asarray(limit, dtype=float)
-    if not (limits.size and np.all(np.isfinite(limits))):
-        raise ValueError(f"Argument `limit` must hold finite numbers, but is {limit}.")
-    if chance is not None and not 0.5 < chance < 1.0:
-        raise ValueError(f"Argument `chance` must lie between 0.5 and 1, but is {chance}.")
+    limits = given_numbers("limit", limit, "hold finite numbers", np.isfinite)
+    if chance is not None:
+        chance = given_chance("chance", chance, least=0.5)
+    if not callable(quantity):
+        raise ValueError(
+            "Argument `quantity` must be a function of an isolator, such as lambda model: model['k1'], "
+            f"but is {quantity!r}."
+        )
     own = getattr(quantity, "__name__", "")
     label = name if name is not None else own if own.isidentifier() else "quantity"
     return Constraint(quantity, limits, upper, label.replace("_", " "), chance)

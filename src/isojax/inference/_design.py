@@ -1,11 +1,12 @@
 """Coefficients that meet a target, found along exact derivatives and compared with others."""
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from .._given_numbers import given_count
 from .._results import result_named
 from .._types import check_float64
 from ..models import EndsEstimated, Estimated, Isolator, Modelled, as_isolator, coefficient_errors
@@ -13,7 +14,7 @@ from ._constraint import Constraint
 from ._design_result import Design, Outcome
 from ._design_scan import Scan, scan_design
 from ._design_search import FoundDesign, Task, search, stand
-from ._design_space import NotFinite, Quantity, space_of
+from ._design_space import NotFinite, Quantity, given_bounds, space_of
 
 _RESTARTS = 3
 """Times that the search starts again from a better point of the scan."""
@@ -87,19 +88,13 @@ def design(
     """
     check_float64()
     model = as_isolator(model, recorded=True)
-    as_isolator(model, recorded=set(model.conditions) <= set(free))
-    constraints = (subject_to,) if isinstance(subject_to, Constraint) else tuple(subject_to)
-    if scan < 2:
-        raise ValueError(f"Argument `scan` must be at least 2, but is {scan}.")
-    for one in constraints:
-        if not isinstance(one, Constraint):
-            raise ValueError(
-                "Argument `subject_to` must hold constraints, such as `inference.at_most(quantity, limit)`, "
-                f"but holds one of type {type(one).__name__}."
-            )
+    bounds = given_bounds(model, free)
+    as_isolator(model, recorded=set(model.conditions) <= set(bounds))
+    constraints = _constraints(subject_to)
+    scan, seed = given_count("scan", scan, least=2), given_count("seed", seed, least=0)
     if fit is None and any(one.chance is not None for one in constraints):
         raise ValueError("Argument `fit` must be given where a constraint asks for a chance, but is missing.")
-    space = space_of(model, free)
+    space = space_of(model, bounds)
     errors = None if fit is None else coefficient_errors(fit, model)
     wanted = Quantity(space, objective, "the objective")
     limits = tuple(Quantity(space, one.quantity, one.name, one, errors) for one in constraints)
@@ -125,13 +120,26 @@ def design(
         space.upper,
         found.objective,
         before,
-        found.stopped,
         tuple(_outcome(one, found) for one in limits),
         result_named(ended if found.feasible else "infeasible"),
         compared,
         sum(one.evaluations for one in (wanted, *limits)),
         found.retreats,
+        found.stopped,
     )
+
+
+def _constraints(subject_to: Any) -> tuple[Constraint, ...]:
+    """Give the constraints that a caller gave, one or several."""
+    several = isinstance(subject_to, Iterable) and not isinstance(subject_to, Constraint)
+    given: tuple[Any, ...] = tuple(subject_to) if several else (subject_to,)
+    for one in given:
+        if not isinstance(one, Constraint):
+            raise ValueError(
+                "Argument `subject_to` must hold constraints, such as `inference.at_most(quantity, limit)`, "
+                f"but holds one of type {type(one).__name__}."
+            )
+    return given
 
 
 def _task(wanted: Quantity, limits: tuple[Quantity, ...], start: np.ndarray) -> Task:

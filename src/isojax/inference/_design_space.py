@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.special import ndtri
 
-from .._parameters import find_parameter, list_parameters, own_parameters, replace_parameters
+from .._given_numbers import asked_numbers, given_numbers
+from .._parameters import find_parameter, full_names, list_parameters, own_parameters, replace_parameters
 from .._show import number
 from ..models import CoefficientErrors, Isolator
 from ._constraint import Constraint
@@ -119,39 +120,59 @@ def _known_conditions(model: Isolator) -> dict[str, _Free]:
     return found
 
 
+def given_bounds(model: Isolator, free: Any) -> dict[str, tuple[float, float]]:
+    """Give the bounds that a caller gave, by full name.
+
+    Args:
+        model: the isolator.
+        free: lower and upper bound by name, symbol or operating condition.
+
+    Returns:
+        Both by name.
+
+    Raises:
+        ValueError: if these are no bounds, or a name is no parameter of the model and no condition that it
+            follows, or names one again.
+    """
+    if not isinstance(free, Mapping) or not free:
+        raise ValueError(
+            "Argument `free` must give the bounds of at least one coefficient, such as {'k1': (1e5, 1e7)}, "
+            f"but is {free!r}."
+        )
+    names = full_names(model, free, "free", *_known_conditions(model))
+    return {name: _ends(name, ends) for name, ends in zip(names, free.values(), strict=True)}
+
+
 def space_of(model: Isolator, free: Mapping[str, tuple[float, float]]) -> Space:
     """Give the coefficients and conditions that a design may choose.
 
     Args:
         model: the isolator.
-        free: lower and upper bound by name.
+        free: lower and upper bound by full name.
 
     Returns:
         The space. A condition starts at its reference, or at the bound next to it.
 
     Raises:
-        ValueError: if a name is no parameter of the model and no condition that it follows, a bound is not
-            finite, outside of what the coefficient admits or not below the other, or a coefficient starts
-            outside of its bounds.
+        ValueError: if a bound is outside of what the coefficient admits, or a coefficient starts outside of
+            its bounds.
     """
     listed, conditions = list_parameters(model), _known_conditions(model)
-    if not free:
-        raise ValueError("Argument `free` must name at least one coefficient with its bounds, but is empty.")
     bounds: dict[str, tuple[_Free, float, float]] = {}
     places: list[int] = []
-    for given, ends in sorted(free.items(), key=lambda item: item[0] in conditions):
-        low, high = _ends(given, ends)
-        if given in conditions:
-            name, one = given, conditions[given]
+    for name, (low, high) in sorted(free.items(), key=lambda item: item[0] in conditions):
+        if name in conditions:
+            one = conditions[name]
             one = one._replace(value=min(max(one.value, low), high))
         else:
-            place = find_parameter(model, given, "free", *conditions)
-            name, spec = listed[place].name, listed[place].spec
+            place = find_parameter(model, name)
+            spec = listed[place].spec
             places.append(place)
             one = _Free(float(listed[place].value), spec.unit, spec.lower, spec.upper)
         if low < one.lower or high > one.upper:
             raise ValueError(
-                f"Argument `free` must bound {name} within {one.lower:g} and {one.upper:g}, but by {ends}."
+                f"Argument `free` must bound {name} within {one.lower:g} and {one.upper:g}, but by {low:g} "
+                f"and {high:g}."
             )
         if not low <= one.value <= high:
             raise ValueError(
@@ -172,11 +193,12 @@ def space_of(model: Isolator, free: Mapping[str, tuple[float, float]]) -> Space:
     )
 
 
-def _ends(name: str, ends: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(one) for one in ends)
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise ValueError(f"Argument `free` must bound {name} by two finite numbers, but by {ends}.")
-    return low, high
+def _ends(name: str, ends: Any) -> tuple[float, float]:
+    wanted = f"bound {name} by two finite numbers, the lower first"
+    known = given_numbers("free", ends, wanted, np.isfinite)
+    if known.shape != (2,) or not known[0] < known[1]:
+        raise ValueError(f"Argument `free` must {wanted}, but is {ends}.")
+    return float(known[0]), float(known[1])
 
 
 class Answer(NamedTuple):
@@ -207,7 +229,7 @@ class Quantity:
         """Keep what is asked; nothing is evaluated yet. No quantity is the distance from the start."""
         self.space, self.name, self.constraint = space, name, constraint
         self.evaluations = 0
-        self._function = quantity
+        self._function, self._argument = quantity, "objective" if constraint is None else "quantity"
         self._errors = errors if constraint is not None and constraint.chance is not None else None
         self._known: dict[tuple[bytes, bool], Answer] = {}
 
@@ -265,7 +287,7 @@ class Quantity:
     def _flat(self, at: Array) -> Array:
         if self._function is None:
             return jnp.ravel(self.space.distance(at))
-        return jnp.ravel(jnp.asarray(self._function(self.space.moved(at)), dtype=float))
+        return jnp.ravel(asked_numbers(self._argument, self._function, self.space.moved(at)))
 
     def _twice(self, at: Array) -> tuple[Array, Array]:
         value = self._flat(at)
@@ -285,6 +307,6 @@ class Quantity:
                     numbers[place] = numbers[place] + share if gone else numbers[place] * (1.0 + share)
                 return numbers
 
-            return jnp.ravel(jnp.asarray(function(self.space.moved(at, shake)), dtype=float))
+            return jnp.ravel(asked_numbers(self._argument, function, self.space.moved(at, shake)))
 
         return np.linalg.norm(np.asarray(jax.jacfwd(shaken)(jnp.zeros(errors.steps))), axis=1)

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from scipy import stats
 
-from .._parameters import find_parameter, list_parameters, replace_parameters
+from .._given_numbers import as_numbers, given_chance, given_count
+from .._parameters import find_parameter, full_names, list_parameters, replace_parameters
 from .._progress import silent
 from .._results import RESULTS, cell_results
 from .._show import Row, brief, number, shown
@@ -146,8 +146,8 @@ def global_sensitivity(
         ['0.2', '0.8']
     """
     check_float64()
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
+    confidence, seed = given_chance("confidence", confidence), given_count("seed", seed, least=0)
+    samples = given_count("samples", samples)
     if samples < 64 or samples & (samples - 1):
         raise ValueError(f"Argument `samples` must be a power of 2, at least 64, but is {samples}.")
     if not isinstance(ranges, Mapping):
@@ -156,8 +156,7 @@ def global_sensitivity(
             f"{type(ranges).__name__}."
         )
     if model is not None:
-        listed = list_parameters(model)
-        ranges = {listed[find_parameter(model, name, "ranges")].name: ends for name, ends in ranges.items()}
+        ranges = dict(zip(full_names(model, ranges, "ranges"), ranges.values(), strict=True))
     names = tuple(ranges)
     if not names:
         raise ValueError("Argument `ranges` must name at least one input, but is empty.")
@@ -170,11 +169,9 @@ def global_sensitivity(
         own = {name: numbers[place] for place, name in enumerate(names)}
         answer = quantity(own if model is None else _moved(model, own))
         value, result = answer if isinstance(answer, tuple) else (answer, None)
-        return 1.0 * jnp.asarray(value), result  # a count that fails is NaN as well
+        return as_numbers("quantity", value), result
 
     (values, result), raised = evaluate(at, flat, progress)
-    if np.iscomplexobj(values):
-        raise ValueError("Argument `quantity` must give real numbers, but gave complex ones.")
     failed, reason = _failures(values, result, raised)
     kept = ~failed.reshape(points.shape[:2]).any(axis=1)
     if not 2 * kept.sum() >= samples:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._given_numbers import given_chance, given_count
 from .._parameters import list_parameters, to_free, to_physical
 from .._progress import Counted, silent
 from .._results import RESULTS, is_successful
@@ -157,11 +158,9 @@ def posterior(
     check_float64()
     numpyro = _numpyro()
     meant = as_fit(fit)
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
-    for argument, count, least in (("draws", draws, 10), ("warmup", warmup, 10), ("chains", chains, 2)):
-        if count < least:
-            raise ValueError(f"Argument `{argument}` must be at least {least}, but is {count}.")
+    confidence = given_chance("confidence", confidence)
+    draws, warmup = given_count("draws", draws, least=10), given_count("warmup", warmup, least=10)
+    chains, seed = given_count("chains", chains, least=2), given_count("seed", seed, least=0)
     if not is_successful(meant.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[meant.result]}")
     own = tuple(meant.parameters[name] for name in meant.free)

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 from scipy.special import ndtri
 
+from .._given_numbers import given_chance
 from .._parameters import find_parameter, list_parameters
 from .._progress import silent
 from .._quantities import typeset_unit
@@ -153,8 +154,7 @@ def profile(
     """
     check_float64()
     meant = as_fit(fit)
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
+    confidence = given_chance("confidence", confidence)
     if not is_successful(meant.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[meant.result]}")
     one = _coefficient(meant, name)

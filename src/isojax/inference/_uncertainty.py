@@ -1,14 +1,15 @@
 """Value, standard error and interval of a quantity of a fitted model."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from .._given_numbers import asked_numbers, given_chance, given_count
 from .._progress import silent
-from .._show import Row, brief, shown
+from .._show import Row, shown
 from .._types import check_float64
 from ..models import (
     CoefficientErrors,
@@ -118,7 +119,7 @@ class UncertainQuantity(NamedTuple):
 
 
 def uncertainty(
-    fit: Estimated | EndsEstimated | list[Any],
+    fit: Estimated | EndsEstimated | Sequence[Any],
     quantity: Callable[[Isolator], Any],
     *,
     confidence: float = 0.95,
@@ -136,7 +137,8 @@ def uncertainty(
     have it is then the probability that it exists, and the interval is stated beside it.
 
     Args:
-        fit: a fit, a saved one, or what ends with one: an extension, a closed loop.
+        fit: a fit, a saved one, or what ends with one: an extension, a closed loop; or a list of fits to the
+            same records, each of which is weighed by its evidence.
         quantity: function of an isolator that gives real numbers: one, or an array. It must be differentiable
             by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one; `find_again`
             lets it go through folds and orbits. Where it is NaN or raises, at a draw or at the fitted
@@ -169,11 +171,10 @@ def uncertainty(
         True
     """
     check_float64()
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"Argument `confidence` must lie between 0 and 1, but is {confidence}.")
-    if draws < 100:
-        raise ValueError(f"Argument `draws` must be at least 100, but is {draws}.")
-    fits = fit if isinstance(fit, list) else [fit]
+    confidence = given_chance("confidence", confidence)
+    draws, seed = given_count("draws", draws, least=100), given_count("seed", seed, least=0)
+    # A named tuple, which a saved fit may be, is one fit.
+    fits: list[Any] = list(fit) if isinstance(fit, list) or type(fit) is tuple else [fit]
     if not fits:
         raise ValueError("Argument `fit` must hold at least one fit, but the list is empty.")
     weights = _evidence(fits) if len(fits) > 1 else np.ones(1)
@@ -193,8 +194,8 @@ def uncertainty(
     # The delta method knows one law: several are not one normal distribution, whether or not a law bends.
     straight = error if len(fits) == 1 else np.full_like(error, np.nan)
     known = credible_set(value, straight, drawn, confidence)
-    return UncertainQuantity(
     bent = [credible_set(*part[:3], confidence).curved for part in parts]
+    return UncertainQuantity(
         value,
         known.standard_error,
         known.interval,
@@ -219,7 +220,7 @@ def _carried(
     """Give value, standard error by the delta method, draws of the quantity, and why it raised if it did."""
 
     def at(steps: Float[Array, " step"]) -> Array:
-        return 1.0 * jnp.asarray(quantity(errors.moved(steps)))  # a count that fails is NaN as well
+        return asked_numbers("quantity", quantity, errors.moved(steps))
 
     missing, known = "", None
     try:
@@ -228,8 +229,6 @@ def _carried(
         missing = _why_missing(quantity, errors)
         if not missing:
             raise problem
-    if known is not None and jnp.iscomplexobj(known[0]):
-        raise ValueError(f"Argument `quantity` must give real numbers, but gave {brief(known[0])}.")
     drawn, raised = evaluate(at, errors.draw(draws, seed), progress)
     if known is None:
         known = np.full(drawn.shape[1:], np.nan), np.full((*drawn.shape[1:], errors.steps), np.nan)

@@ -1,14 +1,15 @@
 """The coefficients of a fitted model with their errors: what carries a covariance into any answer."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Inexact
+from jaxtyping import Array, Bool, Float
 
-from .._parameters import list_parameters, replace_parameters
+from .._given_numbers import asked_numbers
+from .._parameters import full_names, list_parameters, replace_parameters
 from .._results import RESULTS, is_successful
 from .._show import shown
 from ._isolator import Isolator
@@ -95,7 +96,7 @@ class CoefficientErrors(NamedTuple):
 
     def carry(
         self, quantity: Callable[[Isolator], Array]
-    ) -> tuple[Inexact[Array, "..."], Inexact[Array, "... step"]]:
+    ) -> tuple[Float[Array, "..."], Float[Array, "... step"]]:
         """Give a quantity of the model, and its change by each independent step, to first order.
 
         The norm of the changes is the standard error.
@@ -107,31 +108,14 @@ class CoefficientErrors(NamedTuple):
             Both.
 
         Raises:
-            ValueError: if the quantity is no function, gives no array, or JAX cannot differentiate it.
+            ValueError: if the quantity is no function, gives no real numbers, or JAX cannot differentiate it.
         """
-        if not callable(quantity):
-            raise ValueError(
-                "Argument `quantity` must be a function of an isolator, such as lambda model: model['k1'], "
-                f"but is {quantity!r}."
-            )
 
         def twice(steps: Array) -> tuple[Array, Array]:
-            given = quantity(self.moved(steps))
-            if isinstance(given, Mapping | str) or given is None:
-                raise ValueError(
-                    "Argument `quantity` must give a number or an array, as of jnp.stack([...]), but gave "
-                    f"one of type {type(given).__name__}."
-                )
-            value = 1.0 * jnp.asarray(given)  # a yes or no is 1 or 0
+            value = asked_numbers("quantity", quantity, self.moved(steps))
             return value, value
 
-        try:
-            change, value = jax.jacfwd(twice, has_aux=True)(jnp.zeros(self.steps))
-        except jax.errors.JAXTypeError as problem:
-            raise ValueError(
-                "Argument `quantity` must be differentiable by `jax.jacfwd`, but makes a traced number "
-                "a plain one, as `float`, `if` and NumPy do. Use `jax.numpy` throughout."
-            ) from problem
+        change, value = jax.jacfwd(twice, has_aux=True)(jnp.zeros(self.steps))
         return value, change
 
     def inside(self, steps: Float[np.ndarray, "draw step"]) -> Bool[np.ndarray, " draw"]:
@@ -205,20 +189,21 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
                 "Argument `model` must be that of argument `fit`, such as fit.model, but differs in "
                 f"{', '.join(other) or 'its elements'}."
             )
+    free = full_names(held.model, held.free, "fit.free")
     covariance = np.asarray(held.covariance, dtype=float)
-    if covariance.shape != (len(held.free),) * 2:
+    if covariance.shape != (len(free),) * 2:
         raise ValueError(
-            f"Argument `fit` must have a covariance with a row and a column for each of its {len(held.free)} "
+            f"Argument `fit` must have a covariance with a row and a column for each of its {len(free)} "
             f"free coefficients, but its shape is {covariance.shape}."
         )
     variances = np.diag(covariance)
-    negative = [name for name, one in zip(held.free, variances, strict=True) if one < 0.0]
+    negative = [name for name, one in zip(free, variances, strict=True) if one < 0.0]
     if negative:
         raise ValueError(
             f"Argument `fit` must have variances of 0 or above, but not for {', '.join(negative)}."
         )
     size = np.sqrt(variances)
-    lost = [name for name, one in zip(held.free, size, strict=True) if not np.isfinite(one)]
+    lost = [name for name, one in zip(free, size, strict=True) if not np.isfinite(one)]
     if lost:
         raise ValueError(
             "Argument `fit` must determine each free coefficient, but its data do not determine "
@@ -241,5 +226,5 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
     kept = shares > _NO_SHARE * shares.max(initial=0.0)
     root = safe[:, None] * vectors[:, kept] * np.sqrt(shares[kept])
     names = [entry.name for entry in listed]
-    values = np.array([float(held.model[name]) for name in held.free])
-    return CoefficientErrors(held.model, tuple(names.index(name) for name in held.free), values, root)
+    values = np.array([float(held.model[name]) for name in free])
+    return CoefficientErrors(held.model, tuple(names.index(name) for name in free), values, root)

@@ -5,9 +5,9 @@ from typing import cast
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jax.core import Tracer
 
+from .._given_numbers import given_scalar
 from .._types import Scalar
 from ..elements import AbstractElement
 
@@ -31,14 +31,15 @@ def plain_elements(
         The effects that follow none, with what the others add to their strengths.
 
     Raises:
-        ValueError: if a condition is missing, follows nothing, or is not positive.
+        ValueError: if a condition is missing, follows nothing, or is not one positive number.
     """
     known = followed_conditions(elements)
     for name, value in conditions.items():
         if name not in known:
             followed = " and ".join(known) if known else "nothing"
             raise ValueError(f"Argument `{name}` must not be given: the model follows {followed}.")
-        if not isinstance(value, Tracer) and not np.all(np.asarray(value) > 0):
+        one = given_scalar(name, value)
+        if not isinstance(one, Tracer) and not one > 0.0:
             raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
     for name in known:
         if name not in conditions:

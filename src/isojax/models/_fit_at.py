@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._parameters import find_parameter, list_parameters, replace_parameters
+from .._parameters import find_parameter, full_names, list_parameters, replace_parameters
 from .._results import RESULTS
 from .._show import shown
 from .._types import Scalar
@@ -46,7 +46,8 @@ def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitA
         The isolator at the condition with its covariance.
 
     Raises:
-        ValueError: if there is no fit; if a condition is missing, follows nothing, or is not positive.
+        ValueError: if there is no fit; if a condition is missing, follows nothing, or is not one
+            positive number.
 
     Example:
         A fitted stiffness that follows the pressure, k(p) = k + dk (p/p0 - 1):
@@ -64,7 +65,7 @@ def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitA
         raise ValueError(
             f"Argument `fit` must be a fit, or end with one, but is of type {type(fit).__name__}."
         )
-    places = [find_parameter(held.model, name) for name in held.free]
+    places = [find_parameter(held.model, name) for name in full_names(held.model, held.free, "fit.free")]
     numbers = [entry.value for entry in list_parameters(held.model)]
 
     def plain(values: Array) -> Array:

@@ -13,6 +13,7 @@ from .._parameters import (
     Parameter,
     element_names,
     find_parameter,
+    full_names,
     list_parameters,
     parameter,
     replace_parameters,
@@ -135,11 +136,12 @@ class Isolator(eqx.Module):
             The new isolator.
 
         Raises:
-            ValueError: if there is no such parameter.
+            ValueError: if there is no such parameter, or it is given twice.
         """
         numbers = [entry.value for entry in list_parameters(self)]
-        for name, value in values.items():
-            numbers[find_parameter(self, name.replace("__", "."))] = jnp.asarray(value, dtype=float)
+        names = full_names(self, [name.replace("__", ".") for name in values])
+        for name, value in zip(names, values.values(), strict=True):
+            numbers[find_parameter(self, name)] = jnp.asarray(value, dtype=float)
         return replace_parameters(self, numbers)
 
     def element(self, name: str) -> AbstractElement | None:

@@ -4,7 +4,6 @@ import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -14,7 +13,7 @@ from ..._types import check_float64
 from ...elements import CATALOGUE, AbstractElement
 from ...models import Isolator, coefficient_errors
 from ...records import Campaign
-from ..diagnosis import DWELLS, Experiment
+from ..diagnosis import Experiment
 from ..fitting import Fit, Fitted, Point, Uncertainty, as_fit, expect_uncertainty, plain_unit
 from ..guess import scales as campaign_scales
 from ._candidate_experiments import repeated_campaign
@@ -28,6 +27,7 @@ from ._record_candidates import (
 )
 from ._simulated_records import TrialRun
 from ._test_outline import TestOutline, find_test_outline
+from ._test_plan import plan_of
 from ._trial_information import (
     DIVERGES,
     Columns,
@@ -75,9 +75,9 @@ def next_test(
     *,
     rivals: tuple[str, str | AbstractElement] | None = None,
     seconds: float | None = None,
-    levels: Sequence[float] | None = None,
-    bands: Sequence[tuple[float, float]] | None = None,
-    dwells: Sequence[int] = USUAL_DWELLS,
+    levels: Sequence[float] | float | None = None,
+    bands: Sequence[tuple[float, float]] | tuple[float, float] | None = None,
+    dwells: Sequence[int] | int = USUAL_DWELLS,
     farthest: float = 1.2,
 ) -> NextTest:
     """Find the record that shrinks the intervals most, or that separates two effects best.
@@ -100,7 +100,8 @@ def next_test(
             omitted.
         bands: lowest and highest frequency of each [Hz]; the campaign's, parts of it, and to half the lowest
             and twice the highest frequency if omitted.
-        dwells: of a stepped sine; each lasts the same share of the record.
+        dwells: of a stepped sine; each lasts the same share of the record. One level, one band or one number
+            of dwells may stand alone.
         farthest: largest displacement over that of the campaign; records that go beyond it are left out,
             because neither the model nor the room for motion was tested there.
 
@@ -109,8 +110,9 @@ def next_test(
 
     Raises:
         ValueError: if the fit failed or nothing drove its records on and on; if the data do not determine a
-            coefficient and a quantity is asked for; if the quantity is not finite, `rivals` are not such
-            effects, or a number is not positive.
+            coefficient and a quantity is asked for; if the quantity is not finite or depends on no fitted
+            coefficient, `rivals` are not such effects, or levels, bands, dwells, length or reach are not what
+            they must be.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Fedorov 1972, Theory of Optimal Experiments, ch. 2 (D- and c-optimality); Hunter & Reiner 1965,
@@ -129,21 +131,22 @@ def next_test(
     fit = as_fit(fit)
     if not is_successful(fit.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[fit.result]}")
-    _check_plan(seconds, levels, bands, dwells, farthest)
+    plan = plan_of(seconds, levels, bands, dwells, farthest)
     asked = _ask(fit, quantity, rivals)
     campaign, problem = fit.campaign, fit.estimate.problem
     steps = problem.integrator.record_steps(fit.model)
     outline = find_test_outline(campaign, steps, every_sample=needs_every_sample(asked.columns))
     if outline is None:
         raise ValueError("Argument `fit` must be of records that are driven on and on, but none is.")
+    seconds = plan.seconds
     if seconds is None:
         seconds = float(np.mean([one.input.size / one.rate for one in campaign.fit_records]))
     candidates = record_candidates(
         campaign,
         outline_of_record(outline, seconds, steps),
-        usual_levels(outline) if levels is None else levels,
-        usual_bands(outline) if bands is None else bands,
-        dwells,
+        plan.levels or usual_levels(outline),
+        plan.bands or usual_bands(outline),
+        plan.dwells,
     )
     largest = _largest_motion(asked.columns, campaign, outline)
     proposals = []
@@ -151,7 +154,7 @@ def next_test(
         alike = tuple(group)
         for first in range(0, len(alike), _SIDE_BY_SIDE):
             proposals += _proposals(
-                asked, outline, alike[first : first + _SIDE_BY_SIDE], seconds, farthest * largest
+                asked, outline, alike[first : first + _SIDE_BY_SIDE], seconds, plan.farthest * largest
             )
     listed = {entry.name: entry for entry in list_parameters(fit.model)}
     value = np.zeros(0) if quantity is None else np.ravel(np.asarray(quantity(fit.model), dtype=float))
@@ -168,27 +171,6 @@ def next_test(
     )
 
 
-def _check_plan(
-    seconds: float | None,
-    levels: Sequence[float] | None,
-    bands: Sequence[tuple[float, float]] | None,
-    dwells: Sequence[int],
-    farthest: float,
-) -> None:
-    if not farthest > 0.0:
-        raise ValueError(f"Argument `farthest` must be positive, but is {farthest}.")
-    if seconds is not None and not 0.0 < seconds < np.inf:
-        raise ValueError(f"Argument `seconds` must be positive and finite, but is {seconds}.")
-    if levels is not None and not (len(levels) and all(0.0 < level < np.inf for level in levels)):
-        raise ValueError(f"Argument `levels` must hold positive numbers, but is {levels}.")
-    if bands is not None and not (len(bands) and all(0.0 < low < high < np.inf for low, high in bands)):
-        raise ValueError(f"Argument `bands` must hold pairs 0 < lowest < highest, but is {bands}.")
-    # Each segment of a simulated record has an even number of samples.
-    samples = 2 * DWELLS
-    if not (len(dwells) and all(count > 0 and samples % count == 0 for count in dwells)):
-        raise ValueError(f"Argument `dwells` must hold divisors of {samples}, but is {tuple(dwells)}.")
-
-
 def _ask(
     fit: Fit,
     quantity: Callable[[Isolator], Any] | None,
@@ -200,16 +182,19 @@ def _ask(
     if quantity is not None:
         carrying = coefficient_errors(fit)
         sizes = known.standard_error
-        value, change = carrying._replace(root=np.diag(sizes)).carry(
-            lambda model: jnp.asarray(quantity(model))
-        )
+        value, change = carrying._replace(root=np.diag(sizes)).carry(quantity)
         gradient = np.reshape(np.asarray(change), (-1, sizes.size)) / sizes
-        if jnp.iscomplexobj(value) or not (np.all(np.isfinite(value)) and np.all(np.isfinite(gradient))):
+        if not (np.all(np.isfinite(value)) and np.all(np.isfinite(gradient))):
             raise ValueError(
                 "Argument `quantity` must give finite real numbers with finite derivatives at the fitted "
                 f"coefficients, but gave {np.asarray(value)}."
             )
         errors = _errors_of(gradient, fit.covariance)
+        if not np.all(errors > 0.0):
+            raise ValueError(
+                "Argument `quantity` must depend on the fitted coefficients, but number "
+                f"{int(np.argmin(errors))} of it does not."
+            )
     probes, effect = _rival(fit, rivals)
     scales = campaign_scales(fit.campaign)
     columns = trial_columns(fit.estimate, probes, tuple(probe.typical_strength(scales) for probe in probes))
@@ -230,6 +215,11 @@ def _rival(
     """Give what may stand in place of an effect, at zero strength, and the column of the effect."""
     if rivals is None:
         return (), -1
+    if not isinstance(rivals, tuple | list) or len(rivals) != 2 or rivals[0] == rivals[1]:
+        raise ValueError(
+            "Argument `rivals` must be a pair, an effect of the model and another that may stand in its "
+            f"place, but is {rivals!r}."
+        )
     name, given = rivals
     labels = element_names(fit.model)
     strengths = {
@@ -248,6 +238,11 @@ def _rival(
                 f"{given!r}."
             )
         given = CATALOGUE[given].guess(campaign_scales(fit.campaign))
+    if not isinstance(given, AbstractElement):
+        raise ValueError(
+            "Argument `rivals` must end with an element or a name of the catalogue, but ends with one of "
+            f"type {type(given).__name__}."
+        )
     return (absent(given),), fit.free.index(strengths[name])
 
 

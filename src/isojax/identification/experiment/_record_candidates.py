@@ -102,9 +102,18 @@ def record_candidates(
                 outline.rate,
                 campaign.output.quantity,
                 waveform,
-                lacking="" if high <= HIGHEST * outline.rate else "the sampling rate is too low for its band",
+                lacking=_lacking(outline, waveform, low, high),
                 backward=backward,
                 dwells=count,
             )
         )
     return tuple(found)
+
+
+def _lacking(outline: TestOutline, waveform: Waveform, low: float, high: float) -> str:
+    """Say why a record cannot be measured in a band; "" if it can."""
+    if high > HIGHEST * outline.rate:
+        return "the sampling rate is too low for its band"
+    seconds = DWELLS * outline.samples / outline.rate
+    lines = waveform != "multisine" or np.floor(high * seconds) >= np.ceil(low * seconds)
+    return "" if low * seconds >= 1.0 and lines else "the record is too short for its band"

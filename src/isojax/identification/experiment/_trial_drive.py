@@ -57,12 +57,14 @@ def _sweep(outline: TestOutline, first: float, last: float) -> Float[np.ndarray,
 
 
 def _multisine(outline: TestOutline, lowest: float, highest: float, seed: int) -> Float[np.ndarray, " time"]:
-    """Give a multisine of unit rms."""
+    """Give a multisine of unit rms; NaN where none of its lines lies in the band."""
     total = DWELLS * outline.samples
     orders = np.arange(total // 2)
     inside = (
         (orders >= lowest * total / outline.rate) & (orders <= highest * total / outline.rate) & (orders > 0)
     )
+    if not inside.any():
+        return np.full(total, np.nan)
     spectrum = np.zeros(total // 2 + 1, dtype=complex)
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, orders.size)
     spectrum[orders[inside]] = np.exp(1j * phases[inside])

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from ..._parameters import Parameter, find_parameter, list_parameters, replace_parameters
+from ..._parameters import Parameter, full_names, list_parameters, replace_parameters
 from ..._results import RESULTS, is_successful
 from ..._show import shown
 from ...elements import Scales
@@ -120,18 +120,17 @@ def free_places(
         Their places in `list_parameters`.
 
     Raises:
-        ValueError: if a name is no parameter of the model, or nothing is left to fit.
+        ValueError: if a name is no parameter of the model or names one again, or nothing is left to fit.
     """
-    held = {find_parameter(model, name, "fixed") for name in fixed}
-    chosen = {find_parameter(model, name, "free") for name in free or ()}
+    held, chosen = full_names(model, fixed, "fixed"), full_names(model, free or (), "free")
 
-    def is_free(place: int, entry: Parameter) -> bool:
+    def is_free(entry: Parameter) -> bool:
         if free is not None:
-            return place in chosen
+            return entry.name in chosen
         wanted = entry.spec.fitted or (entry.name == "mass" and mass_free)
-        return wanted and place not in held
+        return wanted and entry.name not in held
 
-    places = tuple(place for place, entry in enumerate(list_parameters(model)) if is_free(place, entry))
+    places = tuple(place for place, entry in enumerate(list_parameters(model)) if is_free(entry))
     if not places:
         raise ValueError(
             "Arguments `free` and `fixed` must leave at least one coefficient to fit, but leave none."

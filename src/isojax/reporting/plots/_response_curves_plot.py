@@ -5,6 +5,7 @@ from jaxtyping import Int
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._given_numbers import given_count
 from ...models import EndsEstimated, Estimated
 from ...stability import StabilityMap, frequency_response
 from ._branch_plots import draw_branch_band, threads
@@ -40,8 +41,7 @@ def plot_response_curves(
         ValueError: if `curves` is no positive count, or `fit` failed, leaves a coefficient undetermined or is
             of another model.
     """
-    if curves < 1:
-        raise ValueError(f"Argument `curves` must be a positive count, but is {curves}.")
+    curves = given_count("curves", curves)
     figure, ax = axes_for(ax, 7.2, 4.2)
     frequency, amplitudes = np.asarray(smap.frequencies), np.asarray(smap.amplitudes)
     shape = (-1, amplitudes.size, frequency.size)

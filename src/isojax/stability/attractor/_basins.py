@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from ..._given_numbers import given_count
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
@@ -16,7 +17,7 @@ from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, as_isolator
 from ..orbit import ascending, integrator_for, period_map, recorded_sine
-from ._stroboscope import Repetition, Watch, bounded_or_not, check_counts, repeats_after, settle_down
+from ._stroboscope import Repetition, Watch, bounded_or_not, repeats_after, settle_down
 
 _SAME_ATTRACTOR = 1000.0
 """Distance over the tolerance of a repetition up to which two settled motions are one: a motion that repeats
@@ -99,7 +100,9 @@ def basins_of_attraction(
     """
     model = as_isolator(model)
     check_float64()
-    check_counts(settle=settle, most=most, longest=longest)
+    settle = given_count("settle", settle)
+    most = given_count("most", most)
+    longest = given_count("longest", longest)
     integrator = integrator_for(model, integrator)
     places = ascending("displacements", displacements, positive=False)
     speeds = ascending("velocities", velocities, positive=False)

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from ..._given_numbers import given_count
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
@@ -20,7 +21,6 @@ from ._stroboscope import (
     Watch,
     any_disturbance,
     bounded_or_not,
-    check_counts,
     repeats_after,
     start_states,
     still_settling,
@@ -177,7 +177,9 @@ def bifurcation_diagram(
         raise ValueError(
             f"Argument `direction` must be one of {get_args(SweepDirection)}, but is {direction!r}."
         )
-    check_counts(settle=settle, samples=samples, longest=longest)
+    settle = given_count("settle", settle)
+    samples = given_count("samples", samples)
+    longest = given_count("longest", longest)
     if 2 * longest > samples:
         raise ValueError(f"Argument `longest` must be at most half of {samples} samples, but is {longest}.")
     begin = start_states(model, "starts", starts)

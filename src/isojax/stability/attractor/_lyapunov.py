@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._given_numbers import given_count
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import amount, shown
@@ -15,7 +16,7 @@ from ..._types import Lanes, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, as_isolator
 from ..orbit import integrator_for, recorded_sine
-from ._stroboscope import Watch, any_disturbance, bounded_or_not, check_counts, start_states, watch_settled
+from ._stroboscope import Watch, any_disturbance, bounded_or_not, start_states, watch_settled
 
 _BLOCKS = 20
 """Segments of the motion whose scatter gives the standard error."""
@@ -76,7 +77,8 @@ def largest_lyapunov_exponent(
     """
     model = as_isolator(model)
     check_float64()
-    check_counts(settle=settle, periods=periods)
+    settle = given_count("settle", settle)
+    periods = given_count("periods", periods)
     if periods < _BLOCKS:
         raise ValueError(f"Argument `periods` must be at least {_BLOCKS}, but is {periods}.")
     integrator = integrator_for(model, integrator)

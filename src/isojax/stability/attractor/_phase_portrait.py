@@ -5,6 +5,7 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._given_numbers import given_count
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
@@ -12,7 +13,7 @@ from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, as_isolator
 from ..orbit import AbstractStatePath, integrator_for, recorded_sine, trajectory
-from ._stroboscope import bounded_or_not, check_counts, settle_down, start_states
+from ._stroboscope import bounded_or_not, settle_down, start_states
 
 
 @shown
@@ -58,7 +59,8 @@ def phase_portrait(
     """
     model = as_isolator(model)
     check_float64()
-    check_counts(settle=settle, periods=periods)
+    settle = given_count("settle", settle)
+    periods = given_count("periods", periods)
     integrator = integrator_for(model, integrator)
     return _portrait(model, excitation, start_states(model, "start", start), integrator, settle, periods)
 

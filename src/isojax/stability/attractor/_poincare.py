@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._given_numbers import given_count
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
@@ -15,7 +16,7 @@ from ..._types import check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, State, advance, as_isolator
 from ..orbit import AbstractStatePath, PeriodicDrive, integrator_for, recorded_sine, trajectory
-from ._stroboscope import Watch, bounded_or_not, check_counts, settle_down, start_states
+from ._stroboscope import Watch, bounded_or_not, settle_down, start_states
 
 
 @shown
@@ -66,7 +67,8 @@ def poincare_section(
     """
     model = as_isolator(model)
     check_float64()
-    check_counts(settle=settle, periods=periods)
+    settle = given_count("settle", settle)
+    periods = given_count("periods", periods)
     integrator = integrator_for(model, integrator)
     turns = np.asarray(phases, dtype=float)
     if turns.ndim != 1 or not turns.size:

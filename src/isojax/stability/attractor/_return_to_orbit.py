@@ -10,13 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..._given_numbers import given_count
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import brief, shown
 from ..._types import Lanes, check_float64
 from ...models import Integrator, Isolator, State
 from ..orbit import Orbit, PeriodicDrive, integrator_for, modulus, multipliers, period_map, recorded_sine
-from ._stroboscope import bounded_or_not, check_counts
+from ._stroboscope import bounded_or_not
 
 _FIXED_POINT_STEPS = 4
 """Steps of Newton's method from the orbit to the fixed point of the fixed steps, 1e-5 of it away."""
@@ -96,7 +97,7 @@ def return_to_orbit(
     Source: the paper, section 5, Figs. 20 and 21.
     """
     check_float64()
-    check_counts(periods=periods)
+    periods = given_count("periods", periods)
     integrator = integrator_for(model, integrator, 256)
     kick = jnp.asarray(np.asarray(perturbation, dtype=float))
     if kick.shape != orbit.y0.shape:

@@ -227,20 +227,6 @@ def bounded_or_not(finite: Bool[Array, "..."]) -> RESULTS:
     return ending(finite)
 
 
-def check_counts(**counts: int) -> None:
-    """Refuse counts that are not positive.
-
-    Args:
-        **counts: each by the name of its argument.
-
-    Raises:
-        ValueError: if one is below one.
-    """
-    for name, count in counts.items():
-        if count < 1:
-            raise ValueError(f"Argument `{name}` must be a positive count, but is {count}.")
-
-
 def start_states(model: Isolator, name: str, starts: Any) -> State:
     """Give starts, one array a state.
 

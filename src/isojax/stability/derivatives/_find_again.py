@@ -1,7 +1,13 @@
 """A known answer found again for another model: what JAX can trace, batch and differentiate."""
 
+from collections.abc import Callable
 from typing import Any, TypeVar, get_args
 
+import jax
+
+from ..._given_numbers import given_scalar
+from ..._parameters import element_names
+from ..._show import listed
 from ..._types import Scalar, as_float64, check_float64
 from ...models import Isolator, Modelled, as_isolator
 from ..branch import (
@@ -49,8 +55,8 @@ def find_again(
         The answer for this model.
 
     Raises:
-        ValueError: if `answer` is none of these or is traced, or a drive is given that it solves for or
-            that differs from cell to cell.
+        ValueError: if `answer` is none of these or is traced, `model` has other elements, or a drive is no
+            single number, or is given though the answer solves for it or it differs from cell to cell.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Newton's method from the known solution; derivatives by the implicit function theorem.
@@ -66,13 +72,13 @@ def find_again(
     """
     isolator = as_isolator(model)
     check_float64()
-    finders: dict[type, Any] = {
-        Orbit: find_orbit_again,
-        SpecialPoint: _special_point,
-        CodimensionTwoPoint: _codimension_two,
-        StabilityMap: _map,
-        Resonance: _resonance,
-        Transmissibility: _transmissibility,
+    finders: dict[type, tuple[Any, Callable[[Any], Isolator]]] = {
+        Orbit: (find_orbit_again, lambda orbit: orbit.model),
+        SpecialPoint: (_special_point, lambda point: point.family.model),
+        CodimensionTwoPoint: (_codimension_two, lambda point: point.family.model),
+        StabilityMap: (_map, lambda smap: smap.model),
+        Resonance: (_resonance, lambda resonance: resonance.orbit.model),
+        Transmissibility: (_transmissibility, lambda curve: curve.orbits.model),
     }
     if type(answer) not in finders:
         raise ValueError(
@@ -84,8 +90,27 @@ def find_again(
             "Argument `answer` must hold known numbers, but JAX is tracing it. Find it outside the function "
             "that JAX transforms."
         )
-    drive = [None if value is None else as_float64(value) for value in (amplitude, frequency)]
-    return finders[type(answer)](answer, isolator, *drive)
+    drive = [
+        None if value is None else given_scalar(name, value)
+        for name, value in (("amplitude", amplitude), ("frequency", frequency))
+    ]
+    finder, model_of = finders[type(answer)]
+    _check_alike(model_of(answer), isolator)
+    return finder(answer, isolator, *drive)
+
+
+def _check_alike(known: Isolator, model: Isolator) -> None:
+    """Refuse an isolator that is another by more than its numbers."""
+    if jax.tree.structure(known) == jax.tree.structure(model):
+        return
+    own, other = (
+        f"{listed(element_names(one), 20)} under {one.excitation.replace('_', ' ')}" for one in (known, model)
+    )
+    other = "others of their fields" if own == other else other
+    raise ValueError(
+        f"Argument `model` must differ from the isolator of `answer` in numbers only ({own}), but has "
+        f"{other}."
+    )
 
 
 def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequency: Any) -> SpecialPoint:

@@ -11,6 +11,7 @@ import optimistix as optx
 from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
+from ..._given_numbers import given_count
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
@@ -143,8 +144,7 @@ def harmonic_balance(
     size = 2 + model.internal_states
     if start is not None and len(start) != size:
         raise ValueError(f"Argument `start` must hold {size} states, but holds {len(start)}.")
-    if harmonics < 1:
-        raise ValueError(f"Argument `harmonics` must be a positive count, but is {harmonics}.")
+    harmonics, samples = given_count("harmonics", harmonics), given_count("samples", samples)
     order = highest_order(frozen(model))
     if harmonics < order:
         raise ValueError(

@@ -11,6 +11,7 @@ import optimistix as optx
 from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
+from ..._given_numbers import given_count
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS, is_successful
@@ -150,8 +151,7 @@ def find_periodic_orbit(
     size = 2 + model.internal_states
     if start is not None and len(start) != size:
         raise ValueError(f"Argument `start` must hold {size} states, but holds {len(start)}.")
-    if periods < 1:
-        raise ValueError(f"Argument `periods` must be a positive count, but is {periods}.")
+    periods = given_count("periods", periods)
     still, drive = frozen((model, excitation))
     frequency = drive.frequency
     if not isinstance(frequency, Tracer) and not 0.0 < float(frequency) < math.inf:
