@@ -226,7 +226,7 @@ def test_fold_force_moves_as_the_fold_that_differences_find(paper: ij.Isolator):
     for name in names[:2]:
         assert float(backwards[name]) == pytest.approx(float(sens.by("value", name)), rel=1e-10)
     # The amplitude is what the fold solves for.
-    with pytest.raises(ValueError, match=r"names 'drive\.amplitude'"):
+    with pytest.raises(ValueError, match=r"must be one of .*, but is 'drive\.amplitude'"):
         ij.sensitivity(point, parameters=("drive.amplitude",))
 
 
@@ -242,7 +242,11 @@ def test_function_of_a_model_is_differentiated_by_name():
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"parameters": ["stiffness"]}, "`parameters` must name some of mass, .* names 'stiff"),
+        ({"parameters": ["stiffness"]}, r"`parameters` must be one of mass \(m\), .* but is 'stiff"),
+        ({"parameters": ["k1", STATIC[0]]}, r"name linear_stiffness\.coefficient once, .* 'k1' and 'linear"),
+        ({"parameters": []}, "`parameters` must name some of mass, .* but is empty"),
+        ({"parameters": 3}, "`parameters` must list names of parameters, but is 3"),
+        ({"covariance": np.eye(2), "covariance_of": ("k1", STATIC[0])}, "`covariance_of` must name linear_s"),
         ({"covariance": np.eye(2)}, "`covariance` and `covariance_of` must be given together"),
         ({"covariance": np.eye(3), "covariance_of": STATIC[:2]}, "a row and a column for each of 2 names"),
         (
@@ -251,9 +255,59 @@ def test_function_of_a_model_is_differentiated_by_name():
         ),
     ],
 )
-def test_what_does_not_fit_together_is_refused(given: dict, words: str):
+def test_what_does_not_fit_together_is_refused(given: dict, words: str, unchecked):
     with pytest.raises(ValueError, match=words):
         ij.sensitivity(lambda model: jnp.asarray(model.mass), linear(), **given)
+
+
+def test_a_symbol_names_a_coefficient_as_its_name_does():
+    def static(model: ij.Isolator):
+        return model["k1"] ** 2 * model["c1"]
+
+    whole = ij.sensitivity(static, linear())
+    some = ij.sensitivity(static, linear(), parameters=["c1", "k1"], covariance=np.eye(1), covariance_of="k1")
+    assert some.parameters == (STATIC[1], STATIC[0])
+    assert float(whole.by("value", "c1")) == float(some.by("value", STATIC[1])) == STIFFNESS**2
+    assert float(some.standard_errors["value"]) == pytest.approx(2.0 * STIFFNESS * DAMPING)
+    with pytest.raises(ValueError, match=r"`parameter` must be one of .*\(c1\), .*\(k1\), but is 'm'"):
+        some.by("value", "m")
+
+
+def test_the_print_of_a_map_says_how_far_its_cells_move():
+    """Made up: the response moves by 1 to 9 % a newton of the drive, and by twice as much with the damper."""
+    response, share = np.full((3, 3), 2e-4), np.arange(1.0, 10.0).reshape(3, 3)
+    slopes = np.stack([-2.0 * share / DAMPING * response, 0.01 * share * response])
+    names = ("linear_damping.coefficient", "drive.amplitude")
+    at, values = jnp.asarray([DAMPING, np.nan]), {"response": jnp.asarray(response)}
+    moved = {"response": jnp.asarray(slopes)}
+    shown = repr(ij.Sensitivity(names, ("c1", ""), ("N s/m", "N"), at, values, moved, None, 1.5e-5))
+    assert "linear_damping.coefficient +1 %  response 10 (-18) %" in shown
+    assert "drive.amplitude +1 N             response 5 (+9) %" in shown
+    assert "relative error at most 1.5e-05" in shown
+
+
+def test_what_has_no_percent_or_no_derivative_is_treated_as_such(unchecked):
+    zero = repr(ij.sensitivity(lambda model: model["k1"] - STIFFNESS, linear(), parameters="k1"))
+    assert "linear_stiffness.coefficient +1 %  value +1e+04" in zero  # of zero there are no percent
+    with pytest.raises(ValueError, match=r"`subject` must be an orbit, .* but is of type str"):
+        ij.sensitivity("k1", linear())
+    with pytest.raises(ValueError, match=r"`subject` must be differentiable by `jax\.jacfwd`"):
+        ij.sensitivity(lambda model: float(model["k1"]), linear())
+
+
+@pytest.mark.parametrize(
+    ("model", "drive", "words"),
+    [
+        (ij.Isolator(MASS, (ij.LinearStiffness(STIFFNESS),)), {}, "numbers only .* has linear_stiffness un"),
+        (linear(), {"amplitude": np.ones(2)}, r"`amplitude` must be one real number, but has shape \(2,\)"),
+        (linear(), {"amplitude": "100"}, "`amplitude` must be one real number, but is '100'"),
+        (linear(), {"frequency": 1j}, r"`frequency` must be one real number"),
+    ],
+)
+def test_an_answer_of_other_elements_or_drives_is_not_found_again(model, drive, words, unchecked):
+    known = ij.stability_map(linear(), [FORCE], [FREQUENCY])
+    with pytest.raises(ValueError, match=words):
+        ij.find_again(known, model, **drive)
 
 
 def test_a_function_needs_its_model():

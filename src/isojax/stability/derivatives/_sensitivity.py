@@ -1,14 +1,15 @@
 """How orbits, their multipliers and whatever follows from them move with each coefficient."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..._parameters import list_parameters
-from ..._quantities import DRIVE_UNITS
+from ..._parameters import find_name, full_names, list_parameters
+from ..._quantities import DRIVE_UNITS, typeset_unit
 from ..._show import Row, brief, shown
 from ..._types import check_float64
 from ...models import Isolator
@@ -17,7 +18,7 @@ from ..map import StabilityMap
 from ..orbit import Orbit
 from ..response import Resonance
 from ._parameter_values import DRIVE
-from ._subjects import as_subject
+from ._subjects import Subject, as_subject
 
 
 @shown
@@ -26,6 +27,7 @@ class Sensitivity(eqx.Module):
 
     Attributes:
         parameters: names, such as `cubic_stiffness.coefficient`; `drive.amplitude` and `drive.frequency`.
+        symbols: of the parameters; "" for the drive.
         units: of the parameters.
         at: their values; NaN for the drive of a map, which differs from cell to cell.
         values: the quantities, by name.
@@ -37,6 +39,7 @@ class Sensitivity(eqx.Module):
     """
 
     parameters: tuple[str, ...] = eqx.field(static=True)
+    symbols: tuple[str, ...] = eqx.field(static=True)
     units: tuple[str, ...] = eqx.field(static=True)
     at: Float[Array, " parameter"]
     values: Mapping[str, Array]
@@ -49,7 +52,7 @@ class Sensitivity(eqx.Module):
 
         Args:
             quantity: its name.
-            parameter: its name.
+            parameter: its name, or its symbol.
 
         Returns:
             The derivative, in the shape of the quantity.
@@ -57,13 +60,9 @@ class Sensitivity(eqx.Module):
         Raises:
             ValueError: if either is not among those that were asked for.
         """
-        for name, known, word in (
-            (quantity, tuple(self.values), "quantity"),
-            (parameter, self.parameters, "parameter"),
-        ):
-            if name not in known:
-                raise ValueError(f"Argument `{word}` must be one of {', '.join(known)}, but is {name!r}.")
-        return self.derivatives[quantity][self.parameters.index(parameter)]
+        what = find_name(dict.fromkeys(self.values, ""), quantity, "quantity")
+        symbols = dict(zip(self.parameters, self.symbols, strict=True))
+        return self.derivatives[what][self.parameters.index(find_name(symbols, parameter, "parameter"))]
 
     def relative(self, quantity: str) -> Array:
         """Give the relative change of a quantity for a relative change of each parameter.
@@ -88,16 +87,44 @@ class Sensitivity(eqx.Module):
         ]
         return [*own, *(self._slopes(name) for name in self.parameters)]
 
+    def _shown(self) -> list[str]:
+        """Name the quantities whose changes are shown: those of one number, else all real ones."""
+        real = [name for name, slope in self.derivatives.items() if not np.iscomplexobj(slope)]
+        return [name for name in real if np.ndim(self.values[name]) == 0] or real
+
     def _slopes(self, parameter: str) -> Row:
-        """Show by how many percent each scalar moves with a parameter that grows by one percent."""
+        """Show by how much each quantity moves with a parameter that grows by one percent."""
         place = self.parameters.index(parameter)
-        at = float(np.asarray(self.at)[place])
-        moved = [
-            f"{name} {at * float(np.asarray(slope)[place]) / float(np.asarray(self.values[name])):+.3g} %"
-            for name, slope in self.derivatives.items()
-            if np.ndim(slope) == 1 and not np.iscomplexobj(slope)
-        ]
-        return Row(f"{parameter} +1 %", ", ".join(moved) or brief(self.derivatives), self.units[place])
+        at, unit = float(np.asarray(self.at)[place]), self.units[place]
+        # The drive of a map differs from cell to cell, and of zero there are no percent.
+        step, words = (0.01 * at, "1 %") if np.isfinite(at) and at else (1.0, f"1 {typeset_unit(unit)}")
+        moved = [self._moved(name, place, step) for name in self._shown()]
+        return Row(f"{parameter} +{words}", ", ".join(moved) or brief(self.derivatives), unit)
+
+    def _moved(self, name: str, place: int, step: float) -> str:
+        """Say how a quantity moves with a step of a parameter: in percent, unless a number of it is zero."""
+        value = np.asarray(self.values[name])
+        change = step * np.asarray(self.derivatives[name])[place]
+        sign = "" if np.any(value == 0.0) else " %"
+        change = 100.0 * change / value if sign else change
+        if change.ndim == 0:
+            return f"{name} {float(change) + 0.0:+.3g}{sign}"
+        known = change[np.isfinite(change)]
+        if not known.size:
+            return f"{name} unknown"
+        largest = known[np.argmax(np.abs(known))] + 0.0  # no -0
+        return f"{name} {np.median(np.abs(known)):.2g} ({largest:+.2g}){sign}"
+
+    def _lines(self) -> list[str]:
+        several = any(np.ndim(self.values[name]) for name in self._shown())
+        lines = (
+            ["  changes of several numbers: the median size, and the largest in brackets"] if several else []
+        )
+        if self.error is not None:
+            lines.append(
+                f"  derivatives read off tables: relative error at most {self.error:.2g}, by a sample"
+            )
+        return lines
 
 
 def sensitivity(
@@ -125,17 +152,17 @@ def sensitivity(
             orbit); or a function of a model that gives one array or several by name, such as
             `lambda m: ij.transmissibility(m, ...).force`.
         model: the isolator, where `subject` is a function.
-        parameters: names of the parameters to differentiate by; all of the model and, but for a
+        parameters: names or symbols of the parameters to differentiate by; all of the model and, but for a
             function, the drive, if omitted; at a special point without the branch's own parameter.
         covariance: of parameters, such as a fit's.
-        covariance_of: their names, in its order, such as a fit's `free`.
+        covariance_of: their names or symbols, in its order, such as a fit's `free`.
 
     Returns:
         Values, derivatives and, with a covariance, standard errors.
 
     Raises:
-        ValueError: if a parameter is unknown, the covariance and its names do not belong together, or `model`
-            is missing or superfluous.
+        ValueError: if a parameter is unknown or named twice, the covariance and its names do not belong
+            together, or `model` is missing or superfluous.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: implicit function theorem; first-order propagation of errors.
@@ -150,25 +177,52 @@ def sensitivity(
     """
     check_float64()
     of = as_subject(subject, model)
-    entries = {entry.name: (entry.spec.unit, entry.value) for entry in list_parameters(of.model)}
-    if of.drive is not None:
-        entries |= zip(
-            DRIVE, zip((DRIVE_UNITS[of.model.excitation], "Hz"), of.drive, strict=True), strict=True
-        )
-    entries = {name: entry for name, entry in entries.items() if name not in of.solved}
-    names = tuple(entries) if parameters is None else tuple(parameters)
-    for name in (*names, *(covariance_of or ())):
-        if name not in entries:
-            raise ValueError(
-                f"Argument `parameters` must name some of {', '.join(entries)}, but names {name!r}."
-            )
+    entries = _entries_of(of)
+    names = tuple(entries) if parameters is None else _named(of, entries, "parameters", parameters)
+    if covariance_of is not None:
+        covariance_of = _named(of, entries, "covariance_of", covariance_of)
     matrix = _covariance(names, covariance, covariance_of)
-    at = jnp.stack([jnp.asarray(entries[name][1], dtype=float) for name in names])
+    at = jnp.stack([jnp.asarray(entries[name].value, dtype=float) for name in names])
     values, slopes, error = of.slopes(names, at)
     errors = None
     if matrix is not None:
         errors = {name: _standard_error(slope, jnp.asarray(matrix)) for name, slope in slopes.items()}
-    return Sensitivity(names, tuple(entries[name][0] for name in names), at, values, slopes, errors, error)
+    symbols, units = (tuple(getattr(entries[name], what) for name in names) for what in ("symbol", "unit"))
+    return Sensitivity(names, symbols, units, at, values, slopes, errors, error)
+
+
+class _Entry(NamedTuple):
+    """What a quantity can be differentiated by."""
+
+    symbol: str
+    unit: str
+    value: Any
+
+
+def _entries_of(of: Subject) -> dict[str, _Entry]:
+    """Give all by which a subject can be differentiated, by name."""
+    entries = {
+        entry.name: _Entry(entry.spec.symbol, entry.spec.unit, entry.value)
+        for entry in list_parameters(of.model)
+    }
+    if of.drive is not None:
+        units = DRIVE_UNITS[of.model.excitation], "Hz"
+        entries |= {
+            name: _Entry("", unit, value) for name, unit, value in zip(DRIVE, units, of.drive, strict=True)
+        }
+    return {name: entry for name, entry in entries.items() if name not in of.solved}
+
+
+def _named(
+    of: Subject, entries: Mapping[str, _Entry], argument: str, given: Sequence[str]
+) -> tuple[str, ...]:
+    """Give the full names of parameters that a caller named."""
+    names = full_names(of.model, given, argument, *(name for name in DRIVE if name in entries))
+    lost = [name for name in names if name not in entries]
+    if lost or not names:
+        found = f"names {lost[0]!r}" if lost else "is empty"
+        raise ValueError(f"Argument `{argument}` must name some of {', '.join(entries)}, but {found}.")
+    return names
 
 
 def _covariance(

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple, cast
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from ...models import Isolator
+from ..._given_numbers import as_numbers, asked
+from ...models import Isolator, as_isolator
 from ..branch import CodimensionTwoPoint, SpecialPoint
 from ..map import StabilityMap
 from ..orbit import Orbit
@@ -113,8 +114,9 @@ _QUANTITIES: dict[type, dict[str, Callable[[Any], Array]]] = {
 def _of_function(function: Callable[[Isolator], Mapping[str, Array] | Array], model: Isolator) -> Subject:
     def slopes(names: tuple[str, ...], at: Array) -> Derivatives:
         def quantities(numbers: Array) -> Mapping[str, Array]:
-            given = function(with_values(model, names, numbers))
-            return given if isinstance(given, Mapping) else {"value": jnp.asarray(given)}
+            given = asked("subject", function, with_values(model, names, numbers))
+            several = given if isinstance(given, Mapping) else {"value": given}
+            return {name: as_numbers("subject", value, real=False) for name, value in several.items()}
 
         return Derivatives(*differentiate(quantities, at))
 
@@ -142,7 +144,7 @@ def as_subject(what: object, model: Isolator | None) -> Subject:
         The subject.
 
     Raises:
-        ValueError: if `model` is missing or superfluous.
+        ValueError: if it is neither, or `model` is missing or superfluous.
     """
     known = _ADAPTERS.get(type(what))
     if (known is None) == (model is None):
@@ -150,4 +152,11 @@ def as_subject(what: object, model: Isolator | None) -> Subject:
             "Argument `model` must be given where `subject` is a function, and only there, but is "
             f"{'missing' if model is None else 'given'}."
         )
-    return _of_function(cast("Any", what), cast("Isolator", model)) if known is None else known(what)
+    if known is not None:
+        return known(what)
+    if not callable(what):
+        raise ValueError(
+            "Argument `subject` must be an orbit, a map, a special point, a resonance or a function of an "
+            f"isolator, but is of type {type(what).__name__}."
+        )
+    return _of_function(cast("Any", what), as_isolator(model))
