@@ -6,6 +6,7 @@ holds. An event ends the step: it is located on the interpolant and the step is 
 """
 
 from collections.abc import Callable, Sequence
+from operator import mul
 from typing import Any, NamedTuple, no_type_check
 
 import numpy as np
@@ -18,15 +19,16 @@ from ._motion_equation import EquationOfMotion
 from ._path import Path, powers
 
 _STAGES = 12
-_A = [np.ascontiguousarray(DOP853.A[s, :s]) for s in range(_STAGES)]
-_B = np.ascontiguousarray(DOP853.B)
-_C = [float(c) for c in DOP853.C[:_STAGES]]
-_ERRORS = np.stack([DOP853.E5, DOP853.E3])
-_A_EXTRA = [np.ascontiguousarray(row[: _STAGES + 1 + s]) for s, row in enumerate(DOP853.A_EXTRA)]
-_C_EXTRA = [float(c) for c in DOP853.C_EXTRA]
-_D = np.ascontiguousarray(DOP853.D)
+# The table as numbers: of the few that a state has, their sums take half as long as those of arrays.
+_A = [DOP853.A[s, :s].tolist() for s in range(_STAGES)]
+_B = DOP853.B.tolist()
+_C = DOP853.C[:_STAGES].tolist()
+_E5, _E3 = DOP853.E5.tolist(), DOP853.E3.tolist()
+_A_EXTRA = [row[: _STAGES + 1 + s].tolist() for s, row in enumerate(DOP853.A_EXTRA)]
+_C_EXTRA = DOP853.C_EXTRA.tolist()
+_D = DOP853.D.tolist()
 _LOOKS = np.arange(1, 9) / 8
-_LOOK_POWERS = powers(_LOOKS)
+_LOOK_POWERS = np.stack(powers(_LOOKS))
 _EARLY = [0.0, *(_LOOKS[0] * 2.0 ** -np.arange(10, 0, -1)).tolist()]
 _SMALLEST = 1e-9
 _SHORTEST = 1e-15
@@ -39,7 +41,7 @@ class _Event(NamedTuple):
     """One event within a step."""
 
     margin: Callable[..., Any]
-    """Function of times and states that is zero there."""
+    """Function of times and states, numbers or arrays, that is zero there."""
     value: Callable[[float], float]
     """The same along the step's interpolant, as a function of the share of the step."""
     happen: Callable[..., None]
@@ -59,8 +61,8 @@ class PlantIntegrator:
     def __init__(self, balance: EquationOfMotion, tolerance: float = 3e-10) -> None:
         self._balance = balance
         self._tolerance = tolerance
-        self._slopes = np.empty((_STAGES + 4, balance.order))
-        self._largest = np.full(balance.order, _SMALLEST)
+        self._slopes = [[0.0] * (_STAGES + 4) for _ in range(balance.order)]  # of each state, at each stage
+        self._largest = [_SMALLEST] * balance.order
         self._sides = [1.0] * balance.sides
         self._stuck = False
         self._first_slope_holds = False
@@ -84,16 +86,16 @@ class PlantIntegrator:
     @no_type_check
     def _run(self, pieces, start):
         """Path from the first piece's start to the last one's stop."""
-        y = np.array(start, dtype=float)
+        y = [float(one) for one in start]
         for switch, states, own in self._balance.watches:
             self._put_side(own, 1.0 if switch(y[0], y[1], y[states]) >= 0 else -1.0)
         size = 1e-3
         for piece in pieces:
-            t = piece.start
+            t, longest = piece.start, piece.longest_step
             self._come_to_rest(t, y, piece)
             self._first_slope_holds = False
             while t < piece.stop:
-                t, y, size = self._step(t, y, min(size, piece.longest_step), piece)
+                t, y, size = self._step(t, y, min(size, longest), piece)
         return self._path
 
     @no_type_check
@@ -107,7 +109,7 @@ class PlantIntegrator:
         if y[1] != 0.0:
             return
         lower, upper = self._balance.holding
-        net = self._balance.net_at_rest(t, y.tolist(), piece.force(t), self._sides)
+        net = self._balance.net_at_rest(t, y, piece.force(t), self._sides)
         self._stuck = self._balance.sticks and lower <= net <= upper
         for own in self._turning:
             self._put_side(own, 1.0 if net > upper else -1.0)
@@ -139,61 +141,76 @@ class PlantIntegrator:
                 event.happen(t + trial, end, False)
             self._first_slope_holds = share == 1.0
             if self._first_slope_holds:
-                self._slopes[0] = self._slopes[_STAGES]
-            np.maximum(self._largest, np.abs(end), out=self._largest)
+                for own in self._slopes:
+                    own[0] = own[_STAGES]
+            self._largest = [max(most, abs(one)) for most, one in zip(self._largest, end, strict=True)]
             return (piece.stop if last else t + trial), end, size
         raise RuntimeError(
-            f"The motion of the simulated plant must stay finite, but at t = {t} s it is {y.tolist()}."
+            f"The motion of the simulated plant must stay finite, but at t = {t} s it is {y}."
         )
+
+    @no_type_check
+    def _put_slopes(self, stage, t, y, piece):
+        """Put the rates of the state at an instant among the slopes of the step."""
+        rates = self._balance.rates_stuck if self._stuck else self._balance.rates
+        for own, rate in zip(self._slopes, rates(t, y, piece.force(t), self._sides), strict=True):
+            own[stage] = rate
+
+    @no_type_check
+    def _ahead(self, y, size, weights):
+        """State after a step of a size along the weighted slopes of its first stages."""
+        return [one + size * sum(map(mul, weights, own)) for one, own in zip(y, self._slopes, strict=True)]
 
     @no_type_check
     def _stages(self, t, y, size, piece):
         """State after a step and its local error over the tolerance."""
-        slopes, force, sides = self._slopes, piece.force, self._sides
-        rates = self._balance.rates_stuck if self._stuck else self._balance.rates
         if not self._first_slope_holds:
-            slopes[0] = rates(t, y.tolist(), force(t), sides)
+            self._put_slopes(0, t, y, piece)
             self._first_slope_holds = True
-        for s in range(1, _STAGES):
-            instant = t + _C[s] * size
-            state = (y + size * (_A[s] @ slopes[:s])).tolist()
-            slopes[s] = rates(instant, state, force(instant), sides)
-        end = y + size * (_B @ slopes[:_STAGES])
-        slopes[_STAGES] = rates(t + size, end.tolist(), force(t + size), sides)
-        scale = self._tolerance * np.maximum(self._largest, np.abs(end))
-        fifth, third = (((_ERRORS @ slopes[: _STAGES + 1]) / scale) ** 2).sum(axis=1).tolist()
+        for stage in range(1, _STAGES):
+            self._put_slopes(stage, t + _C[stage] * size, self._ahead(y, size, _A[stage]), piece)
+        end = self._ahead(y, size, _B)
+        self._put_slopes(_STAGES, t + size, end, piece)
+        fifth = third = 0.0
+        for one, most, own in zip(end, self._largest, self._slopes, strict=True):
+            scale = self._tolerance * max(most, abs(one))
+            fifth += (sum(map(mul, _E5, own)) / scale) ** 2
+            third += (sum(map(mul, _E3, own)) / scale) ** 2
         if fifth == 0.0:
             return end, 0.0
-        return end, size * fifth / ((fifth + 0.01 * third) * y.size) ** 0.5
+        return end, size * fifth / ((fifth + 0.01 * third) * len(y)) ** 0.5
 
     @no_type_check
     def _interpolant(self, t, y, end, size, piece):
-        """Coefficients (7, state) of the interpolant of the step just taken."""
-        slopes, force, sides = self._slopes, piece.force, self._sides
-        rates = self._balance.rates_stuck if self._stuck else self._balance.rates
-        for s in range(3):
-            instant = t + _C_EXTRA[s] * size
-            state = (y + size * (_A_EXTRA[s] @ slopes[: _STAGES + 1 + s])).tolist()
-            slopes[_STAGES + 1 + s] = rates(instant, state, force(instant), sides)
-        coefficients = np.empty((7, y.size))
-        change = end - y
-        coefficients[0] = change
-        coefficients[1] = size * slopes[0] - change
-        coefficients[2] = 2 * change - size * (slopes[_STAGES] + slopes[0])
-        coefficients[3:] = size * (_D @ slopes)
+        """Coefficients of the interpolant of the step just taken, seven a state."""
+        for extra, weights in enumerate(_A_EXTRA):
+            ahead = self._ahead(y, size, weights)
+            self._put_slopes(_STAGES + 1 + extra, t + _C_EXTRA[extra] * size, ahead, piece)
+        coefficients = []
+        for first, last, own in zip(y, end, self._slopes, strict=True):
+            change = last - first
+            coefficients.append(
+                [
+                    change,
+                    size * own[0] - change,
+                    2 * change - size * (own[_STAGES] + own[0]),
+                    *(size * sum(map(mul, weights, own)) for weights in _D),
+                ]
+            )
         return coefficients
 
     @no_type_check
     def _first_event(self, t, y, size, coefficients, piece):
         """Share of the step at which the first event falls, 1 for none, and the event."""
         earliest, event = 1.0, None
-        looks = y[:, None] + (_LOOK_POWERS @ coefficients).T
+        looks = np.array(y)[:, None] + np.array(coefficients) @ _LOOK_POWERS
         for margin, happen in self._margins(piece):
             values = margin(t + _LOOKS * size, looks)
 
             def value(share, margin=margin):
-                state = y + powers(share) @ coefficients
-                return float(margin(np.array([t + share * size]), state[:, None])[0])
+                basis = powers(share)
+                state = [one + sum(map(mul, basis, own)) for one, own in zip(y, coefficients, strict=True)]
+                return margin(t + share * size, state)
 
             share = _first_zero(values, value)
             if share < earliest:
@@ -205,7 +222,7 @@ class PlantIntegrator:
         """Size and end of the step that ends at an event, whose place the interpolant gives too coarsely."""
         for _ in range(_MOST_CORRECTIONS):
             end, _ = self._stages(t, y, share * size, piece)
-            miss = float(event.margin(np.array([t + share * size]), end[:, None])[0])
+            miss = event.margin(t + share * size, end)
             if abs(miss) <= self._tolerance * event.scale:
                 break
             slope = (event.value(share) - event.value(share * (1 - _NUDGE))) / (share * _NUDGE)
@@ -216,7 +233,10 @@ class PlantIntegrator:
 
     @no_type_check
     def _margins(self, piece):
-        """Functions of times and states that stay positive until an event, each with what then happens."""
+        """Functions of times and states that stay positive until an event, each with what then happens.
+
+        They take arrays of instants or single ones.
+        """
         balance, sides = self._balance, self._sides
         for switch, inner, own in balance.watches:
             if switch is not velocity:
@@ -237,7 +257,8 @@ class PlantIntegrator:
 
     @no_type_check
     def _net(self, times, states, piece):
-        return self._balance.net_at_rest(times, states, piece.forces(times), self._sides)
+        push = piece.forces(times) if isinstance(times, np.ndarray) else piece.force(times)
+        return self._balance.net_at_rest(times, states, push, self._sides)
 
     @no_type_check
     def _turn(self, piece):
