@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 from isojax import Harmonic, Isolator, elements, find_periodic_orbit, paper, stability_map
 from isojax._results import RESULTS
 from isojax.stability.map._batched_newton import FOUND, NOT_CONVERGED, CellSolver, Found, blanked
+from isojax.stability.map._chunks import fingerprint
 from isojax.stability.map._empty_cells import Cells, without_repeats
 from isojax.stability.map._starts import Candidates
 from isojax.stability.map._surface import MapWindow
@@ -214,6 +216,7 @@ def test_a_map_of_traced_axes_says_what_to_use(name, transformed):
 
 SCRIPT = """
 import sys
+import equinox as eqx
 import jax
 jax.config.update("jax_enable_x64", True)
 if len(sys.argv) > 2:
@@ -294,3 +297,17 @@ def test_of_starts_that_led_to_one_orbit_one_is_left(small):
     left = without_repeats(small.model, small.integrator, True, window, cells)
     np.testing.assert_array_equal(left.found.code == FOUND, [True, False, False, True])
     np.testing.assert_array_equal(np.isnan(left.found.response), [False, True, True, False])
+
+
+def test_where_one_axis_ends_belongs_to_the_name_of_a_checkpoint():
+    assert fingerprint(np.arange(2.0), np.arange(2.0, 5.0)) != fingerprint(
+        np.arange(3.0), np.arange(3.0, 5.0)
+    )
+    assert fingerprint(np.arange(2.0)) == fingerprint(np.arange(2.0))
+
+
+def test_an_even_count_of_orbits_is_printed_as_one_that_lacks_some(lens_map):
+    assert "even" not in repr(lens_map)
+    lacking = eqx.tree_at(lambda smap: smap.count, lens_map, lens_map.count.at[0, 1].set(2))
+    assert "1 with an even count of them" in " ".join(repr(lacking).split())
+    assert "1 cells hold an even number of orbits: folds come in pairs" in repr(lacking)

@@ -82,6 +82,12 @@ class StabilityMap(eqx.Module):
         return self.spectral_radius < 1.0
 
     @property
+    def incomplete(self) -> Bool[np.ndarray, "amplitude frequency"]:
+        """Whether a cell of a map of all orbits lacks one: folds come in pairs, so their count is odd."""
+        count = np.asarray(self.count)
+        return self._all_sought & (count > 0) & (count % 2 == 0)
+
+    @property
     def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
         """State of each orbit at t = 0 of the recorded drive, by integration from `start`."""
         return self.states_at_zero(np.arange(self.spectral_radius.size)).reshape(self.start.shape)
@@ -111,6 +117,8 @@ class StabilityMap(eqx.Module):
         cells = {"with an unstable orbit": self._unstable}
         if self._all_sought:
             cells["with coexisting orbits"] = count > 1
+            if self.incomplete.any():
+                cells["with an even count of them, where one is missing"] = self.incomplete
         cells["without any"] = count == 0
         counted = ", ".join(f"{int(np.sum(which))} {words}" for words, which in cells.items())
         largest = number(found.max()) if found.size else "unknown"
@@ -151,6 +159,7 @@ class StabilityMap(eqx.Module):
             legend,
             *([f"  with all orbits of a cell, {chances}"] if chances else []),
             *([f"  {unconfirmed_words(self)}"] if self.unconfirmed else []),
+            *([f"  {incomplete_words(self)}"] if self.incomplete.any() else []),
         ]
 
 
@@ -159,4 +168,12 @@ def unconfirmed_words(smap: StabilityMap) -> str:
     return (
         f"finer steps did not find {smap.unconfirmed} of the sampled orbits, which are left out; "
         "the error says nothing of others like them"
+    )
+
+
+def incomplete_words(smap: StabilityMap) -> str:
+    """Say how many cells lack an orbit for sure."""
+    return (
+        f"{np.sum(smap.incomplete)} cells hold an even number of orbits: folds come in pairs, so one is "
+        "missing, or lies beyond `reach`"
     )
