@@ -1,8 +1,10 @@
 """What a map of stability holds, and how it shows itself."""
 
+import dataclasses
 from collections.abc import Mapping
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
@@ -14,6 +16,9 @@ from ..orbit import Sine
 from ._batched_newton import states_at_zero
 from ._chance import chance_words
 from ._map_method import Lane, MapMethod
+
+_OF_EACH_ORBIT = ("spectral_radius", "multipliers", "start", "direction", "phases", "split", "response")
+"""Fields with an axis `orbit` where coexisting orbits are sought."""
 
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
@@ -40,7 +45,8 @@ class StabilityMap(eqx.Module):
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
         result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
-        error: of a multiplier at most, from a sample of cells against steps three times finer.
+        error: of a multiplier at most, from a sample of cells against steps three times finer; of `response`
+            and the states it says nothing.
         unconfirmed: orbits of this sample that finer steps did not find. They are left out, as not accurate;
             of others like them, in cells outside the sample, `error` says nothing.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
@@ -91,6 +97,14 @@ class StabilityMap(eqx.Module):
     def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
         """State of each orbit at t = 0 of the recorded drive, by integration from `start`."""
         return self.states_at_zero(np.arange(self.spectral_radius.size)).reshape(self.start.shape)
+
+    def smallest(self) -> "StabilityMap":
+        """Give a map of all orbits as that of the smallest motion in each cell."""
+        first = {name: getattr(self, name)[0] for name in _OF_EACH_ORBIT}
+        found = jnp.isfinite(first["spectral_radius"]).astype(int)
+        return dataclasses.replace(
+            self, count=found, result=jax.tree.map(lambda own: own[0], self.result), **first
+        )
 
     def states_at_zero(self, cells: Int[np.ndarray, " cell"]) -> Float[Array, "cell state"]:
         """Give the states of some orbits at t = 0 of the recorded drive.

@@ -28,7 +28,7 @@ from ..orbit import (
     trajectory,
     value_and_jacobian,
 )
-from ._frequency_response import frequency_response
+from ._frequency_response import FrequencyResponse, frequency_response
 
 _RESONANCE_STEPS, _RESONANCE_CLOSED_TO = 12, 1e-8
 """Steps of Newton's method, and the last of them, over the size of the motion, after which it converged."""
@@ -46,11 +46,14 @@ class Resonance(eqx.Module):
         frequency: at which the response is largest [Hz]; NaN where it was not found.
         orbit: the motion there.
         integrator: solver and steps with which the frequency was found.
+        response: the curve from the smallest motion, with those beside it among which this is the largest
+            motion; None for a resonance that was found again.
     """
 
     frequency: Float[Array, ""]
     orbit: Orbit
     integrator: Integrator
+    response: FrequencyResponse | None = None
 
     @property
     def amplitude(self) -> Float[Array, ""]:
@@ -67,6 +70,19 @@ class Resonance(eqx.Module):
         if np.isnan(np.asarray(self.frequency)):
             return f"none found under a drive of {drive}. {brief(self.result)}"
         return f"{amount(self.amplitude, 'm')} at {number(float(self.frequency))} Hz under a drive of {drive}"
+
+    def _rows(self) -> list[str]:
+        return ["frequency", "orbit", "integrator"]
+
+    def _lines(self) -> list[str]:
+        if self.response is None:
+            return []
+        curve = self.response.branch.points
+        sizes = np.asarray(curve.response)
+        top = int(np.nanargmax(sizes))
+        peak = f"{amount(sizes[top], 'm')} at {number(float(curve.frequency[top]))} Hz"
+        words = f"the curve from the smallest motion reaches {peak}"
+        return [f"  {words}", *self.response.branch._beside_lines()]
 
 
 def find_resonance(
@@ -115,6 +131,7 @@ def find_resonance(
     )
     # An isola may reach higher than the curve; a subharmonic is no answer at the frequency of the drive.
     own = [one for one in (curve, *curve.others) if one.branch.periods == 1]
+    response = curve
     curve = max(own, key=lambda one: float(np.nanmax(np.asarray(one.amplitude))))
     sizes = np.asarray(curve.amplitude)
     top = int(np.nanargmax(sizes))
@@ -127,7 +144,7 @@ def find_resonance(
     near = _Near(
         frozen(model), frozen(push), points.y0[top], points.frequency[top], curve.branch.symmetric, integrator
     )
-    return _moved(near, model, push, RESULTS.not_converged)
+    return dataclasses.replace(_moved(near, model, push, RESULTS.not_converged), response=response)
 
 
 def resonance_again(known: Resonance, model: Isolator, amplitude: Float[Array, ""] | None) -> Resonance:
