@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from isojax import Harmonic, Isolator, elements, find_periodic_orbit, paper, stability_map
+from isojax import Harmonic, Isolator, elements, find_again, find_periodic_orbit, paper, stability_map
 from isojax._results import RESULTS
 from isojax.stability.map._batched_newton import FOUND, NOT_CONVERGED, CellSolver, Found, blanked
 from isojax.stability.map._chunks import fingerprint
@@ -90,13 +90,24 @@ def test_no_orbit_in_or_beside_the_lens_is_further_off_than_the_reported_error()
 
 
 def test_cells_that_cannot_be_read_off_are_solved_for_themselves():
-    # An internal state gives a third multiplier, which no trace and determinant hold.
-    law = (elements.LinearStiffness(1.0), elements.LinearDamping(0.1), elements.MaxwellBranch(0.2, 1.0))
+    # An internal state gives a third multiplier, which no trace and determinant hold. It forgets so fast that
+    # the usual 128 steps a period overflow, also where the cells are found again.
+    law = (elements.LinearStiffness(1.0), elements.LinearDamping(0.1), elements.MaxwellBranch(60.0, 0.003))
     smap = stability_map(Isolator(1.0, law), [0.5, 1.0], [0.1, 0.17])
+    # As single orbits, as where orbits share no order of kinks.
+    apart = eqx.tree_at(lambda one: one.split, smap, jnp.zeros_like(smap.split))
+    again = find_again(apart, smap.model)
     for row, column in np.ndindex(2, 2):
-        drive = Harmonic(float(smap.amplitudes[row]), float(smap.frequencies[column]))
-        exact = np.asarray(find_periodic_orbit(smap.model, drive).floquet.multipliers)
-        np.testing.assert_allclose(smap.multipliers[row, column], exact, atol=smap.error + 1e-9)
+        force, frequency = float(smap.amplitudes[row]), float(smap.frequencies[column])
+        # s x / (s + 1 / tau) is what the spring of the branch is stretched by.
+        rates = np.array([[0.0, 1.0, 0.0], [-1.0, -0.1, -60.0], [0.0, 1.0, -1.0 / 0.003]])
+        exact = np.sort_complex(np.exp(np.linalg.eigvals(rates) / frequency))
+        turn = 2j * np.pi * frequency
+        size = abs(force / (turn**2 + 0.1 * turn + 1.0 + 60.0 * turn / (turn + 1.0 / 0.003)))
+        for found in (smap, again):
+            roots = np.sort_complex(np.asarray(found.multipliers[row, column]))
+            np.testing.assert_allclose(roots, exact, atol=smap.error + 1e-9)
+            np.testing.assert_allclose(found.response[row, column], size, rtol=1e-6)
 
 
 def test_orbits_of_the_sample_that_finer_steps_do_not_find_are_counted_and_not_kept(small, monkeypatch):
@@ -130,6 +141,7 @@ def test_the_size_of_an_offset_motion_is_half_its_whole_range():
 def test_without_coexisting_the_smallest_motion_is_given(lens_map):
     plain = stability_map(lens_map.model, lens_map.amplitudes, lens_map.frequencies)
     np.testing.assert_allclose(plain.spectral_radius, lens_map.spectral_radius[0], atol=1e-12)
+    same(plain, lens_map.smallest(), tolerance=1e-12)
 
 
 def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
