@@ -43,7 +43,7 @@ from ._single_orbits import SingleOrbits
 from ._sought import MapRun, Sought, seek
 from ._stability_map import StabilityMap
 from ._starts import Candidates, joined
-from ._surface import MapWindow
+from ._surface import MapWindow, displacements
 from ._window_steps import check_steps, window_integrator
 
 _READING_SHARE = 0.2
@@ -181,7 +181,9 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     Returns:
         The map, and the surface from which its orbits came.
     """
-    half, (forces, band, _) = is_odd(model), window
+    forces, band, _ = window
+    *_, largest = displacements(model, window)
+    half = is_odd(model, largest)
     integrator, least = run.integrator, fewest_steps(model)
     if integrator is None:
         usual = integrator_for(model, None)
