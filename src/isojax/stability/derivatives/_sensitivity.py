@@ -22,7 +22,7 @@ from ._subjects import as_subject
 
 @shown
 class Sensitivity(eqx.Module):
-    """Exact derivatives of quantities by parameters, and what the parameters' error bars make of them.
+    """Derivatives of quantities by parameters, and what the parameters' error bars make of them.
 
     Attributes:
         parameters: names, such as `cubic_stiffness.coefficient`; `drive.amplitude` and `drive.frequency`.
@@ -31,9 +31,11 @@ class Sensitivity(eqx.Module):
         values: the quantities, by name.
         derivatives: of each quantity, parameter first [unit of the quantity over unit of the parameter].
         standard_errors: of each quantity, from the covariance of the parameters; None without one.
-        error: of the derivatives of a map that were read off tables, at most, from a sample of cells: of the
-            response and of sum and product of the multipliers, each over its size, or over its median where
-            that is larger. None where all were found orbit by orbit.
+        error: of the derivatives of a map that were read off tables, at most, from a sample of cells: of
+            those of the response and of sum and product of the multipliers, each over its size, or over its
+            median where that is larger. Those of a single multiplier have more where two nearly meet. Of
+            `values` it says nothing: `StabilityMap.error` is that of the multipliers. None where all
+            derivatives were found orbit by orbit, as exact as the orbits.
     """
 
     parameters: tuple[str, ...] = eqx.field(static=True)
@@ -113,9 +115,11 @@ def sensitivity(
     covariance: Float[np.ndarray, "parameter parameter"] | None = None,
     covariance_of: Sequence[str] | None = None,
 ) -> Sensitivity:
-    """Give exact derivatives by the coefficients, the mass and the drive.
+    """Give derivatives by the coefficients, the mass and the drive.
 
-    By the implicit function theorem at the orbit, not through the iterations that found it.
+    By the implicit function theorem at the orbit, not through the iterations that found it, nor by
+    differences. Those of a large map are read off tables of such derivatives, within the `error` that a
+    sample of cells shows.
 
     Args:
         subject: an orbit (`y0`, `amplitude`, and `multipliers` and `spectral_radius` of its `floquet`); a map
