@@ -1,6 +1,7 @@
 """Maps against single orbits and the table of folds; cut, killed, resumed and spread they stay the same."""
 
 import json
+import math
 import os
 import socket
 import subprocess
@@ -202,14 +203,20 @@ def test_the_size_of_the_chunks_changes_no_number():
             "Argument `frequencies` must ascend, but frequencies[1] = 4.0 follows 4.0.",
         ),
         ({"frequencies": [np.nan]}, "Argument `frequencies` must be positive, but frequencies[0] = nan."),
+        ({"amplitudes": ["a"]}, "Argument `amplitudes` must be a list of real numbers, but is ['a']."),
+        ({"amplitudes": [1j]}, "Argument `amplitudes` must be a list of real numbers, but is [1j]."),
+        (
+            {"model": paper.y_direction().replace(mass=math.nan)},
+            "Argument `model` must hold finite numbers, but mass is nan.",
+        ),
         ({"reach": 0.5}, "Argument `reach` must be at least 1, but is 0.5."),
         ({"chunk": 0}, "Argument `chunk` must be a positive count, but is 0."),
     ],
 )
 def test_bad_arguments_are_refused_with_what_was_expected(arguments, words):
-    default = {"amplitudes": [1.0, 2.0], "frequencies": [4.0, 5.0]}
+    default = {"model": paper.y_direction(), "amplitudes": [1.0, 2.0], "frequencies": [4.0, 5.0]}
     with pytest.raises(ValueError, match="Argument") as caught:
-        stability_map(paper.y_direction(), **{**default, **arguments})
+        stability_map(**{**default, **arguments})
     assert str(caught.value) == words
 
 

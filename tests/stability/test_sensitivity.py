@@ -106,6 +106,11 @@ def test_derivatives_read_off_a_large_map_are_those_of_the_receptance_within_the
     sens = ij.sensitivity(smap, parameters=tuple(LETTERS))
     assert sens.error is not None
     assert sens.error <= 2e-5
+    assert f"{sens.error:.1e}" in repr(sens)
+    # Each cell has a force of its own; damping lowers the response of a linear isolator everywhere.
+    words = " ".join(repr(sens).split())
+    assert "linear_damping.coefficient +1 % response -" in words
+    assert "drive.amplitude +1 % from cell to cell" in words
     # Over the resonance at 5.6 Hz; the sum of the multipliers also follows the damped frequency.
     numbers = {"k": STIFFNESS, "c": DAMPING, "m": MASS, "force": forces[:, None], "f": band[None, :]}
 

@@ -31,11 +31,11 @@ class Sensitivity(eqx.Module):
         values: the quantities, by name.
         derivatives: of each quantity, parameter first [unit of the quantity over unit of the parameter].
         standard_errors: of each quantity, from the covariance of the parameters; None without one.
-        error: of the derivatives of a map that were read off tables, at most, from a sample of cells: of
-            those of the response and of sum and product of the multipliers, each over its size, or over its
-            median where that is larger. Those of a single multiplier have more where two nearly meet. Of
-            `values` it says nothing: `StabilityMap.error` is that of the multipliers. None where all
-            derivatives were found orbit by orbit, as exact as the orbits.
+        error: by which derivatives of a map that were read off tables differ at most from those found cell by
+            cell with the same steps, from a sample: of the response and of sum and product of multipliers,
+            each over its size, its median over the map, or a ten-thousandth of what a relative change of any
+            parameter moves, whichever is largest. What the steps of the map leave is not in it, and a single
+            multiplier has more where two nearly meet. None where all were found cell by cell.
     """
 
     parameters: tuple[str, ...] = eqx.field(static=True)
@@ -88,12 +88,37 @@ class Sensitivity(eqx.Module):
             Row(name, brief(value), f"± {brief(errors[name])}" if name in errors else "")
             for name, value in self.values.items()
         ]
-        return [*own, *(self._slopes(name) for name in self.parameters)]
+        off = self.error
+        error = (
+            [] if off is None else [Row("error", f"{off:.1e}", "of derivatives, by reading them off tables")]
+        )
+        return [*own, *error, *(self._slopes(name) for name in self.parameters)]
+
+    @property
+    def _of_cells(self) -> bool:
+        return any(np.ndim(value) > 1 and not np.iscomplexobj(value) for value in self.values.values())
+
+    def _range(self, name: str, place: int, at: float) -> str:
+        """Give least and largest percentage over the cells of a map; "" where there is none."""
+        slope, value = np.asarray(self.derivatives[name])[place], np.asarray(self.values[name])
+        if np.iscomplexobj(slope) or not np.isfinite(at):
+            return ""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moved = at * slope / value
+        moved = moved[np.isfinite(moved)]
+        return f"{moved.min():+.3g} to {moved.max():+.3g} %" if moved.size else ""
 
     def _slopes(self, parameter: str) -> Row:
-        """Show by how many percent each scalar moves with a parameter that grows by one percent."""
+        """Show by how many percent each scalar moves with a parameter that grows by one percent.
+
+        In a map, the least and the most over its cells; by a drive of its own in each cell, nothing.
+        """
         place = self.parameters.index(parameter)
         at = float(np.asarray(self.at)[place])
+        over = {name: self._range(name, place, at) for name in self.derivatives} if self._of_cells else {}
+        if over:
+            words = ", ".join(f"{name} {span}" for name, span in over.items() if span)
+            return Row(f"{parameter} +1 %", words or "from cell to cell", self.units[place])
         moved = [
             f"{name} {at * float(np.asarray(slope)[place]) / float(np.asarray(self.values[name])):+.3g} %"
             for name, slope in self.derivatives.items()

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import (
@@ -126,6 +127,10 @@ def stability_map(
     refuse_transformed(model, _INSTEAD)
     for name, axis in (("amplitudes", amplitudes), ("frequencies", frequencies)):
         refuse_transformed(axis, _INSTEAD_OF_AXES, name)
+    refuse_transformed(reach, "Give one number: no orbit moves with it.", "reach")
+    for entry in list_parameters(model):
+        if not np.all(np.isfinite(np.asarray(entry.value))):
+            raise ValueError(f"Argument `model` must hold finite numbers, but {entry.name} is {entry.value}.")
     if integrator is not None:
         integrator = integrator_for(model, integrator)
     carried = None if fit is None else coefficient_errors(fit, model)
