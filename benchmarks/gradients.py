@@ -4,9 +4,11 @@ Run: python benchmarks/gradients.py
 
 Of each quantity of the paper's y model, by its six coefficients: the largest difference between `jax.jacfwd`
 and fourth-order central differences of the same function, and between `jax.grad` and `jax.jacfwd`, both over
-the largest derivative, coefficients measured by their own size. Then the seconds of an orbit and of a map of
-200 x 200 cells, median of five after one, to be compared between two versions, and the script of the page
-docs/howto/sensitivity_study.md. PASS or FAIL beside each mark; the exit status is 1 after a FAIL.
+the largest derivative, coefficients measured by their own size. Derivatives of a map that are
+read off tables are compared with such differences of single orbits, beside the error that the map reports.
+Then the seconds of an orbit and of a map of 200 x 200 cells, median of five after one, to be compared between
+two versions, and the script of the page docs/howto/sensitivity_study.md. PASS or FAIL beside each mark; the
+exit status is 1 after a FAIL.
 """
 
 import os
@@ -30,6 +32,21 @@ FORWARD, BOTH = 1e-6, 1e-10
 
 STEP = 2e-4
 """Of the differences, over each coefficient."""
+
+CLOSE_STEP = 1e-4
+"""Of differences of sixth order where cells next to a fold are compared: the response bends within less."""
+
+SAMPLES = 8192
+"""Steps a period of the orbits: their size is read by a parabola through one of them."""
+
+FINE = 1024
+"""Steps a period of a map with which only the reading is in error."""
+
+LEAST_SHARE = 1e-4
+"""Of what a relative change of any coefficient moves, below which no derivative is measured by its size."""
+
+CELLS = 12
+"""Of a map, at peaks and as many drawn, at which derivatives that are read off are compared."""
 
 PAGE = Path(__file__).parents[1] / "docs" / "howto" / "sensitivity_study.md"
 
@@ -61,6 +78,78 @@ def compare(words: str, model: ij.Isolator, quantity: Callable[[ij.Isolator], ja
     print(f"{words}: {float(moved(zero)):.6g}, {time.perf_counter() - begin:.0f} s")
     mark("jacfwd against differences", float(jnp.max(jnp.abs(forward - difference))) / largest, FORWARD)
     mark("grad against jacfwd", float(jnp.max(jnp.abs(reverse - forward))) / largest, BOTH)
+
+
+def read_off(model: ij.Isolator, steps: int | None) -> None:
+    """Compare derivatives of a map that are read off tables with differences of single orbits.
+
+    At the peaks of rows, at the corners and at cells drawn at random: the largest error of the derivatives of
+    the response and of sum and product of the multipliers, over their size, their median over the map, or
+    the least share of what a relative change of any coefficient moves: as the map defines what it reports.
+    """
+    names = [entry.name for entry in model.parameters if entry.name != "mass"]
+    size = jnp.asarray([float(model[name]) for name in names])
+    integrator = None if steps is None else ij.Integrator(steps_per_period=steps)
+    axes = np.linspace(1.0, 120.0, 200), np.linspace(4.0, 8.0, 100)
+    smap = ij.stability_map(model, *axes, integrator=integrator)
+    slopes = ij.sensitivity(smap, parameters=names)
+    if slopes.error is None:
+        raise RuntimeError("No derivative of the map was read off.")
+    roots, moved = slopes.values["multipliers"], slopes.derivatives["multipliers"]
+    whole = jnp.stack(
+        [
+            slopes.derivatives["response"],
+            jnp.real(moved.sum(axis=-1)),
+            jnp.real((moved * roots[..., ::-1]).sum(axis=-1)),
+        ],
+        axis=1,
+    )
+    rows = np.linspace(0, 199, CELLS).astype(int)
+    peaks = np.stack([rows, np.asarray(smap.response).argmax(axis=1)[rows]], axis=1)
+    corners = np.array([[row, column] for row in (0, 199) for column in (0, 99)])
+    drawn = np.random.default_rng(3).integers(0, [200, 100], (CELLS, 2))
+    cells = np.unique(np.concatenate([peaks, corners, drawn]), axis=0).T
+
+    @jax.jit
+    @jax.vmap
+    def numbers(shares: jax.Array, force: jax.Array, frequency: jax.Array, start: jax.Array) -> jax.Array:
+        own = {
+            name.replace(".", "__"): size[place] * (1.0 + shares[place]) for place, name in enumerate(names)
+        }
+        # As it is not known to JAX whether the model is odd.
+        orbit = ij.find_periodic_orbit(
+            model.replace(**own),
+            ij.Harmonic(force, frequency),
+            start=start,
+            symmetric=True,
+            integrator=ij.Integrator(steps_per_period=SAMPLES),
+        )
+        own_roots = orbit.floquet.multipliers
+        return jnp.stack([orbit.amplitude, jnp.real(own_roots.sum()), jnp.real(own_roots.prod())])
+
+    drive = smap.amplitudes[cells[0]], smap.frequencies[cells[1]], smap.y0[tuple(cells)]
+    exact = []
+    for place in range(len(names)):
+        aside = [
+            numbers(jnp.tile(share * CLOSE_STEP * jnp.eye(len(names))[place], (cells.shape[1], 1)), *drive)
+            for share in (3.0, 2.0, 1.0, -1.0, -2.0, -3.0)
+        ]
+        weights = jnp.asarray([1.0, -9.0, 45.0, -45.0, 9.0, -1.0]) / (60.0 * CLOSE_STEP * size[place])
+        exact.append(jnp.tensordot(weights, jnp.stack(aside), axes=1).T)
+    moved = jnp.median(jnp.abs(whole), axis=(-2, -1)) * jnp.abs(size)[:, None]
+    usual = (jnp.maximum(moved, LEAST_SHARE * moved.max(axis=0)) / jnp.abs(size)[:, None])[..., None]
+    known, exact = whole[:, :, cells[0], cells[1]], jnp.stack(exact)
+    error = jnp.abs(known - exact) / jnp.maximum(jnp.abs(exact), usual)
+    words = "response", "sum of the multipliers", "product of the multipliers"
+    largest = {name: float(error[:, place].max()) for place, name in enumerate(words)}
+    taken = f"200 x 100, {smap.integrator.steps_per_period} steps a period, {cells.shape[1]} cells"
+    print(f"derivatives of a map of {taken}; reported for reading them off {slopes.error:.1e}")
+    if steps is None:
+        # What the steps of the map leave is not in what it reports.
+        print(f"  largest error: {', '.join(f'{name} {value:.1e}' for name, value in largest.items())}")
+        return
+    for name, value in largest.items():
+        mark(f"{name} against differences of single orbits", value, slopes.error)
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -119,6 +208,8 @@ def main() -> None:
         lambda one: jnp.mean(ij.simulate(one, at_peak, duration=2.0).displacement ** 2),
     )
     grid = np.linspace(1.0, 120.0, 200), np.linspace(4.0, 8.0, 200)
+    read_off(model, None)
+    read_off(model, FINE)
     print(f"one orbit {1e3 * seconds(lambda: ij.find_periodic_orbit(model, beside).y0):.2f} ms")
     print(f"map of 200 x 200 {1e3 * seconds(lambda: ij.stability_map(model, *grid).multipliers):.0f} ms")
     script = PAGE.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]

@@ -1,19 +1,22 @@
 """Maps against single orbits and the table of folds; cut, killed, resumed and spread they stay the same."""
 
 import json
+import math
 import os
 import socket
 import subprocess
 import sys
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from isojax import Harmonic, Isolator, elements, find_periodic_orbit, paper, stability_map
+from isojax import Harmonic, Isolator, elements, find_again, find_periodic_orbit, paper, stability_map
 from isojax._results import RESULTS
 from isojax.stability.map._batched_newton import FOUND, NOT_CONVERGED, CellSolver, Found, blanked
+from isojax.stability.map._chunks import fingerprint
 from isojax.stability.map._empty_cells import Cells, without_repeats
 from isojax.stability.map._starts import Candidates
 from isojax.stability.map._surface import MapWindow
@@ -88,13 +91,24 @@ def test_no_orbit_in_or_beside_the_lens_is_further_off_than_the_reported_error()
 
 
 def test_cells_that_cannot_be_read_off_are_solved_for_themselves():
-    # An internal state gives a third multiplier, which no trace and determinant hold.
-    law = (elements.LinearStiffness(1.0), elements.LinearDamping(0.1), elements.MaxwellBranch(0.2, 1.0))
+    # An internal state gives a third multiplier, which no trace and determinant hold. It forgets so fast that
+    # the usual 128 steps a period overflow, also where the cells are found again.
+    law = (elements.LinearStiffness(1.0), elements.LinearDamping(0.1), elements.MaxwellBranch(60.0, 0.003))
     smap = stability_map(Isolator(1.0, law), [0.5, 1.0], [0.1, 0.17])
+    # As single orbits, as where orbits share no order of kinks.
+    apart = eqx.tree_at(lambda one: one.split, smap, jnp.zeros_like(smap.split))
+    again = find_again(apart, smap.model)
     for row, column in np.ndindex(2, 2):
-        drive = Harmonic(float(smap.amplitudes[row]), float(smap.frequencies[column]))
-        exact = np.asarray(find_periodic_orbit(smap.model, drive).floquet.multipliers)
-        np.testing.assert_allclose(smap.multipliers[row, column], exact, atol=smap.error + 1e-9)
+        force, frequency = float(smap.amplitudes[row]), float(smap.frequencies[column])
+        # s x / (s + 1 / tau) is what the spring of the branch is stretched by.
+        rates = np.array([[0.0, 1.0, 0.0], [-1.0, -0.1, -60.0], [0.0, 1.0, -1.0 / 0.003]])
+        exact = np.sort_complex(np.exp(np.linalg.eigvals(rates) / frequency))
+        turn = 2j * np.pi * frequency
+        size = abs(force / (turn**2 + 0.1 * turn + 1.0 + 60.0 * turn / (turn + 1.0 / 0.003)))
+        for found in (smap, again):
+            roots = np.sort_complex(np.asarray(found.multipliers[row, column]))
+            np.testing.assert_allclose(roots, exact, atol=smap.error + 1e-9)
+            np.testing.assert_allclose(found.response[row, column], size, rtol=1e-6)
 
 
 def test_orbits_of_the_sample_that_finer_steps_do_not_find_are_counted_and_not_kept(small, monkeypatch):
@@ -128,6 +142,7 @@ def test_the_size_of_an_offset_motion_is_half_its_whole_range():
 def test_without_coexisting_the_smallest_motion_is_given(lens_map):
     plain = stability_map(lens_map.model, lens_map.amplitudes, lens_map.frequencies)
     np.testing.assert_allclose(plain.spectral_radius, lens_map.spectral_radius[0], atol=1e-12)
+    same(plain, lens_map.smallest(), tolerance=1e-12)
 
 
 def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
@@ -188,14 +203,20 @@ def test_the_size_of_the_chunks_changes_no_number():
             "Argument `frequencies` must ascend, but frequencies[1] = 4.0 follows 4.0.",
         ),
         ({"frequencies": [np.nan]}, "Argument `frequencies` must be positive, but frequencies[0] = nan."),
+        ({"amplitudes": ["a"]}, "Argument `amplitudes` must be a list of real numbers, but is ['a']."),
+        ({"amplitudes": [1j]}, "Argument `amplitudes` must be a list of real numbers, but is [1j]."),
+        (
+            {"model": paper.y_direction().replace(mass=math.nan)},
+            "Argument `model` must hold finite numbers, but mass is nan.",
+        ),
         ({"reach": 0.5}, "Argument `reach` must be at least 1, but is 0.5."),
         ({"chunk": 0}, "Argument `chunk` must be a positive count, but is 0."),
     ],
 )
 def test_bad_arguments_are_refused_with_what_was_expected(arguments, words):
-    default = {"amplitudes": [1.0, 2.0], "frequencies": [4.0, 5.0]}
+    default = {"model": paper.y_direction(), "amplitudes": [1.0, 2.0], "frequencies": [4.0, 5.0]}
     with pytest.raises(ValueError, match="Argument") as caught:
-        stability_map(paper.y_direction(), **{**default, **arguments})
+        stability_map(**{**default, **arguments})
     assert str(caught.value) == words
 
 
@@ -214,6 +235,7 @@ def test_a_map_of_traced_axes_says_what_to_use(name, transformed):
 
 SCRIPT = """
 import sys
+import equinox as eqx
 import jax
 jax.config.update("jax_enable_x64", True)
 if len(sys.argv) > 2:
@@ -294,3 +316,17 @@ def test_of_starts_that_led_to_one_orbit_one_is_left(small):
     left = without_repeats(small.model, small.integrator, True, window, cells)
     np.testing.assert_array_equal(left.found.code == FOUND, [True, False, False, True])
     np.testing.assert_array_equal(np.isnan(left.found.response), [False, True, True, False])
+
+
+def test_where_one_axis_ends_belongs_to_the_name_of_a_checkpoint():
+    assert fingerprint(np.arange(2.0), np.arange(2.0, 5.0)) != fingerprint(
+        np.arange(3.0), np.arange(3.0, 5.0)
+    )
+    assert fingerprint(np.arange(2.0)) == fingerprint(np.arange(2.0))
+
+
+def test_an_even_count_of_orbits_is_printed_as_one_that_lacks_some(lens_map):
+    assert "even" not in repr(lens_map)
+    lacking = eqx.tree_at(lambda smap: smap.count, lens_map, lens_map.count.at[0, 1].set(2))
+    assert "1 with an even count of them" in " ".join(repr(lacking).split())
+    assert "1 cells hold an even number of orbits: folds come in pairs" in repr(lacking)

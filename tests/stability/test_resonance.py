@@ -82,3 +82,13 @@ def test_the_largest_response_may_lie_on_an_isola():
     # One harmonic, x = a cos: the damper takes all of the force where the spring balances the mass.
     speeds = np.roots([0.75 * 0.045, -0.2 * 8.0 / (3.0 * np.pi), 0.25, -0.105])
     assert float(resonance.amplitude) == pytest.approx(float(np.max(speeds.real)), rel=0.02)
+    words = " ".join(repr(resonance).split())
+    assert "the curve from the smallest motion reaches 0.728" in words
+    assert "beside it detached, a closed curve" in words
+    # With more damping one amplitude is left, the smallest: the isola is gone.
+    damping = 0.3
+    assert np.sum(np.isreal(np.roots([0.75 * 0.045, -0.2 * 8.0 / (3.0 * np.pi), damping, -0.105]))) == 1
+    gone = ij.find_again(resonance, model.replace(linear_damping__coefficient=damping))
+    assert ij.RESULTS.gone == gone.result
+    assert np.isnan([gone.frequency, gone.amplitude, gone.orbit.floquet.spectral_radius]).all()
+    assert "none found under a drive of 0.105. Followed from" in " ".join(repr(gone).split())

@@ -1,5 +1,6 @@
 """Backbone, frequency response and transmissibility against closed forms and SciPy."""
 
+import dataclasses
 import math
 from typing import NamedTuple
 
@@ -297,6 +298,12 @@ def test_coexisting_orbits_each_have_their_transmissibility():
     found = ij.transmissibility(ij.paper.y_direction(), 175.0, [4.2], coexisting=True)
     assert found.ratio.shape == (3, 1)
     assert np.asarray(found.stable)[:, 0].tolist() == [True, False, True]
+    assert "at 1 of 1 frequencies, 4.2 to 4.2 Hz, several orbits coexist;" in " ".join(repr(found).split())
+    own = {name: getattr(found, name)[0] for name in ("ratio", "peak", "spectral_radius")}
+    smallest = dataclasses.replace(found, result=found.result[0], **own)
+    assert "this is the one of the smallest motion: `coexisting=True` gives all" in " ".join(
+        repr(smallest).split()
+    )
 
 
 def test_bad_arguments_are_refused():

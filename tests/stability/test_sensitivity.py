@@ -106,6 +106,7 @@ def test_derivatives_read_off_a_large_map_are_those_of_the_receptance_within_the
     sens = ij.sensitivity(smap, parameters=tuple(LETTERS))
     assert sens.error is not None
     assert sens.error <= 2e-5
+    assert f"at most {sens.error:.2g}" in repr(sens)
     # Over the resonance at 5.6 Hz; the sum of the multipliers also follows the damped frequency.
     numbers = {"k": STIFFNESS, "c": DAMPING, "m": MASS, "force": forces[:, None], "f": band[None, :]}
 

@@ -83,3 +83,18 @@ def test_a_branch_that_meets_a_law_on_one_side_is_closed_over_the_whole_period()
     state = np.asarray(branch.points.y0[-1])
     # The steps of a branch are coarse for a push that lasts a hundredth of the period.
     np.testing.assert_allclose(period_later(state), state, atol=2e-3)
+
+
+def test_a_map_that_meets_a_law_on_one_side_is_one_of_whole_periods(monkeypatch):
+    class Asked(Exception):
+        """Ends the map where its orbits would be sought."""
+
+    def stop(model, integrator, half, *more):
+        raise Asked(half)
+
+    monkeypatch.setattr("isojax.stability.map._map.seek", stop)
+    for forces, half in (([1e-3, 2e-3], True), ([0.3, FORCE], False)):
+        with pytest.raises(Asked) as asked:
+            ij.stability_map(with_bump(), forces, [FREQUENCY, 0.25])
+        # Up to three times the motion that these forces need: below the place of the push, and past it.
+        assert asked.value.args == (half,)

@@ -145,9 +145,7 @@ class PlantIntegrator:
                     own[0] = own[_STAGES]
             self._largest = [max(most, abs(one)) for most, one in zip(self._largest, end, strict=True)]
             return (piece.stop if last else t + trial), end, size
-        raise RuntimeError(
-            f"The motion of the simulated plant must stay finite, but at t = {t} s it is {y}."
-        )
+        raise RuntimeError(f"The motion of the simulated plant must stay finite, but at t = {t} s it is {y}.")
 
     @no_type_check
     def _put_slopes(self, stage, t, y, piece):

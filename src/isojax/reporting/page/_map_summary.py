@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...stability import FoldCurve, StabilityMap
-from ...stability.map import chance_words, unconfirmed_words
+from ...stability.map import chance_words, incomplete_words, unconfirmed_words
 from ..plots import drive_unit, quantity
 from ._map_files import result_codes
 
@@ -140,6 +140,4 @@ def _missing(smap: StabilityMap, count: np.ndarray, coexisting: bool) -> str:
         if np.any(empty & (first == code))
     ]
     words = f"{empty.sum()} cells" + (f" ({', '.join(parts)})" if parts else "")
-    # Orbits are born and vanish in pairs, so that their number is odd where none is missed.
-    even = coexisting and int(np.sum((count > 0) & (count % 2 == 0)))
-    return words + (f"; {even} cells hold an even number of orbits, so one is missing" if even else "")
+    return words + (f"; {incomplete_words(smap)}" if smap.incomplete.any() else "")

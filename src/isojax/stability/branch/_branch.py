@@ -321,10 +321,14 @@ class Branch(eqx.Module):
         lines = [f"  {point._headline()}" for point in self.special_points]
         lines += [f"  possible {point.in_doubt}" for point in self.possible_points]
         lines += [f"  {self.undecided_part}"] if self.undecided else []
+        return lines + self._beside_lines()
+
+    def _beside_lines(self) -> list[str]:
+        """Say which branches were found beside this one and where they were sought, a line each."""
         if self.searched is None:
-            return lines
+            return []
         beside = [f"  beside it {other._in_words()}" for other in self.others]
-        return [*lines, *beside, f"  looked for beside it: {self.searched._headline()}"]
+        return [*beside, f"  looked for beside it: {self.searched._headline()}"]
 
     def _in_words(self) -> str:
         """Say what kind of curve this is beside another, where it lies and how large its motions are."""

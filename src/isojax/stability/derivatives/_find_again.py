@@ -20,8 +20,8 @@ from ..branch import (
     find_orbit_again,
 )
 from ..map import StabilityMap, found_again
-from ..orbit import Orbit, closed_by_half, is_traced
-from ..response import Resonance, Transmissibility, resonance_near, transmissibility_again
+from ..orbit import Orbit, is_traced
+from ..response import Resonance, Transmissibility, resonance_again, transmissibility_again
 
 Answer = TypeVar(
     "Answer", Orbit, SpecialPoint, CodimensionTwoPoint, StabilityMap, Resonance, Transmissibility
@@ -41,7 +41,7 @@ def find_again(
     `jax.vmap`, `jax.jacfwd` and `jax.grad` go through, also where those that found it in the first place
     refuse. An orbit, or a bifurcation of a branch, is sought along the branch of the other model, so that it
     is found where it is, and nothing else where it is gone: past its fold an orbit is NaN, not the one to
-    which the motion jumps.
+    which the motion jumps. So is a resonance whose isola has vanished.
 
     Args:
         answer: an orbit; a special or possible point of a branch, such as a fold; a special point of a curve
@@ -157,11 +157,7 @@ def _resonance(resonance: Resonance, model: Isolator, amplitude: Any, frequency:
         raise ValueError(
             f"Argument `frequency` must be omitted for a resonance, which solves for it, but is {frequency}."
         )
-    orbit = resonance.orbit
-    push = as_float64(orbit.excitation.amplitude if amplitude is None else amplitude)
-    return resonance_near(
-        model, push, orbit.y0, resonance.frequency, closed_by_half(orbit), resonance.integrator
-    )
+    return resonance_again(resonance, model, None if amplitude is None else as_float64(amplitude))
 
 
 def _transmissibility(

@@ -23,7 +23,7 @@ from ._subjects import Subject, as_subject
 
 @shown
 class Sensitivity(eqx.Module):
-    """Exact derivatives of quantities by parameters, and what the parameters' error bars make of them.
+    """Derivatives of quantities by parameters, and what the parameters' error bars make of them.
 
     Attributes:
         parameters: names, such as `cubic_stiffness.coefficient`; `drive.amplitude` and `drive.frequency`.
@@ -33,9 +33,11 @@ class Sensitivity(eqx.Module):
         values: the quantities, by name.
         derivatives: of each quantity, parameter first [unit of the quantity over unit of the parameter].
         standard_errors: of each quantity, from the covariance of the parameters; None without one.
-        error: of the derivatives of a map that were read off tables, at most, from a sample of cells: of the
-            response and of sum and product of the multipliers, each over its size, or over its median where
-            that is larger. None where all were found orbit by orbit.
+        error: by which derivatives of a map that were read off tables differ at most from those found cell by
+            cell with the same steps, from a sample: of the response and of sum and product of multipliers,
+            each over its size, its median over the map, or a ten-thousandth of what a relative change of any
+            parameter moves, whichever is largest. What the steps of the map leave is not in it, and a single
+            multiplier has more where two nearly meet. None where all were found cell by cell.
     """
 
     parameters: tuple[str, ...] = eqx.field(static=True)
@@ -140,9 +142,11 @@ def sensitivity(
     covariance: Float[np.ndarray, "parameter parameter"] | None = None,
     covariance_of: Sequence[str] | None = None,
 ) -> Sensitivity:
-    """Give exact derivatives by the coefficients, the mass and the drive.
+    """Give derivatives by the coefficients, the mass and the drive.
 
-    By the implicit function theorem at the orbit, not through the iterations that found it.
+    By the implicit function theorem at the orbit, not through the iterations that found it, nor by
+    differences. Those of a large map are read off tables of such derivatives, within the `error` that a
+    sample of cells shows.
 
     Args:
         subject: an orbit (`y0`, `amplitude`, and `multipliers` and `spectral_radius` of its `floquet`); a map

@@ -26,6 +26,7 @@ from ._read_slopes import fewest_nodes as fewest_nodes
 from ._read_slopes import multiplier_slopes as multiplier_slopes
 from ._read_slopes import relative_error as relative_error
 from ._stability_map import StabilityMap as StabilityMap
+from ._stability_map import incomplete_words as incomplete_words
 from ._stability_map import unconfirmed_words as unconfirmed_words
 from ._surface import MapWindow as MapWindow
 from ._window_steps import window_integrator as window_integrator

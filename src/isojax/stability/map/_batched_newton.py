@@ -18,9 +18,8 @@ from ..._cores import usable_cores
 from ..._quick_jit import quick_jit
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Sine, modulus, multipliers, trajectory, with_overtones
+from ..orbit import Sine, half_range, modulus, multipliers, trajectory, with_overtones
 from ._map_method import Lane, MapMethod, advance, kinks_between
-from ._nodes import half_peak_to_peak
 from ._starts import Candidates, PlacedSurface, joined, read_surface
 from ._surface import Surface
 
@@ -154,10 +153,14 @@ def _newton_steps(
 
 @quick_jit
 def _sizes(model: Isolator, method: MapMethod, states: Array, push: Array, frequency: Array) -> Lanes:
-    drive = with_overtones(model, Sine(push[:, 0], push[:, 1], frequency))
     turns = 0.5 if method.half else 1.0
-    path = trajectory(model, method.integrator, drive, tuple(states.T), turns=turns)[0]
-    return half_peak_to_peak(path, method.half)
+
+    def one(state: Array, push: Array, frequency: Array) -> Array:
+        drive = with_overtones(model, Sine(push[0], push[1], frequency))
+        path = trajectory(model, method.integrator, drive, tuple(state), turns=turns)
+        return half_range(model, drive, path, turns)
+
+    return jax.vmap(one)(states, push, frequency)
 
 
 @functools.partial(quick_jit, options=_WIDE)

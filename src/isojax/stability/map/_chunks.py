@@ -30,7 +30,13 @@ def fingerprint(*parts: object) -> str:
         leaves, structure = jax.tree_util.tree_flatten(part)
         word.update(str(structure).encode())
         for leaf in leaves:
-            word.update(np.asarray(leaf).tobytes() if not callable(leaf) else repr(leaf).encode())
+            if callable(leaf):
+                word.update(repr(leaf).encode())
+                continue
+            values = np.asarray(leaf)
+            # Without its shape, where one axis ends and the next begins would not count.
+            word.update(f"{values.shape} {values.dtype}".encode())
+            word.update(values.tobytes())
     return word.hexdigest()[:16]
 
 

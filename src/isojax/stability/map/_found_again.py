@@ -13,21 +13,21 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
-from ...excitations import Harmonic
 from ...models import Isolator
 from ..orbit import (
+    ShootingMethod,
     Sine,
-    find_periodic_orbit,
     has_continuous_slopes,
     modulus,
     multipliers,
-    recorded_sine,
     trajectory,
     value_and_jacobian,
     with_overtones,
 )
+from ._batched_newton import FOUND
 from ._map_method import Lane, MapMethod, kinks_between
 from ._nodes import half_peak_to_peak
+from ._single_orbits import single_orbit
 from ._stability_map import StabilityMap
 
 _CELL_CLOSED_TO, _MOST_CELL_STEPS = 1e-9, 12
@@ -162,7 +162,9 @@ def cells_again(
         found = _put(found, places, _close(model, method, kinks, *own))
     places = np.flatnonzero(held & ~together)
     if places.size:
-        single = _single(model, smap.states_at_zero(cells[places]), force[places], frequency[places])
+        # With the steps of the map: fewer may follow no state that is faster than the motion.
+        own = ShootingMethod(smap.integrator, 1, smap.symmetric)
+        single = _single(model, own, smap.states_at_zero(cells[places]), force[places], frequency[places])
         # Where kinks are passed is of no interest: they are not split at.
         found = _put(found, places, single._replace(phases=phases[places]))
     return found
@@ -293,17 +295,14 @@ def _gap_and_matrix(
 @quick_jit
 def _single(
     model: Isolator,
+    method: ShootingMethod,
     y0: Float[Array, "cell state"],
     force: Float[Array, " cell"],
     frequency: Float[Array, " cell"],
 ) -> FoundCells:
     def one(cell: tuple[Array, Array, Array]) -> FoundCells:
         start, push, rate = cell
-        orbit = find_periodic_orbit(model, Harmonic(push, rate), start=start)
-        drive = recorded_sine(model, jnp.ones(()), rate).fundamental
-        blank = jnp.where(orbit.result == RESULTS.successful, 1.0, jnp.nan)
-        direction = jnp.stack([drive.sine, jnp.asarray(drive.cosine)]) * blank
-        roots, good = orbit.floquet.multipliers, jnp.isfinite(blank)
-        return FoundCells(orbit.y0, direction, jnp.zeros(0), roots, orbit.amplitude, good)
+        state, direction, phases, roots, _, size, code = single_orbit(model, method, push, rate, start)
+        return FoundCells(state, direction, phases, roots, size, code == FOUND)
 
     return jax.lax.map(one, (y0, force, frequency), batch_size=_SINGLE_ORBITS_AT_ONCE)

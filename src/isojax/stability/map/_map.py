@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import (
@@ -43,7 +44,7 @@ from ._single_orbits import SingleOrbits
 from ._sought import MapRun, Sought, seek
 from ._stability_map import StabilityMap
 from ._starts import Candidates, joined
-from ._surface import MapWindow
+from ._surface import MapWindow, displacements
 from ._window_steps import check_steps, window_integrator
 
 _READING_SHARE = 0.2
@@ -126,6 +127,10 @@ def stability_map(
     refuse_transformed(model, _INSTEAD)
     for name, axis in (("amplitudes", amplitudes), ("frequencies", frequencies)):
         refuse_transformed(axis, _INSTEAD_OF_AXES, name)
+    refuse_transformed(reach, "Give one number: no orbit moves with it.", "reach")
+    for entry in list_parameters(model):
+        if not np.all(np.isfinite(np.asarray(entry.value))):
+            raise ValueError(f"Argument `model` must hold finite numbers, but {entry.name} is {entry.value}.")
     if integrator is not None:
         integrator = integrator_for(model, integrator)
     carried = None if fit is None else coefficient_errors(fit, model)
@@ -181,7 +186,9 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     Returns:
         The map, and the surface from which its orbits came.
     """
-    half, (forces, band, _) = is_odd(model), window
+    forces, band, _ = window
+    *_, largest = displacements(model, window)
+    half = is_odd(model, largest)
     integrator, least = run.integrator, fewest_steps(model)
     if integrator is None:
         usual = integrator_for(model, None)

@@ -65,7 +65,7 @@ class SlopeTables:
             smap: the map.
             directions: the parameters.
         """
-        rest = displacement_at_rest(smap.model)
+        rest = displacement_at_rest(smap.model, smap.symmetric)
         # Cells that were found as single orbits keep another state than that at the largest displacement.
         together = found_together(smap).reshape(smap.split.shape)
         sizes = np.asarray(smap.start)[..., 0][together] - rest

@@ -8,12 +8,16 @@ import optimistix as optx
 from jax.sharding import NamedSharding
 from jaxtyping import Array, Float
 
+from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
+from ...excitations import Harmonic
 from ...models import Integrator, Isolator
 from ..orbit import (
     Accuracy,
     ShootingMethod,
+    closing,
     event_places,
+    half_range,
     is_held,
     modulus,
     multipliers,
@@ -34,7 +38,6 @@ from ._batched_newton import (
     surface_lanes,
 )
 from ._map_method import MapMethod
-from ._nodes import half_peak_to_peak
 from ._starts import Candidates, PlacedSurface, joined
 
 _ORBITS_TOGETHER = 128
@@ -116,28 +119,51 @@ def single_orbits(
 def _shoot(
     model: Isolator, method: ShootingMethod, amplitude: Array, frequency: Array, starts: Array | None = None
 ) -> tuple[Array, ...]:
+    if starts is None:
+        return jax.vmap(lambda push, rate: single_orbit(model, method, push, rate))(amplitude, frequency)
+    return jax.vmap(lambda *lane: single_orbit(model, method, *lane))(amplitude, frequency, starts)
+
+
+def single_orbit(
+    model: Isolator,
+    method: ShootingMethod,
+    amplitude: Float[Array, ""],
+    frequency: Float[Array, ""],
+    start: Float[Array, " state"] | None = None,
+) -> tuple[Array, ...]:
+    """Find one orbit with the accuracy of maps, differentiable by the model and the drive.
+
+    Args:
+        model: the isolator; traced or not.
+        method: steps, and how the orbit is closed.
+        amplitude: of the drive [N, or m/s^2 for base excitation].
+        frequency: of the drive [Hz].
+        start: state at t = 0; the one-harmonic balance if omitted.
+
+    Returns:
+        The fields of `Found`, from t = 0 of the recorded drive, without phases of kinks.
+    """
     goal = method.integrator.orbit_tolerance
     accuracy = Accuracy(method.integrator.map_orbit_tolerance, method.integrator.map_orbit_error)
     solver, places = optx.Newton(rtol=goal, atol=goal), event_places(model, method.turns)
-
-    def one(push: Array, rate: Array, start: Array | None) -> tuple[Array, ...]:
-        drive = recorded_sine(model, push, rate)
-        begin = response_start(model, push, rate) if start is None else start
-        solution = shoot(model, method, solver, drive, begin, places, accuracy)
-        path = trajectory(model, method.integrator, drive, tuple(solution.state), turns=method.turns)[0]
-        finite = jnp.all(jnp.isfinite(path)) & jnp.all(jnp.isfinite(solution.matrix))
-        failed = jnp.where(is_held(model, drive), STICKS, jnp.where(finite, NOT_CONVERGED, NOT_FINITE))
-        code = jnp.where(solution.accurate, FOUND, NOT_ACCURATE)
-        code = jnp.where(finite & solution.found, code, failed)
-        blank = jnp.where(code == FOUND, 1.0, jnp.nan)
-        roots = multipliers(solution.matrix)
-        roots = (roots * roots if method.half else roots) * blank
-        unit = recorded_sine(model, jnp.ones(()), rate).fundamental
-        direction = jnp.stack([unit.sine, jnp.asarray(unit.cosine, dtype=float)])
-        size = half_peak_to_peak(path, method.half) * blank
-        state = solution.state * blank
-        return state, direction, jnp.zeros(0), roots, modulus(roots[0]), size, code.astype(jnp.int8)
-
-    if starts is None:
-        return jax.vmap(lambda push, rate: one(push, rate, None))(amplitude, frequency)
-    return jax.vmap(one)(amplitude, frequency, starts)
+    live = model, Harmonic(amplitude, frequency)
+    still, known = frozen(live)
+    drive = recorded_sine(still, known.amplitude, known.frequency)
+    begin = response_start(still, known.amplitude, known.frequency) if start is None else frozen(start)
+    solution = shoot(still, method, solver, drive, begin, places, accuracy)
+    state, matrix = with_derivatives(
+        (solution.state, solution.matrix), closing, solution.root, live, (method, solution.split)
+    )
+    drive = recorded_sine(model, amplitude, frequency)
+    path = trajectory(model, method.integrator, drive, tuple(state), turns=method.turns)
+    finite = jnp.all(jnp.isfinite(path[0])) & jnp.all(jnp.isfinite(matrix))
+    failed = jnp.where(is_held(still, drive), STICKS, jnp.where(finite, NOT_CONVERGED, NOT_FINITE))
+    code = jnp.where(solution.accurate, FOUND, NOT_ACCURATE)
+    code = jnp.where(finite & solution.found, code, failed)
+    blank = jnp.where(code == FOUND, 1.0, jnp.nan)
+    roots = multipliers(matrix)
+    roots = (roots * roots if method.half else roots) * blank
+    unit = recorded_sine(model, jnp.ones(()), frequency).fundamental
+    direction = jnp.stack([unit.sine, jnp.asarray(unit.cosine, dtype=float)])
+    size = half_range(model, drive, path, method.turns) * blank
+    return state * blank, direction, jnp.zeros(0), roots, modulus(roots[0]), size, code.astype(jnp.int8)

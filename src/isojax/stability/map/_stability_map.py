@@ -1,8 +1,10 @@
 """What a map of stability holds, and how it shows itself."""
 
+import dataclasses
 from collections.abc import Mapping
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Complex, Float, Int
@@ -14,6 +16,9 @@ from ..orbit import Sine
 from ._batched_newton import states_at_zero
 from ._chance import chance_words
 from ._map_method import Lane, MapMethod
+
+_OF_EACH_ORBIT = ("spectral_radius", "multipliers", "start", "direction", "phases", "split", "response")
+"""Fields with an axis `orbit` where coexisting orbits are sought."""
 
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
@@ -40,7 +45,8 @@ class StabilityMap(eqx.Module):
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
         result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
-        error: of a multiplier at most, from a sample of cells against steps three times finer.
+        error: of a multiplier at most, from a sample of cells against steps three times finer; of `response`
+            and the states it says nothing.
         unconfirmed: orbits of this sample that finer steps did not find. They are left out, as not accurate;
             of others like them, in cells outside the sample, `error` says nothing.
         symmetric: whether the half-period map of an odd model was used, so that only symmetric orbits show.
@@ -82,9 +88,23 @@ class StabilityMap(eqx.Module):
         return self.spectral_radius < 1.0
 
     @property
+    def incomplete(self) -> Bool[np.ndarray, "amplitude frequency"]:
+        """Whether a cell of a map of all orbits lacks one: folds come in pairs, so their count is odd."""
+        count = np.asarray(self.count)
+        return self._all_sought & (count > 0) & (count % 2 == 0)
+
+    @property
     def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
         """State of each orbit at t = 0 of the recorded drive, by integration from `start`."""
         return self.states_at_zero(np.arange(self.spectral_radius.size)).reshape(self.start.shape)
+
+    def smallest(self) -> "StabilityMap":
+        """Give a map of all orbits as that of the smallest motion in each cell."""
+        first = {name: getattr(self, name)[0] for name in _OF_EACH_ORBIT}
+        found = jnp.isfinite(first["spectral_radius"]).astype(int)
+        return dataclasses.replace(
+            self, count=found, result=jax.tree.map(lambda own: own[0], self.result), **first
+        )
 
     def states_at_zero(self, cells: Int[np.ndarray, " cell"]) -> Float[Array, "cell state"]:
         """Give the states of some orbits at t = 0 of the recorded drive.
@@ -111,6 +131,8 @@ class StabilityMap(eqx.Module):
         cells = {"with an unstable orbit": self._unstable}
         if self._all_sought:
             cells["with coexisting orbits"] = count > 1
+            if self.incomplete.any():
+                cells["with an even count of them, where one is missing"] = self.incomplete
         cells["without any"] = count == 0
         counted = ", ".join(f"{int(np.sum(which))} {words}" for words, which in cells.items())
         largest = number(found.max()) if found.size else "unknown"
@@ -151,6 +173,7 @@ class StabilityMap(eqx.Module):
             legend,
             *([f"  with all orbits of a cell, {chances}"] if chances else []),
             *([f"  {unconfirmed_words(self)}"] if self.unconfirmed else []),
+            *([f"  {incomplete_words(self)}"] if self.incomplete.any() else []),
         ]
 
 
@@ -159,4 +182,12 @@ def unconfirmed_words(smap: StabilityMap) -> str:
     return (
         f"finer steps did not find {smap.unconfirmed} of the sampled orbits, which are left out; "
         "the error says nothing of others like them"
+    )
+
+
+def incomplete_words(smap: StabilityMap) -> str:
+    """Say how many cells lack an orbit for sure."""
+    return (
+        f"{np.sum(smap.incomplete)} cells hold an even number of orbits: folds come in pairs, so one is "
+        "missing, or lies beyond `reach`"
     )

@@ -15,7 +15,7 @@ from scipy.ndimage import maximum_filter
 
 from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
-from ..orbit import is_odd, response_amplitudes, rest_displacement
+from ..orbit import response_amplitudes, rest_displacement
 from ._grids import REFINEMENTS, Grid, filled, first_grid, node_at
 from ._nodes import node_responses
 from ._shared_kinks import AROUND
@@ -99,16 +99,17 @@ def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Arr
     return rest, response_amplitudes(model, frequencies, amplitudes, rest)
 
 
-def displacement_at_rest(model: Isolator) -> float:
+def displacement_at_rest(model: Isolator, half: bool) -> float:
     """Give the displacement at rest [m].
 
     Args:
         model: the isolator.
+        half: whether the half-period map is used, which only an odd model has.
 
     Returns:
         The displacement, from which those of a surface count.
     """
-    return 0.0 if is_odd(model) else float(_forces(model, jnp.ones(1), jnp.array([1e-9]))[0])
+    return 0.0 if half else float(_forces(model, jnp.ones(1), jnp.array([1e-9]))[0])
 
 
 def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, float]:

@@ -43,6 +43,7 @@ from ._orbit import find_periodic_orbit as find_periodic_orbit
 from ._period_map import period_map as period_map
 from ._period_map import trajectory as trajectory
 from ._shooting import Accuracy as Accuracy
+from ._shooting import closing as closing
 from ._shooting import shoot as shoot
 from ._shooting_method import ShootingMethod as ShootingMethod
 from ._sine import PeriodicDrive as PeriodicDrive

@@ -28,7 +28,10 @@ def ascending(name: str, values: Any, *, positive: bool = True) -> Float[np.ndar
             f"Argument `{name}` must list the values, but is the pair {values}. For a range write "
             f"np.linspace({first}, {last}, 100), for these two values [{first}, {last}]."
         )
-    axis = np.asarray(values, dtype=float)
+    try:
+        axis = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as problem:
+        raise ValueError(f"Argument `{name}` must be a list of real numbers, but is {values!r}.") from problem
     if axis.ndim != 1 or not axis.size:
         raise ValueError(f"Argument `{name}` must be a list of numbers, but has shape {axis.shape}.")
     bad = np.flatnonzero(~(np.isfinite(axis) & ((axis > 0.0) | (not positive))))

@@ -50,7 +50,7 @@ def is_odd(model: Isolator, up_to: float | None = None) -> bool:
 
     Args:
         model: the isolator.
-        up_to: largest displacement of known motions, up to which it is tried closely as well [m].
+        up_to: largest displacement of motions, known or sought, up to which it is tried closely too [m].
 
     Returns:
         True if symmetric orbits may be sought with the half-period map; False for a model whose numbers are

@@ -14,7 +14,7 @@ from ._frequency_response import FrequencyResponse as FrequencyResponse
 from ._frequency_response import frequency_response as frequency_response
 from ._resonance import Resonance as Resonance
 from ._resonance import find_resonance as find_resonance
-from ._resonance import resonance_near as resonance_near
+from ._resonance import resonance_again as resonance_again
 from ._response_bands import CurveFold as CurveFold
 from ._response_bands import ResponseBands as ResponseBands
 from ._response_bands import ResponseCurve as ResponseCurve

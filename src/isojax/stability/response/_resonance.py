@@ -1,5 +1,7 @@
 """Resonance: the largest response over frequency to one drive amplitude, as a point that JAX can move."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,13 +11,14 @@ from jaxtyping import Array, Float
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
-from ..._show import amount, number, shown
+from ..._show import amount, brief, number, shown
 from ..._types import Scalar, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
 from ..branch import tracing_steps
 from ..orbit import (
     Orbit,
+    closed_by_half,
     find_periodic_orbit,
     half_range,
     period_map,
@@ -25,10 +28,14 @@ from ..orbit import (
     trajectory,
     value_and_jacobian,
 )
-from ._frequency_response import frequency_response
+from ._frequency_response import FrequencyResponse, frequency_response
 
 _RESONANCE_STEPS, _RESONANCE_CLOSED_TO = 12, 1e-8
 """Steps of Newton's method, and the last of them, over the size of the motion, after which it converged."""
+
+_STAGES, _SAME_PEAK = 4, 0.5
+"""Models between the known and the other one, through which a resonance is moved, and the largest move from
+one to the next, over the size of the motion: where it is gone Newton's method may end at another peak."""
 
 
 @shown
@@ -39,11 +46,14 @@ class Resonance(eqx.Module):
         frequency: at which the response is largest [Hz]; NaN where it was not found.
         orbit: the motion there.
         integrator: solver and steps with which the frequency was found.
+        response: the curve from the smallest motion, with those beside it among which this is the largest
+            motion; None for a resonance that was found again.
     """
 
     frequency: Float[Array, ""]
     orbit: Orbit
     integrator: Integrator
+    response: FrequencyResponse | None = None
 
     @property
     def amplitude(self) -> Float[Array, ""]:
@@ -57,7 +67,22 @@ class Resonance(eqx.Module):
 
     def _headline(self) -> str:
         drive = number(float(self.orbit.excitation.amplitude))
+        if np.isnan(np.asarray(self.frequency)):
+            return f"none found under a drive of {drive}. {brief(self.result)}"
         return f"{amount(self.amplitude, 'm')} at {number(float(self.frequency))} Hz under a drive of {drive}"
+
+    def _rows(self) -> list[str]:
+        return ["frequency", "orbit", "integrator"]
+
+    def _lines(self) -> list[str]:
+        if self.response is None:
+            return []
+        curve = self.response.branch.points
+        sizes = np.asarray(curve.response)
+        top = int(np.nanargmax(sizes))
+        peak = f"{amount(sizes[top], 'm')} at {number(float(curve.frequency[top]))} Hz"
+        words = f"the curve from the smallest motion reaches {peak}"
+        return [f"  {words}", *self.response.branch._beside_lines()]
 
 
 def find_resonance(
@@ -106,6 +131,7 @@ def find_resonance(
     )
     # An isola may reach higher than the curve; a subharmonic is no answer at the frequency of the drive.
     own = [one for one in (curve, *curve.others) if one.branch.periods == 1]
+    response = curve
     curve = max(own, key=lambda one: float(np.nanmax(np.asarray(one.amplitude))))
     sizes = np.asarray(curve.amplitude)
     top = int(np.nanargmax(sizes))
@@ -115,36 +141,63 @@ def find_resonance(
             "Hz the response is largest at an end of the curve."
         )
     points = curve.branch.points
-    return resonance_near(
-        model, push, points.y0[top], points.frequency[top], curve.branch.symmetric, integrator
+    near = _Near(
+        frozen(model), frozen(push), points.y0[top], points.frequency[top], curve.branch.symmetric, integrator
     )
+    return dataclasses.replace(_moved(near, model, push, RESULTS.not_converged), response=response)
 
 
-def resonance_near(
-    model: Isolator,
-    amplitude: Float[Array, ""],
-    state: Float[Array, " state"],
-    frequency: Float[Array, ""],
-    symmetric: bool,
-    integrator: Integrator,
-) -> Resonance:
-    """Find a resonance from a motion close to it.
+def resonance_again(known: Resonance, model: Isolator, amplitude: Float[Array, ""] | None) -> Resonance:
+    """Find a known resonance again for another isolator or drive: the same peak, or none.
 
     Args:
+        known: the resonance, of known numbers.
         model: the isolator; traced or not.
-        amplitude: of the drive [N, or m/s^2 for base excitation].
-        state: of the motion at t = 0.
-        frequency: of the motion [Hz].
-        symmetric: whether the second half of it is minus the first.
-        integrator: solver and steps.
+        amplitude: of the drive; that of the resonance if omitted [N, or m/s^2 for base excitation].
 
     Returns:
-        The resonance.
+        The resonance. Where it is gone its numbers are NaN.
     """
-    frequency, start = _stationary(model, amplitude, frozen(state), frozen(frequency), symmetric, integrator)
-    drive = Harmonic(amplitude, frequency)
-    orbit = find_periodic_orbit(model, drive, start=start, symmetric=symmetric)
-    return Resonance(frequency, orbit, integrator)
+    orbit = known.orbit
+    push = as_float64(orbit.excitation.amplitude)
+    near = _Near(orbit.model, push, orbit.y0, known.frequency, closed_by_half(orbit), known.integrator)
+    return _moved(near, model, push if amplitude is None else amplitude, RESULTS.gone)
+
+
+class _Near(eqx.Module):
+    """A motion at or next to a resonance: isolator, drive, state at t = 0, frequency, and how it closes."""
+
+    model: Isolator
+    amplitude: Float[Array, ""]
+    state: Float[Array, " state"]
+    frequency: Float[Array, ""]
+    symmetric: bool = eqx.field(static=True)
+    integrator: Integrator
+
+
+def _moved(near: _Near, model: Isolator, amplitude: Float[Array, ""], lost: RESULTS) -> Resonance:
+    """Give the resonance of an isolator, traced or not, next to a motion; where it is lost, say so."""
+    frequency, start = _stationary(model, amplitude, frozen(near))
+    found = jnp.isfinite(frozen(frequency))
+    # The search for the orbit is given numbers also where there is none.
+    drive = Harmonic(amplitude, jnp.where(found, frequency, frozen(near.frequency)))
+    start = jnp.where(found, start, near.state)
+    orbit = find_periodic_orbit(
+        model, drive, start=start, symmetric=near.symmetric, integrator=near.integrator
+    )
+    blank = jnp.where(found, 1.0, jnp.nan)
+    orbit = dataclasses.replace(
+        orbit,
+        excitation=Harmonic(amplitude, frequency),
+        y0=orbit.y0 * blank,
+        floquet=jax.tree.map(lambda values: values * blank, orbit.floquet),
+        symmetric=orbit.symmetric & found,
+        time=orbit.time * blank,
+        states=orbit.states * blank,
+        error=orbit.error * blank,
+        result=RESULTS.where(found, orbit.result, lost),
+    )
+    return Resonance(frequency, orbit, near.integrator)
 
 
 Held = tuple[bool, Integrator, Float[Array, " state"], Float[Array, ""]]
@@ -153,30 +206,33 @@ Held = tuple[bool, Integrator, Float[Array, " state"], Float[Array, ""]]
 
 @quick_jit
 def _stationary(
-    model: Isolator,
-    amplitude: Float[Array, ""],
-    state: Float[Array, " state"],
-    frequency: Float[Array, ""],
-    symmetric: bool,
-    integrator: Integrator,
+    model: Isolator, amplitude: Float[Array, ""], near: _Near
 ) -> tuple[Float[Array, ""], Float[Array, " state"]]:
     """Give frequency and state at the resonance; NaN where the search failed."""
-    still, push = frozen((model, amplitude))
-    path = trajectory(still, integrator, recorded_sine(still, push, frequency), tuple(state))
-    held = symmetric, integrator, state_scale(path), frequency
+    still, known = frozen((model, amplitude)), (near.model, near.amplitude)
+    drive = recorded_sine(*known, near.frequency)
+    scale = state_scale(trajectory(near.model, near.integrator, drive, tuple(near.state)))
+    held = near.symmetric, near.integrator, scale, near.frequency
 
-    def newton(_: Array | int, carry: tuple[Array, Array]) -> tuple[Array, Array]:
-        left, slope = value_and_jacobian(lambda at: _residual(at, (still, push), held)[0], carry[0])
-        step = jnp.linalg.solve(slope, left)
-        size = jnp.max(jnp.abs(step))
-        return carry[0] - step * jnp.minimum(1.0, 0.1 / size), size
+    def stage(begin: Array, share: Array) -> tuple[Array, None]:
+        between = jax.tree.map(
+            lambda old, new: old + share * (new - old) if eqx.is_inexact_array(old) else new, known, still
+        )
 
-    begin = jnp.concatenate([state / held[2], jnp.ones(1)]), jnp.asarray(jnp.inf)
-    found, last = jax.lax.fori_loop(0, _RESONANCE_STEPS, newton, begin)
-    value = frequency * found[-1]
-    value = with_derivatives(value, _residual, found, (model, amplitude), held)
-    blank = jnp.where(last < _RESONANCE_CLOSED_TO, 1.0, jnp.nan)
-    return value * blank, found[:-1] * held[2] * blank
+        def newton(_: Array | int, carry: tuple[Array, Array]) -> tuple[Array, Array]:
+            left, slope = value_and_jacobian(lambda at: _residual(at, between, held)[0], carry[0])
+            step = jnp.linalg.solve(slope, left)
+            size = jnp.max(jnp.abs(step))
+            return carry[0] - step * jnp.minimum(1.0, 0.1 / size), size
+
+        found, last = jax.lax.fori_loop(0, _RESONANCE_STEPS, newton, (begin, jnp.asarray(jnp.inf)))
+        good = (last < _RESONANCE_CLOSED_TO) & (jnp.max(jnp.abs(found - begin)) < _SAME_PEAK)
+        return jnp.where(good, found, jnp.nan), None
+
+    begin = jnp.concatenate([near.state / scale, jnp.ones(1)])
+    found, _ = jax.lax.scan(stage, begin, jnp.arange(1.0, _STAGES + 1.0) / _STAGES)
+    value = with_derivatives(near.frequency * found[-1], _residual, found, (model, amplitude), held)
+    return value, found[:-1] * scale
 
 
 def _residual(

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Complex, Float
+from jaxtyping import Array, Bool, Complex, Float, Int
 
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
@@ -58,6 +58,8 @@ class Transmissibility(eqx.Module):
         spectral_radius: of each orbit; constant to JAX: `sensitivity` of a map has its derivatives.
         result: whether the orbit was found; beside NaN, why not.
         orbits: the map of one row that holds the orbits.
+        count: orbits that were found at each frequency, also where only that of the smallest motion is given;
+            None for a curve that was found again.
         band: of the magnitude, where a fit was given.
     """
 
@@ -68,6 +70,7 @@ class Transmissibility(eqx.Module):
     spectral_radius: Float[Array, "*orbit frequency"]
     result: RESULTS
     orbits: StabilityMap
+    count: Int[Array, " frequency"] | None = None
     band: Band | None = None
 
     @property
@@ -91,6 +94,21 @@ class Transmissibility(eqx.Module):
         peak = f"{number(ratio.ravel()[top])} at {number(band[top % band.size])} Hz"
         return f"largest {peak}, drive {number(float(self.amplitude))}"
 
+    def _lines(self) -> list[str]:
+        elsewhere = "`frequency_response` looks for isolas between the frequencies, and for longer periods"
+        if self.count is None:
+            return [f"  the known orbits, found again; {elsewhere}"]
+        several = np.asarray(self.frequencies)[np.asarray(self.count) > 1]
+        if not several.size:
+            return [f"  at these frequencies no coexisting orbit was found; {elsewhere}"]
+        span = f"{number(several[0])} to {number(several[-1])} Hz"
+        words = (
+            f"at {several.size} of {np.size(self.frequencies)} frequencies, {span}, several orbits coexist"
+        )
+        if np.ndim(self.ratio) == 1:
+            words += ", of which this is the one of the smallest motion: `coexisting=True` gives all"
+        return [f"  {words}; {elsewhere}"]
+
 
 def transmissibility(
     model: Isolator | Modelled,
@@ -103,6 +121,9 @@ def transmissibility(
 ) -> Transmissibility:
     """Give the transmissibility over frequency at one drive amplitude.
 
+    Orbits of the period of the drive are sought at each of the frequencies, all up to three times the largest
+    displacement that grows from rest without a jump. `count` and the print say where several coexist. Isolas
+    that lie between two of the frequencies, and orbits of longer periods, are left to `frequency_response`.
     The force on the ground is the sum of all element forces, `restoring_force`.
 
     Args:
@@ -142,12 +163,13 @@ def transmissibility(
         raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
     if integrator is None:
         steps = window_integrator(frozen(model), steps, MapWindow(held[None], grid, 1.0))
-    orbits = stability_map(frozen(model), held[None], grid, coexisting=coexisting, integrator=steps)
+    every = stability_map(frozen(model), held[None], grid, coexisting=True, integrator=steps)
+    orbits = every if coexisting else every.smallest()
 
     def curve(isolator: Isolator) -> Array:
         return jnp.abs(_of_orbits(isolator, force, orbits).ratio)[None]
 
-    known = _of_orbits(model, force, orbits)
+    known = dataclasses.replace(_of_orbits(model, force, orbits), count=every.count[0])
     if errors is None:
         return known
 
