@@ -75,13 +75,10 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
     Source: Gelman et al. 2013, Bayesian Data Analysis, sec. 5.4 (prediction for a further group).
 
     Example:
-        With the fit of `fit`'s example, the amplitude that a further test at 100 N and 5 Hz will show:
+        What a further test will show, with the fit, `amplitude` and `answer` of `uncertainty`'s example:
 
-        >>> def amplitude(model):
-        ...     return ij.find_periodic_orbit(model, ij.Harmonic(100.0, 5.0)).amplitude
-        >>> known = ij.uncertainty(fitted, amplitude)
         >>> expected = ij.uncertainty(ij.next_record(fitted, calibration=0.005), amplitude)
-        >>> bool(expected.standard_error > known.standard_error)
+        >>> bool(expected.standard_error > answer.standard_error)
         True
     """
     held = fit if isinstance(fit, SavedFit) else as_fit(fit)
