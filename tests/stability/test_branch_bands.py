@@ -46,17 +46,25 @@ standard error of every amplitude is half of SHARE, and that of a frequency at w
 none where the force is free."""
 
 
+COARSE = ij.Integrator(steps_per_period=64)
+"""Steps with which forces of orbits without kinks are good to 1e-5."""
+
+
 @pytest.fixture(scope="module")
 def branch():
-    return ij.continue_branch(
-        DUFFING,
-        parameter="amplitude",
-        frequency=1.6 / TURN,
-        start=0.05,
-        stop=2.0,
-        other_periods=(),
-        fit=STIFF,
-    )
+    with pytest.MonkeyPatch.context() as few:
+        # Its bands are straight, so that draws say little; a thousand of them take seconds a point.
+        few.setattr("isojax.models._band._DRAWS", 100)
+        return ij.continue_branch(
+            DUFFING,
+            parameter="amplitude",
+            frequency=1.6 / TURN,
+            start=0.05,
+            stop=2.0,
+            integrator=COARSE,
+            other_periods=(),
+            fit=STIFF,
+        )
 
 
 @pytest.mark.slow
@@ -200,6 +208,7 @@ def along_force(share):
         frequency=OMEGA / TURN,
         start=0.01,
         stop=0.2,
+        integrator=COARSE,
         other_periods=(),
         step=0.008,  # as many points as the branch above has room for, so that nothing is compiled anew
         fit=fit,
