@@ -143,10 +143,12 @@ def test_steps_that_are_too_few_for_the_accuracy_say_so():
 def test_a_map_with_friction_holds_the_orbits_of_the_rig(monkeypatch):
     # Orbits are found so many at once; there are but six.
     monkeypatch.setattr("isojax.stability.map._single_orbits._ORBITS_TOGETHER", 6)
-    model = paper.y_direction().with_elements(elements.CoulombFriction(4.0, 1e-4))
+    laws = elements.LinearStiffness(1e6), elements.LinearDamping(1e4), elements.CoulombFriction(4.0, 1e-4)
+    model = Isolator(800.0, laws)
     forces, band = np.array([2.0, 5.5, 20.0]), np.array([4.4, 5.9])
     smap = stability_map(model, forces, band)
-    plant, y0 = rig.y_plant().plus(rig.CoulombFriction(4.0)), np.asarray(smap.y0)
+    plant = rig.Plant((rig.LinearStiffness(1e6), rig.LinearDamping(1e4), rig.CoulombFriction(4.0)), 800.0)
+    y0 = np.asarray(smap.y0)
     np.testing.assert_array_equal(smap.count, [[0, 0], [1, 1], [1, 1]])
     np.testing.assert_array_equal(
         smap.result == RESULTS.sticks, [[True, True], [False, False], [False, False]]
