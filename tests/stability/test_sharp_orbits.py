@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from rig_orbits import multiplier_error, rig_orbit
+from scipy.optimize import brentq
 from scipy_orbits import Y_DIRECTION, polynomial, shoot
 
 from isojax import Harmonic, Integrator, Isolator, elements, find_periodic_orbit, paper, rig, stability_map
@@ -80,12 +81,8 @@ def test_a_stop_that_is_barely_met_is_met_and_one_that_is_not_is_not():
 
 def _grazing_force():
     """The drive under which the y model alone just reaches the stop."""
-    low, high = 1.0, 60.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        size = shoot(polynomial(**Y_DIRECTION), middle, 5.0, [GAP, 0.0]).amplitude
-        low, high = (middle, high) if size < GAP else (low, middle)
-    return high
+    law = polynomial(**Y_DIRECTION)
+    return brentq(lambda force: shoot(law, force, 5.0, [GAP, 0.0]).amplitude / GAP - 1.0, 1.0, 60.0)
 
 
 def test_a_contact_within_one_step_is_not_stepped_over():
