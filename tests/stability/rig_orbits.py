@@ -64,7 +64,7 @@ def after_a_period(plant: rig.Plant, amplitude: float, frequency: float, y0: np.
     integrator._largest[:] = np.maximum(np.abs(y0), 1e-3 * np.abs(y0).max() * _units(y0, frequency))
     path = integrator.run(drive, y0)
     start, size, state, coefficients, _, _ = path._steps[-1]
-    return np.asarray(state) + coefficients[0] * (period - start) / size
+    return np.asarray(state) + np.asarray(coefficients)[:, 0] * (period - start) / size
 
 
 def _units(y0: np.ndarray, frequency: float) -> np.ndarray:

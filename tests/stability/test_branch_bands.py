@@ -46,17 +46,25 @@ standard error of every amplitude is half of SHARE, and that of a frequency at w
 none where the force is free."""
 
 
+COARSE = ij.Integrator(steps_per_period=64)
+"""Steps with which forces of orbits without kinks are good to 1e-5."""
+
+
 @pytest.fixture(scope="module")
 def branch():
-    return ij.continue_branch(
-        DUFFING,
-        parameter="amplitude",
-        frequency=1.6 / TURN,
-        start=0.05,
-        stop=2.0,
-        other_periods=(),
-        fit=STIFF,
-    )
+    with pytest.MonkeyPatch.context() as few:
+        # Its bands are straight, so that draws say little; a thousand of them take seconds a point.
+        few.setattr("isojax.models._band._DRAWS", 100)
+        return ij.continue_branch(
+            DUFFING,
+            parameter="amplitude",
+            frequency=1.6 / TURN,
+            start=0.05,
+            stop=2.0,
+            integrator=COARSE,
+            other_periods=(),
+            fit=STIFF,
+        )
 
 
 @pytest.mark.slow
@@ -89,7 +97,7 @@ def test_the_ends_of_a_branch_band_lie_on_the_scaled_branch(branch):
         ends = np.stack([np.asarray(band["value"]), np.asarray(band["response"])]) / scale
         scales = np.linspace(1.0 - 2.0 * shift, 1.0 + 2.0 * shift, 401)
         best = []
-        for place in places[across][::6]:
+        for place in places[across][::12]:
             near = fine[:, max(0, 50 * place - 250) : 50 * place + 250]
             away = scales[:, None, None] * near[None] - ends[:, place][None, :, None]
             best.append(scales[np.argmin(np.min(np.sum(away**2, axis=1), axis=1))] - 1.0)
@@ -200,6 +208,7 @@ def along_force(share):
         frequency=OMEGA / TURN,
         start=0.01,
         stop=0.2,
+        integrator=COARSE,
         other_periods=(),
         step=0.008,  # as many points as the branch above has room for, so that nothing is compiled anew
         fit=fit,
@@ -251,10 +260,11 @@ def test_an_orbit_is_found_again_on_its_own_piece_of_the_branch_or_nowhere(branc
     limit = (fold / force) ** 2  # the fold force goes with k^(-1/2)
     springs = limit * np.array([0.9, 0.97, 0.998, 1.002, 1.03, 1.1])
 
-    def amplitude(spring):
-        return ij.find_again(orbit, DUFFING.replace(cubic_stiffness__coefficient=spring)).amplitude
+    def again(spring):
+        return ij.find_again(orbit, DUFFING.replace(cubic_stiffness__coefficient=spring))
 
-    found = np.asarray(jax.vmap(amplitude)(jnp.asarray(springs)))
+    orbits = jax.vmap(again)(jnp.asarray(springs))
+    found = np.asarray(jax.vmap(lambda one: one.amplitude)(orbits))
     assert np.isfinite(found).tolist() == [True] * 3 + [False] * 3
     # By one harmonic k F^2 = 4 y / 3 ((y - d)^2 + (c w)^2) with y = 3 k a^2 / 4, and the least y is of the
     # piece. Beside the fold it moves with the root of the distance, so that one harmonic is too coarse there.
@@ -263,7 +273,7 @@ def test_an_orbit_is_found_again_on_its_own_piece_of_the_branch_or_nowhere(branc
         roots = np.roots([1.0, -2.0 * d, d**2 + loss, -0.75 * spring * force**2])
         least = np.min(roots.real[np.abs(roots.imag) < 1e-9])
         assert size == pytest.approx(np.sqrt(4.0 * least / 3.0 / spring), rel=0.02)
-    gone = ij.find_again(orbit, DUFFING.replace(cubic_stiffness__coefficient=springs[3]))
+    gone = jax.tree.map(lambda numbers: numbers[3], orbits)
     assert gone.result == ij.RESULTS.gone
     assert np.isnan(np.asarray(gone.floquet.multipliers)).all()
     assert "turns back at a fold" in " ".join(str(gone).split())

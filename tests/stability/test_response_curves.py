@@ -84,9 +84,9 @@ def test_free_vibration_with_kinks_and_without_symmetry_is_that_of_scipy():
 
 
 def test_free_vibration_is_nan_where_the_spring_does_not_hold():
-    softening = ij.Isolator(1.0, (ij.LinearStiffness(1.0), ij.CubicStiffness(-1.0), ij.LinearDamping(0.1)))
-    natural = ij.backbone_curve(softening, [0.5, 0.99, 1.01, 3.0]).natural_frequency
-    assert np.isfinite(natural).tolist() == [True, True, False, False]
+    softening = DUFFING.replace(cubic_stiffness__coefficient=-1.0)
+    natural = ij.backbone_curve(softening, [0.5, 0.9, 0.99, 1.01, 3.0]).natural_frequency
+    assert np.isfinite(natural).tolist() == [True, True, True, False, False]
 
 
 def test_phase_resonance_of_a_linear_isolator_is_at_its_natural_frequency():
@@ -128,11 +128,12 @@ def test_phase_resonance_beside_a_quick_relaxation_is_that_with_its_damper():
 
 
 def test_transmissibility_beside_a_quick_relaxation_is_the_textbooks_with_its_damper():
-    laws = ij.LinearStiffness(1e6), ij.LinearDamping(4e3), ij.elements.MaxwellBranch(5e6, 1e-4)
+    relaxation = 5e-4
+    laws = ij.LinearStiffness(1e6), ij.LinearDamping(4e3), ij.elements.MaxwellBranch(1e6, relaxation)
     frequencies = np.array([3.0, 5.5, 9.0])
     ratio = ij.transmissibility(ij.Isolator(800.0, laws), 10.0, frequencies).ratio
     omega = 2.0 * math.pi * frequencies
-    passed = 1e6 + 1j * omega * (4e3 + 5e6 * 1e-4 / (1.0 + 1j * omega * 1e-4))
+    passed = 1e6 + 1j * omega * (4e3 + 1e6 * relaxation / (1.0 + 1j * omega * relaxation))
     np.testing.assert_allclose(ratio, passed / (passed - 800.0 * omega**2), rtol=1e-6)
 
 
@@ -194,7 +195,7 @@ def test_response_folds_where_the_force_is_a_fold_force():
 @pytest.mark.parametrize("excitation", ["force", "base_acceleration"])
 def test_transmissibility_of_a_linear_isolator_is_the_textbooks(excitation):
     model = ij.Isolator(LINEAR.mass, LINEAR.elements, excitation)
-    band = np.linspace(0.2, 2.0, 7)
+    band = np.array([0.2, 0.8, 2.0])
     found = ij.transmissibility(model, 1.5, band)
     exact = linear_ratio(band)
     np.testing.assert_allclose(found.ratio, exact, rtol=3e-6)
@@ -272,8 +273,9 @@ def half_range(values: np.ndarray) -> float:
 
 @pytest.mark.slow
 def test_force_on_the_ground_is_that_of_scipys_motion():
-    found = ij.transmissibility(ij.paper.y_direction(), 300.0, [3.0, 5.5])
-    for place, frequency in enumerate((3.0, 5.5)):
+    frequencies = [3.0, 4.9, 5.5]
+    found = ij.transmissibility(ij.paper.y_direction(), 300.0, frequencies)
+    for place, frequency in enumerate(frequencies):
         phase, x, v = steady_y(300.0, frequency, base=False)
         passed = spring_y(x) + damper_y(v)
         ratio = 2.0 * np.mean(passed * np.exp(-1j * phase)) / (-1j * 300.0)
@@ -367,14 +369,14 @@ def test_the_band_of_a_transmissibility_at_its_peak_is_curved():
 
 
 def test_the_band_of_a_backbone_is_that_of_free_vibration():
-    backbone = ij.backbone_curve(LINEAR, SIZES[:2], fit=LOOSE)
+    backbone = ij.backbone_curve(LINEAR, SIZES[:3], fit=LOOSE)
     expected = 0.05 / (2.0 * math.sqrt(50.0 * 2.0) * TURN)
     np.testing.assert_allclose(backbone.band.standard_error["natural_frequency"], expected, rtol=1e-8)
     assert ij.plot.backbone(backbone).axes[0].patches
     assert not np.any(backbone.band.curved["natural_frequency"])
     # Of a stiffness known to 35 % the frequency, its root, is not normal.
     loose = uncertain(LINEAR, linear_stiffness__coefficient=17.5)
-    wide = ij.backbone_curve(LINEAR, SIZES[:2], fit=loose).band
+    wide = ij.backbone_curve(LINEAR, SIZES[:3], fit=loose).band
     assert np.all(wide.curved["natural_frequency"])
     ends = [np.asarray(end["natural_frequency"])[0] for end in (wide.lower, wide.upper)]
     stiffness = norm.ppf([0.025, 0.975], 50.0, 17.5)

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from rig_orbits import multiplier_error, rig_orbit
+from scipy.optimize import brentq
 from scipy_orbits import Y_DIRECTION, polynomial, shoot
 
 from isojax import Harmonic, Integrator, Isolator, elements, find_periodic_orbit, paper, rig, stability_map
@@ -80,12 +81,8 @@ def test_a_stop_that_is_barely_met_is_met_and_one_that_is_not_is_not():
 
 def _grazing_force():
     """The drive under which the y model alone just reaches the stop."""
-    low, high = 1.0, 60.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        size = shoot(polynomial(**Y_DIRECTION), middle, 5.0, [GAP, 0.0]).amplitude
-        low, high = (middle, high) if size < GAP else (low, middle)
-    return high
+    law = polynomial(**Y_DIRECTION)
+    return brentq(lambda force: shoot(law, force, 5.0, [GAP, 0.0]).amplitude / GAP - 1.0, 1.0, 60.0)
 
 
 def test_a_contact_within_one_step_is_not_stepped_over():
@@ -118,7 +115,7 @@ def test_the_period_map_of_friction_has_the_derivative_of_differences():
 
 def test_a_mass_that_friction_never_lets_go_has_no_orbit_of_its_own():
     # From rest it is freed by a drive above its friction, and by no other.
-    model = paper.y_direction().with_elements(elements.CoulombFriction(40.0, 1e-4))
+    model = Isolator(MASS, (elements.LinearStiffness(STIFFNESS), elements.CoulombFriction(40.0, 1e-3)))
     for force in (20.0, 39.9):
         orbit = find_periodic_orbit(model, Harmonic(force, 5.0))
         assert orbit.result == RESULTS.sticks
@@ -127,7 +124,7 @@ def test_a_mass_that_friction_never_lets_go_has_no_orbit_of_its_own():
 
 
 def test_steps_that_are_too_few_for_the_accuracy_say_so():
-    model = paper.y_direction().with_elements(elements.CoulombFriction(4.0, 1e-4))
+    model = Isolator(MASS, (elements.LinearStiffness(STIFFNESS), elements.LinearDamping(8.0)))
 
     class Coarse(Integrator):
         @property
@@ -140,11 +137,15 @@ def test_steps_that_are_too_few_for_the_accuracy_say_so():
 
 
 @pytest.mark.slow
-def test_a_map_with_friction_holds_the_orbits_of_the_rig():
-    model = paper.y_direction().with_elements(elements.CoulombFriction(4.0, 1e-4))
+def test_a_map_with_friction_holds_the_orbits_of_the_rig(monkeypatch):
+    # Orbits are found so many at once; there are but six.
+    monkeypatch.setattr("isojax.stability.map._single_orbits._ORBITS_TOGETHER", 6)
+    laws = elements.LinearStiffness(1e6), elements.LinearDamping(1e4), elements.CoulombFriction(4.0, 1e-4)
+    model = Isolator(800.0, laws)
     forces, band = np.array([2.0, 5.5, 20.0]), np.array([4.4, 5.9])
     smap = stability_map(model, forces, band)
-    plant, y0 = rig.y_plant().plus(rig.CoulombFriction(4.0)), np.asarray(smap.y0)
+    plant = rig.Plant((rig.LinearStiffness(1e6), rig.LinearDamping(1e4), rig.CoulombFriction(4.0)), 800.0)
+    y0 = np.asarray(smap.y0)
     np.testing.assert_array_equal(smap.count, [[0, 0], [1, 1], [1, 1]])
     np.testing.assert_array_equal(
         smap.result == RESULTS.sticks, [[True, True], [False, False], [False, False]]
