@@ -62,7 +62,9 @@ def simulated_campaign(campaign_of, as_record):
     [Filter("butterworth", 4, 30.0, applied=False), Filter("butterworth", 4, 30.0, applied=True)],
     ids=["reader", "bench"],
 )
-def test_intervals_cover_and_chi2_is_one_under_filtered_noise(low, periodic, simulated_campaign) -> None:
+def test_intervals_cover_and_chi2_is_one_under_filtered_noise(
+    low, periodic, simulated_campaign, unchecked
+) -> None:
     chi2, pulls = [], []
     for seed in range(SEEDS):
         found = fitted(seed, low, periodic, simulated_campaign)
