@@ -11,7 +11,14 @@ from scipy.integrate import solve_ivp
 from isojax import rig
 from isojax._parameters import list_parameters, replace_parameters
 from isojax._results import is_successful
-from isojax.elements import CATALOGUE, CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
+from isojax.elements import (
+    CATALOGUE,
+    CoulombFriction,
+    CubicStiffness,
+    LinearDamping,
+    LinearStiffness,
+    MaxwellBranch,
+)
 from isojax.identification import diagnose, fit
 from isojax.identification.fitting._problem import one_hot
 from isojax.identification.jacobian import (
