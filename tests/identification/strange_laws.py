@@ -1,5 +1,6 @@
 """Laws of which the catalogue knows nothing, for the rig."""
 
+import bisect
 from dataclasses import dataclass, replace
 from typing import ClassVar, no_type_check
 
@@ -110,5 +111,7 @@ class RestlessSpring(rig.Law):
     @no_type_check
     def force(self, t, x, v, z, s):
         """Force in N; see `Law.force`."""
+        if not isinstance(t, np.ndarray):
+            return self.stiffness * self.deviations[max(bisect.bisect_right(self.starts, t) - 1, 0)] * x
         place = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, len(self.starts) - 1)
         return self.stiffness * np.asarray(self.deviations)[place] * x

@@ -40,7 +40,8 @@ def fitted(seed: int, low: Filter, periodic: bool, simulated_campaign, declared:
     kept = dataclasses.replace(one, force=drive, output=output, period=one.period if periodic else None)
     campaign = simulated_campaign(kept, low, declared)
     start = Isolator(800.0, (LinearStiffness(1.01 * STIFFNESS), LinearDamping(0.98 * DAMPING)))
-    return fit(start, campaign, integrator=Integrator())
+    # Whether the records are right is asked elsewhere, and takes a quarter of such a fit.
+    return fit(start, campaign, integrator=Integrator(), anyway=True)
 
 
 @pytest.fixture
@@ -62,7 +63,9 @@ def simulated_campaign(campaign_of, as_record):
     [Filter("butterworth", 4, 30.0, applied=False), Filter("butterworth", 4, 30.0, applied=True)],
     ids=["reader", "bench"],
 )
-def test_intervals_cover_and_chi2_is_one_under_filtered_noise(low, periodic, simulated_campaign) -> None:
+def test_intervals_cover_and_chi2_is_one_under_filtered_noise(
+    low, periodic, simulated_campaign, unchecked
+) -> None:
     chi2, pulls = [], []
     for seed in range(SEEDS):
         found = fitted(seed, low, periodic, simulated_campaign)

@@ -53,7 +53,7 @@ def run_of(drive, residual, **fields):
 
 @pytest.mark.parametrize("excitation", [stepped, swept, periodic])
 @pytest.mark.parametrize("poles", AR.values(), ids=AR)
-def test_the_chance_is_uniform_where_only_noise_is_left(excitation, poles):
+def test_the_chance_is_uniform_where_only_noise_is_left(excitation, poles, unchecked):
     rng = np.random.default_rng(7)
     chances = [
         locked_power(

@@ -10,15 +10,15 @@ from isojax import classical_guess, close_loop, fit, is_successful, read_campaig
 
 PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(2.5e11), rig.LinearDamping(5e3)))
 PLANS = {
-    "free_decay": rig.FreeDecay((2e-4, 5e-4, 1e-3, 1.5e-3), seconds=3.0, holdout_levels=(8e-4,)),
-    "impulse": rig.Impulse((60.0, 200.0, 700.0, 1500.0), seconds=3.0, holdout_levels=(1000.0,)),
+    "free_decay": rig.FreeDecay((2e-4, 5e-4, 1e-3, 1.5e-3), seconds=2.0, holdout_levels=(8e-4,)),
+    "impulse": rig.Impulse((60.0, 200.0, 700.0, 1500.0), seconds=2.0, holdout_levels=(1000.0,)),
 }
 NOISE = 5e-3
 
 
 def written(folder, kind, stiffness):
     """Campaign of a plan, with the noise of the sensor declared and only these springs in its model."""
-    bench = rig.Bench(rate=500.0, noise=NOISE)
+    bench = rig.Bench(rate=250.0, noise=NOISE)
     file = rig.write_campaign(folder, PLANT, PLANS[kind], 5, kind, bench)
     text = file.read_text(encoding="utf-8")
     text = text.replace('["linear", "abs_quadratic", "cubic"]', stiffness, 1)

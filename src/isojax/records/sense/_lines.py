@@ -1,6 +1,7 @@
 """A record as lines of its windows: drive, motion and the forces of general laws, which must balance."""
 
 from dataclasses import dataclass, replace
+from typing import no_type_check
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -88,6 +89,7 @@ def lines_of(record: Record, quantity: OutputQuantity, based: bool) -> Lines:
     return Lines(spectrum[:, 0], spectrum[:, 1], laws, laws[:, first], laws[:, first + 1], omega, middle)
 
 
+@no_type_check  # once a window; its caller is checked
 def _window_lines(
     part: Float[np.ndarray, "time term"],
     rate: float,

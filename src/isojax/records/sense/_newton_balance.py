@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import no_type_check
 
 import numpy as np
 import scipy
@@ -85,6 +86,7 @@ class Rows:
         left, size, _ = np.linalg.svd(self.matrix, full_matrices=False)
         return left[:, size > _ZERO * size[0]]
 
+    @no_type_check  # called a hundred thousand times by those who are checked
     def unexplained(self, lag: Float[np.ndarray, " line"] | float) -> float:
         """Gives the share of the target, acting so many seconds earlier, that the laws leave."""
         target = _stacked(self.target * np.exp(1j * self.omega * lag))
@@ -92,6 +94,7 @@ class Rows:
         return float(np.sqrt(max(0.0, 1.0 - explained / float(target @ target))))
 
 
+@no_type_check
 def _stacked(lines: Complex[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
     return np.concatenate([np.real(lines), np.imag(lines)])
 
