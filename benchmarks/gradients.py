@@ -37,7 +37,10 @@ CLOSE_STEP = 1e-4
 """Of differences of sixth order where cells next to a fold are compared: the response bends within less."""
 
 SAMPLES = 8192
-"""Steps a period of the orbits: their size is read by a parabola through one of them."""
+"""Steps a period of the orbits with which others are compared."""
+
+PEAK, AT_PEAK = (120.0, 4.8), 1e-5
+"""Drive of an orbit whose displacement is most sensitive, and mark of its derivatives with default steps."""
 
 FINE = 1024
 """Steps a period of a map with which only the reading is in error."""
@@ -78,6 +81,22 @@ def compare(words: str, model: ij.Isolator, quantity: Callable[[ij.Isolator], ja
     print(f"{words}: {float(moved(zero)):.6g}, {time.perf_counter() - begin:.0f} s")
     mark("jacfwd against differences", float(jnp.max(jnp.abs(forward - difference))) / largest, FORWARD)
     mark("grad against jacfwd", float(jnp.max(jnp.abs(reverse - forward))) / largest, BOTH)
+
+
+def default_steps(model: ij.Isolator) -> None:
+    """Compare the derivatives of an amplitude with the default steps with those of many.
+
+    Each by the change of the amplitude that a relative change of its coefficient makes.
+    """
+
+    def slopes(integrator: ij.Integrator | None) -> np.ndarray:
+        moved = jax.grad(lambda one: ij.find_periodic_orbit(one, drive, integrator=integrator).amplitude)
+        return np.array([float(slope) for slope in jax.tree.leaves(moved(model))])
+
+    drive = ij.Harmonic(*PEAK)
+    usual, many = slopes(None), slopes(ij.Integrator(steps_per_period=SAMPLES // 4))
+    print(f"displacement of an orbit at {PEAK[0]:g} N and {PEAK[1]:g} Hz, with default steps")
+    mark("each derivative against that with many", float(np.max(np.abs(usual / many - 1.0))), AT_PEAK)
 
 
 def read_off(model: ij.Isolator, steps: int | None) -> None:
@@ -175,6 +194,7 @@ def main() -> None:
         model,
         lambda one: ij.find_periodic_orbit(one, beside).floquet.spectral_radius,
     )
+    default_steps(model)
     resonance = ij.find_resonance(model, drive, (4.5, 6.5))
     at_peak = ij.Harmonic(drive, resonance.frequency)
     compare(

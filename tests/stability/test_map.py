@@ -171,7 +171,14 @@ def test_a_killed_run_goes_on_and_ends_with_the_very_same_numbers(tmp_path):
     damaged.write_bytes(kept[:100])
     with pytest.raises(ValueError, match=f"{damaged.name} is damaged"):
         stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
+    damaged.write_bytes((tmp_path / max(stamps)).read_bytes())
+    with pytest.raises(ValueError, match=f"{damaged.name} holds other cells"):
+        stability_map(paper.y_direction(), many, BAND, checkpoint=tmp_path, **arguments)
     damaged.write_bytes(kept)
+    with pytest.raises(
+        ValueError, match=f"must name a folder, but a file is in the place of .*{damaged.name}"
+    ):
+        stability_map(paper.y_direction(), many, BAND, checkpoint=damaged, **arguments)
     with pytest.raises(ValueError, match="which holds the chunks of another map"):
         stability_map(paper.y_direction(), 1.01 * many, BAND, checkpoint=tmp_path, **arguments)
     other = paper.y_direction().replace(mass=801.0)

@@ -43,6 +43,7 @@ from ._laws import ROUNDED as ROUNDED
 from ._laws import ContinuedLaw as ContinuedLaw
 from ._laws import Regime as Regime
 from ._laws import State as State
+from ._laws import find_switches as find_switches
 from ._laws import share_internal as share_internal
 from ._rk4 import RK4 as RK4
 from ._scan import advance as advance

@@ -250,7 +250,12 @@ class _MapOrbits:
         # determinant therefore says how the force rises.
         known = PchipInterpolator(x[clear], fold[clear] / rise[clear])
         ratio = known(np.clip(x, *x[clear][[0, -1]]))
-        rise = np.where(clear | (ratio == 0.0), rise, fold / np.where(ratio == 0.0, 1.0, ratio))
+        # Beyond the clear ones nothing interpolates it: where friction lets a mass go the force is flat, too,
+        # over a small displacement, and no fold.
+        between = (x > x[clear][0]) & (x < x[clear][-1])
+        rise = np.where(clear | between, rise, PchipInterpolator(x, y).derivative()(x))
+        known_better = ~clear & between & (ratio != 0.0)
+        rise = np.where(known_better, fold / np.where(ratio == 0.0, 1.0, ratio), rise)
         # What is unstable though nothing says so, such as where two multipliers have left through one point,
         # counts as it is.
         margin = np.minimum(ratio, others)

@@ -80,13 +80,14 @@ def run_chunks(
         begin, path = begins[place], paths[place]
         if place % processes != own:
             return
+        cells = Candidates(*(values[begin : begin + lanes] for values in candidates))
         if path is not None and kept[place]:
-            part = _read(path)
+            part = _read(path, cells)
         else:
-            part = solver(Candidates(*(values[begin : begin + lanes] for values in candidates)), lanes)
+            part = solver(cells, lanes)
             if path is not None:
                 buffer = io.BytesIO()
-                np.savez(buffer, **part._asdict())
+                np.savez(buffer, **part._asdict(), **_labelled(cells))
                 write_whole(path, buffer.getvalue())
             if progress is not None:
                 done.append(sizes[place])
@@ -126,9 +127,15 @@ def claim_folder(folder: Path, identity: str) -> None:
         identity: word for this very map.
 
     Raises:
-        ValueError: if it belongs to another map, or its chunks were computed by other code.
+        ValueError: if it is no folder, belongs to another map, or its chunks were computed by other code.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as problem:
+        raise ValueError(
+            f"Argument `checkpoint` must name a folder, but a file is in the place of {folder} or of a "
+            "folder above it."
+        ) from problem
     label, own = folder / "map.json", {"identity": identity, "code": package_digest()}
     if not label.exists():
         if any(folder.glob("*.npz")):
@@ -153,13 +160,25 @@ def claim_folder(folder: Path, identity: str) -> None:
             )
 
 
-def _read(path: Path) -> Found:
-    """Read a finished chunk."""
+def _labelled(cells: Candidates) -> dict[str, np.ndarray]:
+    """Give what a chunk says of the orbits that it holds."""
+    return {f"sought_{name}": np.asarray(values) for name, values in cells._asdict().items()}
+
+
+def _read(path: Path, cells: Candidates) -> Found:
+    """Read a finished chunk, which must be that of some orbits."""
     try:
         with np.load(io.BytesIO(path.read_bytes())) as finished:
-            return Found(*(finished[field] for field in Found._fields))
+            part = Found(*(finished[field] for field in Found._fields))
+            own = all(np.array_equal(finished[name], values) for name, values in _labelled(cells).items())
     except (zipfile.BadZipFile, EOFError, KeyError, ValueError, OSError) as problem:
         raise ValueError(
             f"Argument `checkpoint` must hold whole chunks, but {path} is damaged ({problem}). Delete this "
             "file; its cells are then found again."
         ) from problem
+    if not own:
+        raise ValueError(
+            f"Argument `checkpoint` must hold each chunk under its own name, but {path} holds other cells. "
+            "Delete this file; its cells are then found again."
+        )
+    return part

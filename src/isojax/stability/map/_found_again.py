@@ -17,6 +17,7 @@ from ...models import Isolator
 from ..orbit import (
     ShootingMethod,
     Sine,
+    half_range,
     has_continuous_slopes,
     modulus,
     multipliers,
@@ -26,7 +27,6 @@ from ..orbit import (
 )
 from ._batched_newton import FOUND
 from ._map_method import Lane, MapMethod, kinks_between
-from ._nodes import half_peak_to_peak
 from ._single_orbits import single_orbit
 from ._stability_map import StabilityMap
 
@@ -222,17 +222,12 @@ def _close(
         _, (real, matrix) = _gap_and_matrix(root, still, way)
         real, matrix = with_derivatives((real, matrix), _gap_and_matrix, root, live, way)
         state, drive = _state_and_drive(real, live, states)
-        path = trajectory(
-            model,
-            method.integrator,
-            with_overtones(model, drive),
-            tuple(state),
-            turns=0.5 if method.half else 1.0,
-        )
         # A motion starts at its largest displacement; the rest of one that is symmetric adds nothing to it.
-        response = half_peak_to_peak(path[0], method.half)
-        if method.half and not model.harmonics:
-            response = jnp.abs(state[0])
+        response = jnp.abs(state[0])
+        if not method.half or model.harmonics:
+            acting, turns = with_overtones(model, drive), 0.5 if method.half else 1.0
+            path = trajectory(model, method.integrator, acting, tuple(state), turns=turns)
+            response = half_range(model, acting, path, turns)
         roots = multipliers(matrix)
         roots = roots * roots if method.half else roots
         found = (size <= method.integrator.map_tolerance) & jnp.all(jnp.isfinite(matrix))

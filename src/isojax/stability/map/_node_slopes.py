@@ -10,9 +10,9 @@ from jaxtyping import Array, Float
 
 from ..._quick_jit import quick_jit
 from ...models import Isolator
-from ..orbit import Sine, trajectory, with_overtones
+from ..orbit import Sine, half_range, trajectory, with_overtones
 from ._map_method import Lane, MapMethod, kinks_between
-from ._nodes import half_peak_to_peak, in_blocks
+from ._nodes import in_blocks
 
 TABLES = 5
 """Drive, sine and cosine; sum and product of the multipliers; size of the motion over the displacement."""
@@ -127,8 +127,9 @@ def _slopes(
             wanted = _invariants(matrix, method.half)
             size = jnp.ones(())
             if not method.half:
-                path = trajectory(own, method.integrator, with_overtones(own, drive), tuple(state))[0]
-                size = half_peak_to_peak(path, False) / a
+                acting = with_overtones(own, drive)
+                path = trajectory(own, method.integrator, acting, tuple(state))
+                size = half_range(own, acting, path, 1.0) / a
             wanted = jnp.concatenate([a * real[:2], wanted, size[None]])
             return (left, wanted), wanted
 

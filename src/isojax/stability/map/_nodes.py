@@ -20,6 +20,7 @@ from ..orbit import (
     Sine,
     balanced_motion,
     follow_events,
+    half_range,
     period_map,
     trajectory,
     value_and_jacobian,
@@ -323,30 +324,11 @@ def _responses(
     frequency: Array,
     unknown: Array,
 ) -> Array:
-    push, internal = unknown[:, :2].T * amplitude[None], unknown[:, 2:].T * amplitude[None]
-    state = (rest + amplitude, 0.0 * amplitude, *internal)
-    drive = with_overtones(model, Sine(push[0], push[1], frequency))
-    path = trajectory(model, integrator, drive, state, turns=0.5 if half else 1.0)[0]
-    return half_peak_to_peak(path, half) / amplitude
+    turns = 0.5 if half else 1.0
 
+    def node(a: Array, f: Array, own: Array) -> Array:
+        state = (rest + a, 0.0 * a, *(own[2:] * a))
+        drive = with_overtones(model, Sine(own[0] * a, own[1] * a, f))
+        return half_range(model, drive, trajectory(model, integrator, drive, state, turns=turns), turns) / a
 
-def half_peak_to_peak(path: Float[Array, "time ..."], half: bool) -> Lanes:
-    """Give half the peak-to-peak displacement of motions, each peak by the parabola through its neighbours.
-
-    Args:
-        path: displacement at equidistant instants, time first.
-        half: whether it lasts half a period of a motion whose other half is minus the first.
-
-    Returns:
-        The sizes [m].
-    """
-
-    def peak(values: Array) -> Array:
-        place = jnp.clip(jnp.argmax(values, axis=0), 1, values.shape[0] - 2)[None]
-        before, here, after = (jnp.take_along_axis(values, place + shift, axis=0)[0] for shift in (-1, 0, 1))
-        bend = 2.0 * here - before - after
-        vertex = here + (after - before) ** 2 / (8.0 * jnp.where(bend == 0.0, 1.0, bend))
-        return jnp.where((here >= before) & (here >= after), vertex, jnp.max(values, axis=0))
-
-    high, low = peak(path), -peak(-path)
-    return jnp.maximum(high, -low) if half else 0.5 * (high - low)
+    return jax.vmap(node)(amplitude, frequency, unknown)

@@ -12,6 +12,7 @@ from ...models import (
     Instant,
     Isolator,
     State,
+    find_switches,
     freeing_accelerations,
     law_beside,
     sliding_switch,
@@ -111,7 +112,7 @@ def follow_events(
         target = jnp.minimum(number * length, end)
         ahead = target - walk.phase
         ahead = ahead - jax.lax.stop_gradient(jnp.minimum(ahead, 0.0))
-        share, event, moved, after = _step(model, drive, walk, ahead)
+        share, event, moved, after = _step(model, drive, walk.phase, walk.state, walk.sides, ahead)
         phase = jnp.where(event >= 0, walk.phase + share * ahead, target)
         here = (jnp.arange(places) == walk.events) & (event >= 0)
         later = (jnp.arange(places + 1) > walk.events)[:, None] & (event >= 0)
@@ -136,7 +137,85 @@ def follow_events(
     return EventPath(tuple(value * blank for value in last.state), last.crossings, last.path * blank)
 
 
-def first_sides(model: Isolator, drive: PeriodicDrive, state: State) -> Float[Array, " switch"]:
+class _Turn(NamedTuple):
+    """A step towards an extreme.
+
+    Attributes:
+        phase: at its start [rad].
+        state: there.
+        sides: of the switches.
+        length: as far as the extreme is sought, then up to it [rad].
+        found: whether it was found.
+    """
+
+    phase: Array
+    state: State
+    sides: Float[Array, " switch"]
+    length: Array
+    found: Bool[Array, ""]
+
+
+def turning_point(
+    model: Isolator,
+    drive: PeriodicDrive,
+    state: State,
+    phase: Lanes,
+    length: Lanes | float,
+    side: Array,
+) -> tuple[Array, Bool[Array, ""]]:
+    """Give the displacement where the velocity vanishes within a step; its instant follows the parameters.
+
+    The step ends where a law jumps or bends, and another goes on from there.
+
+    Args:
+        model: the isolator.
+        drive: the drive that acts.
+        state: at the start of the step.
+        phase: there [rad].
+        length: of the step [rad].
+        side: 1 if the displacement is largest there, -1 if it is smallest.
+
+    Returns:
+        The displacement [m], and whether the velocity does vanish.
+    """
+    velocity = find_switches(model.elements, state).velocity
+    sides, turning = first_sides(model, drive, state, phase), max(velocity, 0)
+    if velocity < 0:
+        turning = sides.size
+    elif not model.slides:
+        sides = sides.at[velocity].set(side)
+
+    def towards(_: Array | int, turn: _Turn) -> _Turn:
+        share, event, moved, after = _step(model, drive, *turn[:4], side)
+        met, ends = ~turn.found & (event == turning), ~turn.found & (event >= 0)
+        onward = turn._replace(
+            phase=turn.phase + share * turn.length,
+            state=moved,
+            sides=after,
+            length=(1.0 - share) * turn.length,
+        )
+        there = turn._replace(length=share * turn.length, found=jnp.array(True))
+        return jax.tree.map(
+            lambda old, reached, passed: jnp.where(met, reached, jnp.where(ends, passed, old)),
+            turn,
+            there,
+            onward,
+        )
+
+    begin = tuple(jnp.asarray(value, dtype=float) for value in state)
+    first = _Turn(jnp.asarray(phase), begin, sides, jnp.asarray(length), jnp.array(False))
+    others = sides.size - (velocity >= 0)
+    last = jax.lax.fori_loop(0, 2, towards, first) if others else towards(0, first)
+    # The whole step to the instant: the dense output, which finds it, is of one order less.
+    time, law = last.length / drive.angular_frequency, law_beside(model, tuple(last.sides))
+    acting = tuple(drive.at(drive.waves(last.phase + share * last.length)) for share in (0.0, 0.5, 1.0))
+    reached = last.state[0] + sum(_cubic(model, law, last.state, time, acting)[0])
+    return reached, last.found & (side * state[1] >= 0.0)
+
+
+def first_sides(
+    model: Isolator, drive: PeriodicDrive, state: State, phase: Lanes | float = 0.0
+) -> Float[Array, " switch"]:
     """Give the side of each switch on which a motion begins."""
     values = model.switches(state)
     if not values:
@@ -145,7 +224,7 @@ def first_sides(model: Isolator, drive: PeriodicDrive, state: State) -> Float[Ar
     place = sliding_switch(model)
     if place < 0:
         return sides
-    at = drive.at(drive.waves(jnp.zeros(())))
+    at = drive.at(drive.waves(jnp.asarray(phase)))
     direction = jnp.where(state[1] == 0.0, _leaves(model, state, at, sides), jnp.sign(state[1]))
     return sides.at[place].set(direction)
 
@@ -157,18 +236,27 @@ def _leaves(model: Isolator, state: State, at: Instant, sides: Float[Array, " sw
 
 
 def _step(
-    model: Isolator, drive: PeriodicDrive, walk: _Walk, length: Array
+    model: Isolator,
+    drive: PeriodicDrive,
+    phase: Array,
+    start: State,
+    sides: Float[Array, " switch"],
+    length: Array,
+    turning: Array | None = None,
 ) -> tuple[Array, Int[Array, ""], State, Float[Array, " switch"]]:
-    """Give the share of a step at which an event ends it, which one, the state and the sides there."""
-    sides, place = walk.sides, sliding_switch(model)
-    law = law_beside(model, tuple(sides))
-    start, time = walk.state, length / drive.angular_frequency
+    """Give the share of a step at which an event ends it, which one, the state and the sides there.
+
+    With `turning`, the sign that the velocity has at first, its zero is an event also where no law asks for
+    it, one beyond the switches.
+    """
+    place = sliding_switch(model)
+    law, time = law_beside(model, tuple(sides)), length / drive.angular_frequency
     if place >= 0:
         # What is held has no velocity, nor a derivative of it.
         start = (start[0], jnp.where(sides[place] == 0.0, 0.0, start[1]), *start[2:])
 
     def acting(share: Array | float) -> Instant:
-        return drive.at(drive.waves(walk.phase + share * length))
+        return drive.at(drive.waves(phase + share * length))
 
     begin, middle, finish = (acting(share) for share in (0.0, 0.5, 1.0))
     powers = _cubic(model, law, start, time, (begin, middle, finish))
@@ -184,6 +272,8 @@ def _step(
         there = at(share)
         values = jnp.stack(model.switches(there)) if sides.size else jnp.zeros(0)
         values = sides * values
+        if turning is not None and find_switches(model.elements, there).velocity < 0:
+            return jnp.append(values, turning * there[1])
         if place < 0:
             return values
         held = sides[place] == 0.0

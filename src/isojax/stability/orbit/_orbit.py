@@ -26,11 +26,11 @@ from ._half_range import half_range
 from ._harmonic_balance import harmonic_balance
 from ._held import is_held
 from ._known_numbers import is_traced
-from ._period_map import trajectory
+from ._period_map import split_trajectory
 from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
 from ._sine import highest_order, integrator_for, need_fundamental, recorded_sine
-from ._split_period_map import event_places
+from ._split_period_map import Split, event_places
 from ._state_path import AbstractStatePath
 from ._symmetry import is_odd, is_odd_along
 
@@ -38,8 +38,10 @@ _EVENT_ROOM = 16
 """Times the events of a motion for which room is made first, beyond which no more is made."""
 
 _SYMMETRIC_TO = 1e-4
-"""Distance of the two halves of a motion, over its size, up to which it counts as symmetric: its path is
-sampled with the steps of maps, whose error at a kink is a few times 1e-5."""
+"""Distance of the two halves of a motion, over its size, up to which it counts as symmetric."""
+
+_EVENTS_AT_ENDS = 8
+"""Events of the path to make room for beyond those of the closed motion: one at its end may count twice."""
 
 
 @shown
@@ -72,7 +74,7 @@ class Orbit(AbstractStatePath):
 
     @property
     def amplitude(self) -> Float[Array, ""]:
-        """Half the peak-to-peak displacement [m], each peak by a parabola through its sample."""
+        """Half the peak-to-peak displacement [m], each extreme where the velocity vanishes."""
         drive = recorded_sine(self.model, self.excitation.amplitude, self.excitation.frequency)
         return half_range(self.model, drive, tuple(self.states.T), float(self.periods))
 
@@ -269,16 +271,10 @@ def _orbit(
 ) -> Orbit:
     found = solution.found & jnp.all(jnp.isfinite(solution.matrix))
     blank = jnp.where(found, 1.0, jnp.nan)
-    state, matrix = with_derivatives(
-        (solution.state, solution.matrix),
-        closing,
-        solution.root,
-        (model, excitation),
-        (method, solution.split),
-    )
+    live, held = (model, excitation), (method, solution.split)
+    known = solution.state, solution.matrix, _path(solution.state, frozen(live), held)
+    state, matrix, path = with_derivatives(known, _closing_with_path, solution.root, live, held)
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
-    lasting = float(method.periods)
-    path = jnp.stack(trajectory(model, method.integrator, drive, tuple(state), turns=lasting), axis=-1)
     matrix = matrix * blank
     if method.half:
         roots = multipliers(matrix)
@@ -309,3 +305,24 @@ def _orbit(
         error=solution.error * blank,
         result=result,
     )
+
+
+def _path(
+    state: Float[Array, " state"], live: tuple[Isolator, Harmonic], held: tuple[ShootingMethod, Split]
+) -> Float[Array, "time state"]:
+    """Give the states along an orbit, from the one at t = 0."""
+    (model, excitation), (method, split) = live, held
+    drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
+    lasting = float(method.periods)
+    # As many events as the split motion has, which may last for a half, and some at its ends.
+    places = round(lasting / method.turns) * split.crossings.phases.size + _EVENTS_AT_ENDS
+    path = split_trajectory(model, method.integrator, drive, tuple(state), lasting, places)
+    return jnp.stack(path, axis=-1)
+
+
+def _closing_with_path(
+    root: Float[Array, " unknown"], live: tuple[Isolator, Harmonic], held: tuple[ShootingMethod, Split]
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Give what vanishes for an orbit; its state, the matrix, and the states along it."""
+    left, (state, matrix) = closing(root, live, held)
+    return left, (state, matrix, _path(state, live, held))

@@ -13,6 +13,9 @@ from ._sine import PeriodicDrive, Waves, stage_phases
 _EVENTS_A_TURN = 8
 """Events of each switch in a period to make room for, where laws jump or bend."""
 
+_FINER = 4
+"""Times the steps with which the path of a single orbit is stepped."""
+
 
 def period_map(
     model: Isolator, integrator: Integrator, drive: PeriodicDrive, state: State, *, turns: float = 1.0
@@ -63,6 +66,27 @@ def trajectory(
     """
     end, path = _advance(model, integrator, drive, state, turns, keep=True, rounded=rounded)
     return tuple(jnp.concatenate([along, last[None]]) for along, last in zip(path, end, strict=True))
+
+
+def split_trajectory(
+    model: Isolator, integrator: Integrator, drive: PeriodicDrive, state: State, turns: float, places: int
+) -> State:
+    """Give the states along a motion split at its kinks, with steps finer than those at which they are kept.
+
+    Args:
+        model: the isolator.
+        integrator: steps a period at which states are kept.
+        drive: the drive that acts.
+        state: state at t = 0.
+        turns: periods.
+        places: events to make room for.
+
+    Returns:
+        As `trajectory`; differentiable forwards alone.
+    """
+    steps = _FINER * round(integrator.steps_a_period(model) * turns)
+    motion = follow_events(model, drive, state, 2.0 * math.pi * turns, steps, places, steps + 1)
+    return tuple(motion.path[::_FINER].T)
 
 
 def _advance(
