@@ -107,8 +107,8 @@ def find_nearest_folds(
     Newton's method on the period map from each start, a few periods later; of an odd model on that of half a
     period. From each orbit its branch is then followed by pseudo-arc-length four ways, to less and more drive
     and to lower and higher frequency, and the point at which the parameter first turns back is read off a
-    cubic through the two points around it. All motions go side by side, in fixed steps not split at kinks:
-    multipliers are good to 2e-4, folds to 1e-4 of the drive.
+    cubic through the two points around it. All motions go side by side, in fixed steps; where laws jump, as
+    friction and stops do, steps end at the jumps. Multipliers are good to 2e-4, folds to 1e-4 of the drive.
 
     Args:
         model: the isolator.
