@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -87,7 +88,8 @@ def run_chunks(
             part = solver(cells, lanes)
             if path is not None:
                 buffer = io.BytesIO()
-                np.savez(buffer, **part._asdict(), **_labelled(cells))
+                content: dict[str, Any] = {**part._asdict(), **_labelled(cells)}
+                np.savez(buffer, **content)
                 write_whole(path, buffer.getvalue())
             if progress is not None:
                 done.append(sizes[place])
