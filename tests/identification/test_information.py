@@ -138,7 +138,7 @@ def _exact(model: Isolator, drive: np.ndarray, start: list[float]) -> np.ndarray
         place = min(int(at * RATE), drive.size - 1)
         share, push = at * RATE - place, np.array([pieces[place].force(at)])
         sooner, later = (
-            float(balance.acceleration(at, state[:, None], push, np.array(own)[:, None], stuck)[0])
+            float(balance.acceleration(at, np.array(state)[:, None], push, np.array(own)[:, None], stuck)[0])
             for own, stuck in (before[4:], after)
         )
         jump = later - sooner
