@@ -19,7 +19,7 @@ from ._motion_equation import EquationOfMotion
 from ._path import Path, powers
 
 _STAGES = 12
-# The table as numbers: of the few that a state has, their sums take half as long as those of arrays.
+# The table as numbers: with two or three states a step takes a fifth less time than with arrays.
 _A = [DOP853.A[s, :s].tolist() for s in range(_STAGES)]
 _B = DOP853.B.tolist()
 _C = DOP853.C[:_STAGES].tolist()
