@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ..._given_numbers import given_count
 from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ..._types import check_float64
@@ -137,8 +138,7 @@ def stability_map(
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     if not 1.0 <= reach < math.inf:
         raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
-    if chunk < 1:
-        raise ValueError(f"Argument `chunk` must be a positive count, but is {chunk}.")
+    chunk = given_count("chunk", chunk)
     window = MapWindow(forces, band, reach)
     if integrator is not None:
         check_steps(model, integrator, window)
