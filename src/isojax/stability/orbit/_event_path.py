@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
@@ -60,6 +61,7 @@ class _Walk(NamedTuple):
     path: Float[Array, "time state"]
 
 
+@eqx.filter_jit
 def follow_events(
     model: Isolator,
     drive: PeriodicDrive,
@@ -235,6 +237,7 @@ def _leaves(model: Isolator, state: State, at: Instant, sides: Float[Array, " sw
     return jnp.where(forward > 0.0, 1.0, jnp.where(backward < 0.0, -1.0, 0.0))
 
 
+@eqx.filter_jit
 def _step(
     model: Isolator,
     drive: PeriodicDrive,

@@ -1,12 +1,14 @@
 """A function's value beside its derivative, computed once for both."""
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import equinox as eqx
 import jax
 from jaxtyping import Array, Float
 
 Value = TypeVar("Value")
+Held = TypeVar("Held")
 
 
 def value_and_jacobian(
@@ -28,3 +30,29 @@ def value_and_jacobian(
 
     slope, value = jax.jacfwd(twice, has_aux=True)(at)
     return value, slope
+
+
+def with_matrix(function: Callable[[Array, Held], Array]) -> Callable[[Array, Held], Array]:
+    """Give a function that is differentiated by its matrix, computed beside the value.
+
+    JAX splits what a root finder linearises into a value and a linear map, each of which goes through the
+    whole motion again, to run as well as to compile.
+
+    Args:
+        function: of an unknown, and of what is held fixed.
+
+    Returns:
+        The same function; its derivative, in either mode, is that by the unknown alone.
+    """
+
+    @eqx.filter_custom_jvp
+    def valued(unknown: Array, held: Held) -> Array:
+        return function(unknown, held)
+
+    @valued.def_jvp
+    def _(primals: tuple[Array, Held], tangents: tuple[Array, Any]) -> tuple[Array, Array]:
+        (unknown, held), (moved, _) = primals, tangents
+        value, matrix = value_and_jacobian(lambda at: function(at, held), unknown)
+        return value, matrix @ moved
+
+    return valued

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
@@ -11,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ...excitations import Harmonic
 from ...models import Isolator, sliding_switch
 from ._event_path import follow_events, same_events
-from ._jacobian import value_and_jacobian
+from ._jacobian import value_and_jacobian, with_matrix
 from ._period_map import period_map, trajectory
 from ._shooting_method import ShootingMethod
 from ._sine import PeriodicDrive, recorded_sine
@@ -144,11 +145,14 @@ def shoot(
     integrator, turns = method.integrator, method.turns
     scale = state_scale(trajectory(model, integrator, drive, tuple(start), turns=turns))
 
-    def open_end(scaled: Array, args: None) -> Array:
+    @with_matrix
+    def open_end(scaled: Array, held: tuple[Isolator, PeriodicDrive, Array]) -> Array:
+        model, drive, scale = held
         moved = period_map(model, integrator, drive, tuple(scaled * scale), turns=turns)
         return jnp.stack(moved) / scale - scaled
 
-    near = optx.root_find(open_end, solver, start / scale, max_steps=50, throw=False).value
+    held = model, drive, scale
+    near = optx.root_find(open_end, solver, start / scale, held, max_steps=50, throw=False).value
 
     def again(own: _Round) -> Array:
         return ~own.agrees & jnp.all(jnp.isfinite(own.state)) & (own.rounds < _SPLITS_ANEW)
@@ -175,6 +179,7 @@ def shoot(
     return ShootingSolution(last.root, last.split, last.state, matrix, last.error, found, accurate)
 
 
+@eqx.filter_jit  # JAX keeps its trace, which the shapes and the loop both ask for
 def _closed(
     model: Isolator,
     method: ShootingMethod,
@@ -190,7 +195,7 @@ def _closed(
     split = split_at_events(model, method, drive, tuple(near), places)
     scale, least = split.scale, split.steps
 
-    def matrices(unknown: Array, steps: Array, polish: Array) -> tuple[Array, tuple[Array, Array]]:
+    def trials(unknown: Array, steps: Array, polish: Array) -> tuple[Array, tuple[Array, Array]]:
         """Give the unknown, polished by a step of Newton where wanted, and before it the map's derivative
         and the residual, for one count of steps after the other.
         """
@@ -202,19 +207,30 @@ def _closed(
             step = jnp.linalg.solve(jacobian, left)
             return unknown - jnp.where(wanted, step, 0.0), (transition, jnp.max(jnp.abs(left)))
 
-        # Looped over, so that the motion is compiled once for all of them.
         return jax.lax.scan(body, unknown, (steps, polish))
 
+    @with_matrix
+    def gap(unknown: Array, held: tuple[Split, Isolator, PeriodicDrive]) -> Array:
+        return _gap(unknown, method, *held)
+
+    def closed(unknown: Array, steps: Array) -> Array:
+        held = split._replace(steps=steps), model, drive
+        return optx.root_find(gap, solver, unknown, held, max_steps=20, throw=False).value
+
+    def twice(at: tuple[Array, Array], last: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Find the steps that the multipliers need; then close the motion with them, and see how it is."""
+        unknown, steps = at
+        unknown = jax.lax.cond(last, closed, lambda unknown, _: unknown, unknown, steps)
+        counts = jnp.where(last, jnp.stack([steps, steps, steps // 2]), jnp.stack([least, 2 * least, 0 * least]))
+        unknown, (matrices, left) = trials(unknown, counts, last & (jnp.arange(3) < 1))
+        needed = steps_wanted(least, matrices, goal, doublings=1, most=_MOST_STEPS_A_PIECE)
+        return (unknown, jnp.where(last, steps, needed)), (matrices, left)
+
+    # Looped over, so that the motion is compiled once for all of them.
     first = jnp.concatenate([near / scale, split.crossings.phases])
-    _, (trials, _) = matrices(first, jnp.stack([least, 2 * least]), jnp.zeros(2, bool))
-    steps = steps_wanted(least, trials, goal, doublings=1, most=_MOST_STEPS_A_PIECE)
+    (root, steps), (matrices, left) = jax.lax.scan(twice, (first, least), jnp.array([False, True]))
     split = split._replace(steps=steps)
-
-    def gap(unknown: Array, args: None) -> Array:
-        return _gap(unknown, method, split, model, drive)
-
-    root = optx.root_find(gap, solver, first, max_steps=20, throw=False).value
-    root, (transitions, left) = matrices(root, jnp.stack([steps, steps, steps // 2]), jnp.arange(3) < 1)
+    transitions, left = matrices[-1], left[-1]
     error = jnp.max(jnp.abs(transitions[1] - transitions[2])) / 15.0
     state, end = root[: scale.size] * scale, 2.0 * math.pi * method.turns
     fine = round(_CHECKING_STEPS * integrator.steps_a_period(model) * method.turns)
