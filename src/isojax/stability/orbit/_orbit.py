@@ -192,14 +192,32 @@ def _sought(
     begin: Float[Array, " state"] | None,
 ) -> tuple[ShootingMethod, ShootingSolution, Bool[Array, ""]]:
     """Search, once more with steps that follow fast states where this fails; say whether these are stiff."""
-    solution, stiff = _solve(model, drive, method, solver, begin), False
-    if not isinstance(solution.found, Tracer) and not (solution.found & solution.accurate):
+    places, most = event_places(model, method.turns), event_places(model, _EVENT_ROOM * method.turns)
+    solution, stiff = _shoot(model, drive, method, solver, begin, places), False
+    if isinstance(solution.found, Tracer):
+        return method, solution, jnp.asarray(stiff)
+    if not (solution.found & solution.accurate):
+        # Steps that internal states need, before room for events: too few make events that are none.
         frequency = np.atleast_1d(np.asarray(drive.frequency))
         motion = answer_sizes(model, jnp.atleast_1d(drive.amplitude), jnp.asarray(frequency))
         finer, stiff = integrator_that_follows(model, method.integrator, np.asarray(motion), frequency)
         if finer.steps_per_period > method.integrator.steps_per_period:
             method = ShootingMethod(finer, method.periods, method.half)
-            solution = _solve(model, drive, method, solver, begin)
+            solution = _shoot(model, drive, method, solver, begin, places)
+    while not solution.split.complete and places < most:
+        places *= 2
+        solution = _shoot(model, drive, method, solver, begin, places)
+    if begin is None and not solution.found:
+        order = highest_order(model)
+        balance = harmonic_balance(
+            model,
+            drive,
+            harmonics=max(7, 2 * order),
+            samples=max(128, 16 * order),
+            integrator=method.integrator,
+        )
+        if is_successful(balance.result):
+            solution = _shoot(model, drive, method, solver, balance.y0, places)
     return method, solution, jnp.asarray(stiff)
 
 
@@ -213,37 +231,6 @@ def closed_by_half(orbit: Orbit) -> bool:
         Whether it was.
     """
     return bool(np.all(np.isfinite(np.asarray(orbit.floquet.half_period_multipliers))))
-
-
-def _solve(
-    model: Isolator,
-    drive: Harmonic,
-    method: ShootingMethod,
-    solver: optx.AbstractRootFinder,
-    begin: Float[Array, " state"] | None,
-) -> ShootingSolution:
-    """Search with room for all events, and from another start where the first leads nowhere."""
-    places, most = event_places(model, method.turns), event_places(model, _EVENT_ROOM * method.turns)
-    solution = _shoot(model, drive, method, solver, begin, places)
-
-    def all_split() -> Bool[Array, ""]:
-        return solution.split.complete
-
-    while not isinstance(all_split(), Tracer) and not all_split() and places < most:
-        places *= 2
-        solution = _shoot(model, drive, method, solver, begin, places)
-    if begin is None and not isinstance(solution.found, Tracer) and not solution.found:
-        order = highest_order(model)
-        balance = harmonic_balance(
-            model,
-            drive,
-            harmonics=max(7, 2 * order),
-            samples=max(128, 16 * order),
-            integrator=method.integrator,
-        )
-        if is_successful(balance.result):
-            solution = _shoot(model, drive, method, solver, balance.y0, places)
-    return solution
 
 
 @quick_jit
