@@ -126,6 +126,7 @@ def test_what_cannot_be_met_is_named_with_by_how_much():
     assert len(both.missed) == 2
     words = " ".join(repr(both).split())
     assert "no point was found that keeps the constraints; the best one breaks " in words
+    assert "scan of 8 points: none breaks the constraints by less" in words
     assert re.search(r"stiffness ≥ 2e\+06 by 6\.6\d+e\+05 and stiffness ≤ 1e\+06 by 3\.3\d+e\+05", words)
 
 

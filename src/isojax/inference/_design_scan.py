@@ -27,17 +27,22 @@ class Scan(NamedTuple):
         smaller: how many have a smaller objective; where the design misses its limits, a smaller miss.
         failed: how many gave no finite number.
         better: how many are better: a smaller objective with every limit kept, or a smaller miss.
+        kept: whether the design keeps its limits, so that objectives were compared.
     """
 
     points: int
     smaller: int
     failed: int
     better: int
+    kept: bool
 
     @property
     def words(self) -> str:
         """What was found, in words."""
         lost = f"; {self.failed} failed" if self.failed else ""
+        if not self.kept:
+            nearer = f"{self.better} break" if self.better else "none breaks"
+            return f"scan of {self.points} points: {nearer} the constraints by less{lost}"
         what = f"{self.smaller} have a smaller objective" if self.smaller else "none has a smaller objective"
         kept = ", none of these keeps the limits" if self.smaller and not self.better else ""
         best = f", {self.better} of these keep the limits" if self.better else ""
@@ -87,4 +92,4 @@ def scan_design(
         better += good
         if good and value < best:
             best, best_point = value, at
-    return Scan(count, smaller, failed, better), best_point
+    return Scan(count, smaller, failed, better, found.feasible), best_point

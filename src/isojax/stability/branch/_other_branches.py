@@ -116,7 +116,6 @@ def find_other_branches(
         The other branches, by drive and then by periods, and where they were sought.
     """
     still = frozen(live)
-    odd = is_odd(still.model)
     found: list[Branch] = []
     reach, left, tried, unsettled = 0.0, 0, 0, 0
     for lane in range(scale.shape[0]):
@@ -129,7 +128,7 @@ def find_other_branches(
             np.asarray(followed.tangents[lane, :count]),
             int(followed.ending[lane]),
         )
-        sought = _other_curves(own, odd, main, search)
+        sought = _other_curves(own, main, search)
         reach, left = max(reach, sought.reach), left + sought.left
         tried, unsettled = tried + sought.tried, unsettled + sought.unsettled
         lanes = live.driven(live.amplitude[lane : lane + 1], live.frequency[lane : lane + 1])
@@ -158,7 +157,7 @@ class _Sought(NamedTuple):
     unsettled: int
 
 
-def _other_curves(family: ParameterFamily, odd: bool, main: Curve, search: BranchSearch) -> _Sought:
+def _other_curves(family: ParameterFamily, main: Curve, search: BranchSearch) -> _Sought:
     """Give the other branches under one drive."""
     known, reach, left, tried, unsettled = [main], 0.0, 0, 0, 0
     forced, coarse = one_harmonic(family), integrator_for(family.model, None, _COARSE_STEPS)
@@ -166,6 +165,7 @@ def _other_curves(family: ParameterFamily, odd: bool, main: Curve, search: Branc
     for periods in search.periods:
         starts = orbit_starts(family, forced, periods, unknowns, main.scale)
         reach, tried = max(reach, float(starts.sizes.max())), tried + starts.shares.size
+        odd = is_odd(family.model, reach)
         groups, lost = OrbitSearch(family, coarse, odd, periods).settled(starts)
         closed = OrbitStarts(*map(np.concatenate, zip(*(group for _, group in groups), strict=True)))
         closed = _off(distinct(family, closed), known)

@@ -147,7 +147,7 @@ def _grid(
     begin = balances[:, rows] * (displacements / _TRIED[rows])[:, None]
     start, sizes = np.split(begin.reshape(begin.shape[0], -1).T, [states], axis=1)
     sizes = np.concatenate([np.repeat(np.hypot(*start.T[:2])[:, None], 2, axis=1), sizes], axis=1)
-    half = is_odd(errors.model)
+    half = is_odd(errors.model, float(displacements.max()))
     if errors.model.harmonics:
         start, sizes = _with_begin(errors.model, displacements, frequencies, rest, start, sizes)
     found = _closed(
