@@ -155,3 +155,20 @@ def test_a_map_with_friction_holds_the_orbits_of_the_rig(monkeypatch):
         error = multiplier_error(np.asarray(smap.multipliers)[row, column], exact.multipliers)
         assert exact.closed
         assert error < smap.error < 5e-6
+
+
+@pytest.mark.slow
+def test_a_map_with_friction_holds_all_orbits_between_the_folds(monkeypatch):
+    # Next to rest friction is stiff without bound: how far orbits are sought must not follow from that.
+    monkeypatch.setattr("isojax.stability.map._single_orbits._ORBITS_TOGETHER", 6)
+    laws = elements.LinearStiffness(3e5), elements.CubicStiffness(4e10), elements.LinearDamping(360.0)
+    model = Isolator(120.0, (*laws, elements.CoulombFriction(6.0, 1e-4)))
+    smap = stability_map(model, [60.0, 80.0], [8.0, 10.0], coexisting=True)
+    np.testing.assert_array_equal(smap.count, [[1, 1], [1, 3]])
+    own = rig.LinearStiffness(3e5), rig.CubicStiffness(4e10), rig.LinearDamping(360.0)
+    plant = rig.Plant((*own, rig.CoulombFriction(6.0)), 120.0)
+    for place in range(3):
+        exact = rig_orbit(plant, 80.0, 10.0, np.asarray(smap.y0)[place, 1, 1])
+        assert exact.closed
+        error = multiplier_error(np.asarray(smap.multipliers)[place, 1, 1], exact.multipliers)
+        assert error < smap.error < 5e-6

@@ -1,5 +1,7 @@
 """Cells of a map found as single orbits: where nothing can be read off, and where Newton failed."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,6 +10,7 @@ import optimistix as optx
 from jax.sharding import NamedSharding
 from jaxtyping import Array, Float
 
+from ..._cores import usable_cores
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ...excitations import Harmonic
@@ -105,13 +108,19 @@ def single_orbits(
     Returns:
         The orbits, each from t = 0 of its recorded drive, without phases of kinks.
     """
-    method, orbits = ShootingMethod(integrator, 1, half), []
-    for begin in range(0, amplitude.size, _ORBITS_TOGETHER):
-        block = [amplitude[begin : begin + _ORBITS_TOGETHER], frequency[begin : begin + _ORBITS_TOGETHER]]
-        block += [] if starts is None else [starts[begin : begin + _ORBITS_TOGETHER]]
-        count = block[0].size
-        values = [jnp.asarray(padded(value, _ORBITS_TOGETHER)) for value in block]
-        orbits.append(Found(*(np.asarray(own)[:count] for own in _shoot(model, method, *values))))
+    method = ShootingMethod(integrator, 1, half)
+    given = [amplitude, frequency] if starts is None else [amplitude, frequency, starts]
+
+    def block(begin: int) -> Found:
+        own = [values[begin : begin + _ORBITS_TOGETHER] for values in given]
+        values = [jnp.asarray(padded(value, _ORBITS_TOGETHER)) for value in own]
+        return Found(*(np.asarray(value)[: own[0].size] for value in _shoot(model, method, *values)))
+
+    first, *others = range(0, amplitude.size, _ORBITS_TOGETHER)
+    # The first compiles; then each core runs its own.
+    orbits = [block(first)]
+    with ThreadPoolExecutor(usable_cores()) as pool:
+        orbits += pool.map(block, others)
     return joined(orbits)
 
 

@@ -8,6 +8,7 @@ any force, with the invariants of their period map, from which the multipliers f
 import math
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -15,7 +16,7 @@ from scipy.ndimage import maximum_filter
 
 from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
-from ..orbit import response_amplitudes, rest_displacement
+from ..orbit import answer_scale, response_amplitudes, rest_displacement
 from ._grids import REFINEMENTS, Grid, filled, first_grid, node_at
 from ._nodes import node_responses
 from ._shared_kinks import AROUND
@@ -30,6 +31,9 @@ starts at its largest displacement."""
 
 _ROWS_BEYOND = 2
 """Nodes of the first grid beyond the largest displacement that is held."""
+
+_ALIKE = 1e-3
+"""Share by which the drive of a motion exceeds that of the smallest, below which no motion is told apart."""
 
 PARTS = 8
 """Parts of a spline's piece between whose ends roots are sought."""
@@ -99,6 +103,12 @@ def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Arr
     return rest, response_amplitudes(model, frequencies, amplitudes, rest)
 
 
+@quick_jit
+def _largest_scale(model: Isolator, frequencies: Array, amplitude: Array) -> Array:
+    rest = rest_displacement(model)
+    return jnp.max(jax.vmap(lambda frequency: answer_scale(model, amplitude, frequency, rest))(frequencies))
+
+
 def displacement_at_rest(model: Isolator, half: bool) -> float:
     """Give the displacement at rest [m].
 
@@ -128,15 +138,14 @@ def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, flo
         window.frequencies,
     )
     band = jnp.asarray(np.linspace(frequencies[0], frequencies[-1], 24 if len(frequencies) > 1 else 1))
-    tiny = 1e-9
-    _, slope = _forces(model, band, jnp.array([tiny]))
-    soft = float(jnp.min(slope)) / tiny
-    grid = most / soft * np.logspace(-9.0, 4.0, 400)
+    grid = float(_largest_scale(model, band, jnp.asarray(most))) * np.logspace(-9.0, 4.0, 400)
     rest, needed = (np.asarray(value) for value in _forces(model, band, jnp.asarray(grid)))
     # Connected with rest: from small motion up to the first that needs more than the largest force.
     beyond = np.maximum.accumulate(needed >= most, axis=0)
     reached = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(grid) - 1)
-    below = np.minimum.accumulate(needed < least, axis=0).sum(axis=0)
+    # Friction takes a drive of the smallest motion; what takes no more are all of them alike.
+    enough = np.maximum(least, (1.0 + _ALIKE) * needed[0])
+    below = np.minimum.accumulate(needed < enough, axis=0).sum(axis=0)
     low = grid[max(int(below.min()) - 1, 0)]
     return float(rest), 0.5 * low, window.reach * float(grid[int(reached.max())])
 
