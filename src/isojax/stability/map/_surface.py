@@ -32,7 +32,7 @@ starts at its largest displacement."""
 _ROWS_BEYOND = 2
 """Nodes of the first grid beyond the largest displacement that is held."""
 
-_ALIKE = 1e-3
+_TOLD_APART = 1e-3
 """Share by which the drive of a motion exceeds that of the smallest, below which no motion is told apart."""
 
 PARTS = 8
@@ -144,7 +144,7 @@ def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, flo
     beyond = np.maximum.accumulate(needed >= most, axis=0)
     reached = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(grid) - 1)
     # Friction takes a drive of the smallest motion; what takes no more are all of them alike.
-    enough = np.maximum(least, (1.0 + _ALIKE) * needed[0])
+    enough = np.maximum(least, (1.0 + _TOLD_APART) * needed[0])
     below = np.minimum.accumulate(needed < enough, axis=0).sum(axis=0)
     low = grid[max(int(below.min()) - 1, 0)]
     return float(rest), 0.5 * low, window.reach * float(grid[int(reached.max())])
