@@ -340,12 +340,11 @@ def motions_lacking(case: Case, model: Any) -> tuple[int, int]:
     settled = lacking = 0
     for row, column in np.ndindex(LARGE.size, BELOW.size):
         known = starts[:, row, column]
+        inner = len(case.inner(known[0]))
         known = known[np.isfinite(known).all(axis=1)]
-        if not len(known):
-            continue
         unit = np.array([1.0, 2.0 * np.pi * BELOW[column]])
         for begin in (0.0, FAR * largest):
-            motion = np.array([begin, 0.0, *np.zeros(len(case.inner(known[0])))])
+            motion = np.array([begin, 0.0, *np.zeros(inner)])
             for _ in range(PERIODS):
                 before = motion
                 try:
@@ -356,7 +355,7 @@ def motions_lacking(case: Case, model: Any) -> tuple[int, int]:
                 if np.max(np.abs(motion - before)[:2] / unit) <= SETTLED * size:
                     settled += 1
                     apart = np.max(np.abs(known[:, :2] - motion[:2]) / unit, axis=1)
-                    lacking += bool(np.min(apart) > SAME * size)
+                    lacking += bool(np.min(apart, initial=np.inf) > SAME * size)
                     break
     return settled, lacking
 

@@ -221,7 +221,7 @@ def _closed(
         """Find the steps that the multipliers need; then close the motion with them, and see how it is."""
         unknown, steps = at
         unknown = jax.lax.cond(last, closed, lambda unknown, _: unknown, unknown, steps)
-        counts = jnp.where(last, jnp.stack([steps, steps, steps // 2]), least * jnp.array([1, 2, 0]))
+        counts = jnp.where(last, jnp.stack([steps, steps, steps // 2]), least * jnp.array([1, 2, 1]))
         unknown, (matrices, left) = trials(unknown, counts, last & (jnp.arange(3) < 1))
         needed = steps_wanted(least, matrices, goal, doublings=1, most=_MOST_STEPS_A_PIECE)
         return (unknown, jnp.where(last, steps, needed)), (matrices, left)
