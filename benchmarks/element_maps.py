@@ -36,8 +36,8 @@ AMPLITUDES = np.linspace(5.0, 60.0, 20)
 FREQUENCIES = np.linspace(4.0, 8.0, 20)
 """[N], [Hz]: resonance lies at 5.85 Hz, where 60 N move the mass by 0.15 mm."""
 
-LARGE, BELOW = np.array([60.0, 160.0, 300.0]), np.array([4.0, 4.3, 5.0, 6.0])
-"""Drives under which the model bends [N], and frequencies, most below resonance [Hz]: it softens."""
+LARGE, BESIDE = np.array([60.0, 160.0, 300.0]), np.array([4.0, 4.3, 5.0, 6.0, 7.0, 8.0])
+"""Drives under which the model bends [N], and frequencies on both sides of resonance [Hz]."""
 
 FAR, PERIODS, SETTLED, SAME = 2.0, 150, 1e-6, 1e-3
 """Displacement of the second start over the largest of the map; drive periods at most until a motion settles;
@@ -207,6 +207,10 @@ CASES: dict[str, Case] = {
         inner=lambda y0: 1e-5 * y0[2:],
     ),
     "coulomb_friction": Case((el.CoulombFriction(4.0, WIDTH),), (rig.CoulombFriction(4.0),)),
+    "coulomb_friction on a stiffening spring": Case(
+        (el.CoulombFriction(12.0, WIDTH), el.CubicStiffness(1e11)),
+        (rig.CoulombFriction(12.0), rig.CubicStiffness(1e11)),
+    ),
     "asymmetric_friction": Case(
         (el.CoulombFriction(4.0, WIDTH), el.AsymmetricFriction(1.5, WIDTH)),
         (rig.CoulombFriction(4.0), rig.AsymmetricFriction(1.5)),
@@ -335,20 +339,20 @@ def coexisting(case: Case, model: Any) -> tuple[int, int]:
 
 def motions_lacking(case: Case, model: Any) -> tuple[int, int]:
     """Give how many motions the rig settles to under large drives, and how many of these the map lacks."""
-    smap = ij.stability_map(model, LARGE, BELOW, coexisting=True)
+    smap = ij.stability_map(model, LARGE, BESIDE, coexisting=True)
     starts, largest = np.asarray(smap.y0), float(np.nanmax(np.asarray(smap.response)))
     settled = lacking = 0
-    for row, column in np.ndindex(LARGE.size, BELOW.size):
+    for row, column in np.ndindex(LARGE.size, BESIDE.size):
         known = starts[:, row, column]
         inner = len(case.inner(known[0]))
         known = known[np.isfinite(known).all(axis=1)]
-        unit = np.array([1.0, 2.0 * np.pi * BELOW[column]])
+        unit = np.array([1.0, 2.0 * np.pi * BESIDE[column]])
         for begin in (0.0, FAR * largest):
             motion = np.array([begin, 0.0, *np.zeros(inner)])
             for _ in range(PERIODS):
                 before = motion
                 try:
-                    motion = after_a_period(plant_of(case), case.gain * LARGE[row], BELOW[column], before)
+                    motion = after_a_period(plant_of(case), case.gain * LARGE[row], BESIDE[column], before)
                 except RuntimeError:  # it ran away: the model softens
                     break
                 size = max(np.max(np.abs(motion[:2]) / unit), 1e-300)
@@ -370,7 +374,7 @@ def main() -> int:
     left = set(el.CATALOGUE) - set(CASES) - {name for own in SKIPPED.values() for name in own}
     print(f"elements of the catalogue that neither list holds: {sorted(left) or 'none'}")
     print(
-        f"{'element':<24}{'empty':>6}{'single':>7}{'error':>9}{'reported':>10}{'orbit':>9}{'reported':>10}"
+        f"{'element':<40}{'empty':>6}{'single':>7}{'error':>9}{'reported':>10}{'orbit':>9}{'reported':>10}"
         f"{'several':>8}{'wrong':>6}{'settled':>8}{'lacking':>8}{'compile':>9}{'a cell':>9}"
     )
     failed = 0
@@ -381,7 +385,7 @@ def main() -> int:
         jax.clear_caches()
         failed += not row.passed
         print(
-            f"{name:<24}{row.empty:>6}{row.filled:>7}{row.error:>9.1e}{row.reported:>10.1e}{row.single:>9.1e}"
+            f"{name:<40}{row.empty:>6}{row.filled:>7}{row.error:>9.1e}{row.reported:>10.1e}{row.single:>9.1e}"
             f"{row.single_reported:>10.1e}{row.several:>8}{row.unconfirmed:>6}{row.settled:>8}{row.lacking:>8}"
             f"{row.compiling:>7.1f} s"
             f"{1e3 * row.cell:>6.2f} ms  {'PASS' if row.passed else 'FAIL'}",

@@ -32,6 +32,9 @@ SAMPLED = 1024
 CELLS_TOGETHER = 512
 """Orbits that share a compiled step: those of a sample, and those for which a first step was not enough."""
 
+_FINER_STEPS = 3
+"""Times the steps of a map with which its error is found."""
+
 FULLY_CLOSED = 1e-9
 """Relative step after which an orbit is closed far better than it is integrated."""
 
@@ -200,6 +203,30 @@ class CellSolver(eqx.Module):
     def states(self) -> int:
         """Count of states of the model."""
         return 2 + self.model.internal_states
+
+    @property
+    def sampled(self) -> int:
+        """Count of orbits that are confirmed to learn the error of a map."""
+        return SAMPLED
+
+    def confirmed(self, lanes: Lane, count: int) -> Found:
+        """Find orbits with steps several times finer.
+
+        Args:
+            lanes: the orbits.
+            count: how many.
+
+        Returns:
+            The same, so far closed that only the error of the integration remains.
+        """
+        method = self.method.finer(_FINER_STEPS)
+
+        def closed(block: slice) -> Found:
+            some = jax.tree.map(lambda values: padded(np.asarray(values[block]), CELLS_TOGETHER), lanes)
+            own = len(range(*block.indices(count)))
+            return self.improve(method, jax.device_put(some, self.sharding), own, limit=FULLY_CLOSED)
+
+        return self.in_blocks(closed, count)
 
     def with_steps(self, steps: int) -> "CellSolver":
         """Give the same with other steps a period.

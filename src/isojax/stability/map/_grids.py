@@ -27,6 +27,9 @@ GAIN = 64.0
 """How many times smaller a spline of degree five makes its error with nodes half as far apart, where the
 function is smooth; a sample of cells then says whether it is."""
 
+_KINK_GAIN = 4.0
+"""The same next to a kink, which the surface has where friction begins to hold the mass."""
+
 LEAST_SLOPE = 0.1
 """Smallest slope of the characteristic polynomial that an error of a multiplier is divided by: where two
 multipliers all but coincide they separate like the square root of any error, and their distance would say
@@ -128,12 +131,15 @@ def first_grid(
     shape = len(band), len(logarithms)
     kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
     if model.slides:
-        # At its largest displacement such a motion jumps from law to law: nodes there cannot be closed.
-        kinks = kinks._replace(shared=np.zeros(shape, bool))
+        # Each orbit is split at events of its own.
+        kinks = SharedKinks(np.zeros((*shape, 0)), kinks.sides[:1], np.ones(shape, bool))
     unknown = filled(starts.unknown.T.reshape(-1, *shape)), np.moveaxis(kinks.phases, -1, 0)
     tables = np.concatenate([*unknown, np.zeros((2, *shape)), np.ones((1, *shape))])
     method = MapMethod(
-        integrator, half, jnp.asarray(kinks.sides), jnp.asarray(integrator.steps_a_period(model))
+        integrator,
+        half,
+        None if model.slides else jnp.asarray(kinks.sides),
+        jnp.asarray(integrator.steps_a_period(model)),
     )
     grid = Grid(logarithms, band, tables, np.full(shape, np.inf))
     return FirstGrid(rest, frequencies, ends, method, kinks, grid)
@@ -201,7 +207,8 @@ def _closed_grid(
     tables[-3:-1] = filled(np.where(closed, tables[-3:-1], np.nan))
     # At the frequencies of the map itself no spline is needed over them.
     fewer = Grid(nodes[0][::2], nodes[1][::every], tables[:, ::every, ::2], error)
-    error[closed] = _reading_error(fewer.at(*nodes), tables, nodes[0], method.half)[closed] / GAIN
+    gain = _KINK_GAIN if model.slides else GAIN
+    error[closed] = _reading_error(fewer.at(*nodes), tables, nodes[0], method.half)[closed] / gain
     return Grid(*nodes, tables, error)
 
 

@@ -196,7 +196,8 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         if integrator.steps_per_period > usual.steps_per_period:
             least = integrator.steps_per_period
     sought = seek(model, integrator, half, window, integrator.map_error, run)
-    goal = _READING_SHARE * integrator.map_error
+    # Where friction begins to hold the mass a surface has a kink, near which more steps gain nothing.
+    goal = (1.0 if model.slides else _READING_SHARE) * integrator.map_error
     if run.integrator is None and sought.reading_error > goal:
         integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
         sought = seek(model, integrator, half, window, goal, run)

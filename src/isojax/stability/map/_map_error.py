@@ -4,15 +4,15 @@ import math
 from typing import NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Int
 
 from ..orbit import Sine
-from ._batched_newton import CELLS_TOGETHER, FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found, padded
+from ._batched_newton import CELLS_TOGETHER, FOUND, FULLY_CLOSED, SAMPLED, CellSolver, Found
 from ._grids import LEAST_SLOPE
 from ._map_method import Lane
+from ._single_orbits import SingleOrbits
 from ._starts import Candidates
 from ._surface import MapWindow
 
@@ -21,9 +21,6 @@ _MARGIN = 1.25
 
 _DOUBLINGS = 3
 """Trials with twice the steps where some orbits were not found."""
-
-_FINER_STEPS = 3
-"""Times the steps of a map with which its error is found."""
 
 
 class SampledError(NamedTuple):
@@ -41,16 +38,16 @@ class SampledError(NamedTuple):
 
 
 def sampled_error(
-    solver: CellSolver, candidates: Candidates, found: Found, window: MapWindow
+    solver: CellSolver | SingleOrbits, candidates: Candidates, found: Found, window: MapWindow
 ) -> SampledError:
-    """Give the integration error of multipliers, from a sample of cells solved with steps three times finer.
+    """Give the integration error of multipliers, from a sample of cells solved with finer steps.
 
     The distance of a multiplier from the finer ones is their characteristic polynomial there over its slope.
     The slope counts as 0.1 at least: where two multipliers all but coincide they separate like the square
     root of any error, and their distance would say more of the place than of the integration.
 
     Args:
-        solver: that of the map.
+        solver: confirms orbits.
         candidates: of the map.
         found: their orbits.
         window: of the map.
@@ -61,17 +58,8 @@ def sampled_error(
     good = np.flatnonzero(found.code == FOUND)
     if not good.size:
         return SampledError(math.nan, good)
-    picked = good[np.unique(np.linspace(0, good.size - 1, SAMPLED).astype(int))]
-    method = solver.method.finer(_FINER_STEPS)
-
-    def closed(block: slice) -> Found:
-        lanes = lanes_of(found, candidates, window, picked[block])
-        lanes = jax.tree.map(lambda values: padded(np.asarray(values), CELLS_TOGETHER), lanes)
-        lanes = jax.device_put(lanes, solver.sharding)
-        # So far that only the error of the integration remains.
-        return solver.improve(method, lanes, picked[block].size, limit=FULLY_CLOSED)
-
-    finer = solver.in_blocks(closed, picked.size)
+    picked = good[np.unique(np.linspace(0, good.size - 1, solver.sampled).astype(int))]
+    finer = solver.confirmed(lanes_of(found, candidates, window, picked), picked.size)
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)
     nearest, others = distance[..., 0], distance[..., 1:]

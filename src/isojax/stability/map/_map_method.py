@@ -83,6 +83,11 @@ class MapMethod(eqx.Module):
     sides: Float[Array, "piece kink"] | None
     steps: Int[Array, ""]
 
+    @property
+    def steps_over_map(self) -> Int[Array, ""]:
+        """Steps over the whole or the half of a period."""
+        return (self.steps + 1) // 2 if self.half else self.steps
+
     def finer(self, times: int) -> "MapMethod":
         """Give the same way with more steps.
 
@@ -126,8 +131,7 @@ class MapMethod(eqx.Module):
         """
         end, drive = math.pi if self.half else 2.0 * math.pi, with_overtones(model, lane.drive)
         if self.sides is None:
-            steps = (self.steps + 1) // 2 if self.half else self.steps
-            after = advance(model, self.integrator, drive, lane.state, end, steps)
+            after = advance(model, self.integrator, drive, lane.state, end, self.steps_over_map)
             return (tuple(-value for value in after) if self.half else after), jnp.zeros(0)
         phases = lane.phases
         pieces = len(phases) + 1

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float
 
 from ..._cores import usable_cores
 from ..._quick_jit import quick_jit
@@ -23,13 +23,14 @@ from ..orbit import (
     half_range,
     period_map,
     trajectory,
+    turning_map,
     value_and_jacobian,
     with_overtones,
 )
 from ._map_method import Lane, MapMethod, kinks_between
 
-_START_STEPS = 6
-"""Steps of Newton's method from the balance of one harmonic."""
+_MOST_START_STEPS = 12
+"""Steps of Newton's method at most from the balance of one harmonic."""
 
 _MOST_CLOSING_STEPS = 6
 """Steps of Newton's method at most from orbits that were read off a coarser grid."""
@@ -136,13 +137,13 @@ def _starts(
     model: Isolator, integrator: Integrator, half: bool, rest: Array, amplitude: Array, frequency: Array
 ) -> tuple[Array, Crossings]:
     turns = 0.5 if half else 1.0
+    steps = round(integrator.steps_a_period(model) * turns)
 
     def node(a: Array, f: Array) -> tuple[Array, Crossings]:
         guess, cycle, _ = balanced_motion(model, a, f, rest)
         push = jnp.hypot(guess.sine, jnp.asarray(guess.cosine))
         internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
         inner = jnp.where(internal == 0.0, a, jnp.abs(internal))
-        omega = 2.0 * math.pi * f
 
         def unpack(unknown: Array) -> tuple[PeriodicDrive, tuple[Lanes, ...]]:
             state = (rest + a, 0.0 * a, *(unknown[2:] * inner))
@@ -150,26 +151,33 @@ def _starts(
 
         def gap(unknown: Array) -> Array:
             drive, state = unpack(unknown)
-            moved = period_map(model, integrator, drive, state, turns=turns)
-            scale = (a, a * omega, *inner)
-            return jnp.stack([(m - s) / c for m, s, c in zip(moved, state, scale, strict=True)])
+            if model.slides:
+                moved, missed, _ = turning_map(model, drive, state, half, steps)
+            else:
+                moved = period_map(model, integrator, drive, state, turns=turns)
+                missed = moved[1] / (a * 2.0 * math.pi * f)
+            gaps = [(m - s) / c for m, s, c in zip(moved, state, (a, a, *inner), strict=True)]
+            return jnp.stack([gaps[0], missed, *gaps[2:]])
 
         start = jnp.concatenate([jnp.stack([guess.sine, guess.cosine]) / push, internal / inner])
 
-        def improve(_: Array | int, unknown: Array) -> Array:
+        def improve(carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+            unknown, _, count = carry
             left, slope = value_and_jacobian(gap, unknown)
             step = jnp.linalg.solve(slope, left)
             # Far from the balance of one harmonic a full step may leave the basin.
-            return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
+            moved = unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
+            return moved, jnp.max(jnp.abs(left)), count + 1
 
-        unknown = start
-        # A motion that friction turns, or holds, at the very start has no derivative by it.
-        if not model.slides:
-            found = jax.lax.fori_loop(0, _START_STEPS, improve, start)
-            good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _START_CLOSED_TO)
-            unknown = jnp.where(good, found, start)
+        def unfinished(carry: tuple[Array, Array, Array]) -> Array:
+            _, size, count = carry
+            return (size >= _START_CLOSED_TO) & jnp.isfinite(size) & (count < _MOST_START_STEPS)
+
+        # A step further than closed to the limit: the gap is that of the unknown before.
+        found, size, _ = jax.lax.while_loop(unfinished, improve, (start, jnp.full((), 1e300), jnp.asarray(0)))
+        good = jnp.all(jnp.isfinite(found)) & (size < _START_CLOSED_TO)
+        unknown = jnp.where(good, found, start)
         drive, state = unpack(unknown)
-        steps = round(integrator.steps_a_period(model) * turns)
         end = 2.0 * math.pi * turns
         crossings = follow_events(model, drive, state, end, steps, _MOST_NODE_CROSSINGS).crossings
         over = jnp.concatenate([jnp.full(2, push), inner]) / a
@@ -188,7 +196,8 @@ def closed_nodes(
 ) -> NodeOrbits:
     """Close orbits of imposed displacement, split at their kinks, to machine precision.
 
-    Unknown are the drive, the internal states at the largest displacement and the phases of the kinks.
+    Unknown are the drive, the internal states at the largest displacement and the phases of the kinks that
+    all orbits share. Under dry friction each is split at its own events instead.
 
     Args:
         model: the isolator.
@@ -201,44 +210,42 @@ def closed_nodes(
     Returns:
         The orbits.
     """
-    assert method.sides is not None
-    kinks = kinks_between(method.sides)
     # The steps are a number on the device: with those of the integrator each count would be compiled anew.
     integrator = method.integrator.with_steps(_ANY_STEPS)
     method = MapMethod(integrator, method.half, method.sides, method.steps)
 
     def work(*rows: np.ndarray) -> tuple[Array, Array, Array]:
-        return _closed(model, method, kinks, jnp.asarray(rest), *map(jnp.asarray, rows))
+        return _closed(model, method, jnp.asarray(rest), *map(jnp.asarray, rows))
 
     return NodeOrbits(*in_blocks(work, amplitude, frequency, start))
 
 
 @quick_jit
 def _closed(
-    model: Isolator,
-    method: MapMethod,
-    kinks: Int[Array, " crossing"],
-    rest: Array,
-    amplitude: Array,
-    frequency: Array,
-    start: Array,
+    model: Isolator, method: MapMethod, rest: Array, amplitude: Array, frequency: Array, start: Array
 ) -> tuple[Array, Array, Array]:
     states = 2 + model.internal_states
 
-    def sizes(a: Array, f: Array, scale: Array) -> Array:
-        return jnp.concatenate([jnp.stack([a, a * 2.0 * math.pi * f]), a * scale[2:states]])
-
-    def left(a: Array, f: Array, scale: Array, unknown: Array, shift: Array) -> Array:
+    def left(a: Array, f: Array, scale: Array, unknown: Array, shift: Array) -> tuple[Array, Array, Array]:
+        """Give what is missing, the scaled state at the end, and the kick that the start gives a velocity."""
         real = unknown * scale
-        state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), a * real[2:states]])
-        state = state + shift * sizes(a, f, scale)
+        sizes = jnp.concatenate([jnp.stack([a, a * 2.0 * math.pi * f]), a * scale[2:states]])
+        state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), a * real[2:states]]) + shift * sizes
         drive = Sine(a * real[0], a * real[1], f)
-        moved, reached = method.moved_past(model, Lane(tuple(state), drive, tuple(real[states:]), a), kinks)
-        return jnp.concatenate([(jnp.stack(moved) - state) / sizes(a, f, scale), reached])
+        if model.slides:
+            acting, steps = with_overtones(model, drive), method.steps_over_map
+            moved, late, kick = turning_map(model, acting, tuple(state), method.half, steps)
+            end = jnp.stack(moved) / sizes
+            return (end - state / sizes).at[1].set(late), end, kick
+        assert method.sides is not None
+        lane = Lane(tuple(state), drive, tuple(real[states:]), a)
+        moved, reached = method.moved_past(model, lane, kinks_between(method.sides))
+        moved = jnp.stack(moved)
+        return jnp.concatenate([(moved - state) / sizes, reached]), moved / sizes, jnp.ones(())
 
     def newton(a: Array, f: Array, scale: Array, unknown: Array) -> tuple[Array, Array]:
         """Give the step of Newton's method and its size."""
-        gap, slope = value_and_jacobian(lambda own: left(a, f, scale, own, jnp.zeros(states)), unknown)
+        gap, slope = value_and_jacobian(lambda own: left(a, f, scale, own, jnp.zeros(states))[0], unknown)
         step = jnp.linalg.solve(slope, gap)
         size = jnp.max(jnp.abs(step))
         return step * jnp.minimum(1.0, 0.3 / size), size
@@ -248,15 +255,18 @@ def _closed(
         count = unknown.size
 
         def whole(own: Array) -> Array:
-            return left(a, f, scale, own[:count], own[count:])
+            gap, moved, kick = left(a, f, scale, own[:count], own[count:])
+            return jnp.concatenate([gap, moved, kick[None]])
 
-        gap, slope = value_and_jacobian(whole, jnp.concatenate([unknown, jnp.zeros(states)]))
-        step = jnp.linalg.solve(slope[:, :count], gap)
-        matrix = slope[:states, count:] + jnp.eye(states)
+        out, slope = value_and_jacobian(whole, jnp.concatenate([unknown, jnp.zeros(states)]))
+        step = jnp.linalg.solve(slope[:count, :count], out[:count])
+        by_start = slope[:, count:]
+        matrix = by_start[count : count + states]
         if count > states:
             # The instants of the kinks follow the disturbance.
-            follow = jnp.linalg.solve(slope[states:, states:count], slope[states:, count:])
-            matrix = matrix - slope[:states, states:count] @ follow
+            follow = jnp.linalg.solve(slope[states:count, states:count], by_start[states:count])
+            matrix = matrix - slope[count : count + states, states:count] @ follow
+        matrix = matrix.at[:, 1].multiply(out[-1])
         return step, jnp.max(jnp.abs(step)), jnp.stack([0.5 * jnp.trace(matrix), jnp.linalg.det(matrix)])
 
     def scaled(begin: Array) -> Array:
@@ -280,7 +290,8 @@ def _closed(
     begin = (start / scale, jnp.full(amplitude.shape, 1.0), jnp.asarray(0))
     unknown, _, _ = jax.lax.while_loop(unfinished, body, begin)
     step, size, invariants = jax.vmap(last)(amplitude, frequency, scale, unknown)
-    return (unknown - step) * scale, invariants, size <= _NODE_CLOSED_TO
+    closed = (size <= _NODE_CLOSED_TO) & jnp.all(jnp.isfinite(invariants), axis=1)
+    return (unknown - step) * scale, invariants, closed
 
 
 def node_responses(

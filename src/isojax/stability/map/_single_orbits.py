@@ -40,7 +40,7 @@ from ._batched_newton import (
     states_at_zero,
     surface_lanes,
 )
-from ._map_method import MapMethod
+from ._map_method import Lane, MapMethod
 from ._starts import Candidates, PlacedSurface, joined
 
 _ORBITS_TOGETHER = 128
@@ -66,6 +66,26 @@ class SingleOrbits(eqx.Module):
     def states(self) -> int:
         """Count of states of the model."""
         return 2 + self.model.internal_states
+
+    @property
+    def sampled(self) -> int:
+        """Count of orbits that are confirmed to learn the error of a map: an orbit takes far longer here."""
+        return _ORBITS_TOGETHER
+
+    def confirmed(self, lanes: Lane, count: int) -> Found:
+        """Find orbits from others near them.
+
+        Args:
+            lanes: the orbits.
+            count: how many.
+
+        Returns:
+            The same, with steps enough for each.
+        """
+        starts = np.stack(states_at_zero(self.model, self.method, lanes), axis=-1)
+        sine, cosine, rate = (np.asarray(values) for values in lanes.drive)
+        push = np.hypot(sine, cosine)
+        return single_orbits(self.model, self.method.integrator, self.method.half, push, rate, starts)
 
     def __call__(self, candidates: Candidates, size: int) -> Found:
         """Find the orbits of candidates.

@@ -117,6 +117,9 @@ def seek(
         raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")
     split, whole = cell_solvers(model, integrator, half, surface, window.amplitudes, run.devices)
     reader = SurfaceReader(half, split.surface, split.sharding)
+    unsplit = MapMethod(integrator, half, None, split.method.steps)
+    single = SingleOrbits(model, unsplit, split.surface, split.sharding)
+    judge = single if model.slides else split
     expected = surface.error[candidates.frequency, candidates.part]
     read, error = (expected <= integrator.map_error) & (model.internal_states == 0), math.nan
     shared = surface.shared[candidates.frequency, candidates.part]
@@ -129,7 +132,7 @@ def seek(
         some = _chosen(candidates, places)
         # In the lanes of the map, which then compiles nothing more.
         by_reading = reader(some, max(lanes_of(int(np.count_nonzero(read)), run.chunk), SAMPLED))
-        error, unconfirmed = sampled_error(split, some, by_reading, window)
+        error, unconfirmed = sampled_error(judge, some, by_reading, window)
         # What finer steps do not find is solved for itself, and judged again.
         read[places[unconfirmed]] = False
         if not error <= integrator.map_error:
@@ -141,11 +144,7 @@ def seek(
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
     if model.splits:
         # Where sharp laws give each orbit events of its own, no compiled step serves all.
-        unsplit = MapMethod(integrator, half, None, split.method.steps)
-        ways = (
-            ("read", reader, read),
-            ("single", SingleOrbits(model, unsplit, split.surface, split.sharding), ~read),
-        )
+        ways = (("read", reader, read), ("single", single, ~read))
     groups = tuple(Group(name, way, _chosen(candidates, own)) for name, way, own in ways if own.any())
     return Sought(surface, groups, error)
 

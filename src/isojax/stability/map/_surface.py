@@ -25,6 +25,10 @@ from ._spline import spline_matrix, spline_pieces
 _FEW = 0.002
 """Share of the nodes whose orbits may be left to Newton's method."""
 
+_NODES_AN_ORBIT, _MORE_NODES = 8, 4
+"""Under dry friction: nodes that are closed in the time of one single orbit; nodes of a grid for each of the
+one before."""
+
 _LARGEST_RESPONSE = 2.0
 """Half the peak-to-peak displacement over the largest from rest, beyond which a motion did not close: it
 starts at its largest displacement."""
@@ -176,7 +180,7 @@ def find_surface(
     grid = start
     for level in range(1, 1 + REFINEMENTS):
         grid = first.finer(model, grid, level)
-        if not kinks.shared.any() or not _needs_doubling(grid, window, goal):
+        if not kinks.shared.any() or not _needs_doubling(model, grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
     tables = _with_responses(model, integrator, half, rest, grid)
@@ -196,8 +200,9 @@ def find_surface(
     shared = kinks.shared[
         np.ix_(node_at(start.frequencies, window.frequencies), node_at(start.logarithms, parts))
     ]
-    around = maximum_filter(grid.error, [2 * reach + 1 for reach in AROUND])
-    error = around[np.ix_(node_at(grid.frequencies, window.frequencies), node_at(grid.logarithms, parts))]
+    error = _around(grid.error)[
+        np.ix_(node_at(grid.frequencies, window.frequencies), node_at(grid.logarithms, parts))
+    ]
     error = np.where(shared, error, np.inf)
     return Surface(rest, pieces.breaks, window.frequencies, polynomials, force, kinks.sides, shared, error)
 
@@ -213,9 +218,7 @@ def _ends_needed(grid: Grid, window: MapWindow) -> tuple[float, float]:
 def _with_responses(
     model: Isolator, integrator: Integrator, half: bool, rest: float, grid: Grid
 ) -> Float[np.ndarray, "table frequency displacement"]:
-    """Give the tables of a grid with half the peak-to-peak displacements; without, of what slides."""
-    if model.slides:
-        return grid.tables
+    """Give the tables of a grid with half the peak-to-peak displacements."""
     frequency, amplitude = np.meshgrid(grid.frequencies, np.exp(grid.logarithms), indexing="ij")
     unknown = grid.tables[: 2 + model.internal_states].reshape(-1, amplitude.size).T
     sizes = node_responses(model, integrator, half, rest, amplitude.ravel(), frequency.ravel(), unknown)
@@ -225,8 +228,20 @@ def _with_responses(
     return np.concatenate([grid.tables[:-1], sizes])
 
 
-def _needs_doubling(grid: Grid, window: MapWindow, goal: float) -> bool:
+def _around(error: Float[np.ndarray, "frequency node"]) -> Float[np.ndarray, "frequency node"]:
+    """Give the largest error of the nodes that a node is interpolated from."""
+    return maximum_filter(error, [2 * reach + 1 for reach in AROUND])
+
+
+def _needs_doubling(model: Isolator, grid: Grid, window: MapWindow, goal: float) -> bool:
     """Say whether more of the orbits that are asked for than a few cannot be read off."""
     force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
+    if model.slides:
+        # Next to a kink of the surface orbits are found for themselves however near the nodes are.
+        passed = np.abs(np.diff(np.searchsorted(window.amplitudes, force), axis=1))
+        lost = passed[_around(grid.error)[:, 1:] > goal].sum() * (
+            window.frequencies.size / grid.frequencies.size
+        )
+        return bool(_NODES_AN_ORBIT * lost > _MORE_NODES * grid.error.size)
     asked = (force >= window.amplitudes[0]) & (force <= window.amplitudes[-1])
     return bool(asked.any() and np.mean(grid.error[asked] > goal) > _FEW)

@@ -67,3 +67,4 @@ from ._split_period_map import steps_wanted as steps_wanted
 from ._state_path import AbstractStatePath as AbstractStatePath
 from ._symmetry import is_odd as is_odd
 from ._symmetry import is_odd_along as is_odd_along
+from ._turning_map import turning_map as turning_map
