@@ -14,6 +14,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ._small_systems import solve
+
 Values = TypeVar("Values")
 
 Equations = Callable[[Array, Any, Any], tuple[Array, Values]]
@@ -91,7 +93,7 @@ def _along(primals: tuple, tangents: tuple, *, equations: Equations) -> tuple[An
         (bent, wanted), residual = jax.jacfwd(along, has_aux=True)(at)
         if not count:
             return residual, wanted
-        change = -jnp.linalg.solve(bent[:, :count], bent[:, count:])
+        change = -solve(bent[:, :count], bent[:, count:])
         return residual, jax.tree.map(lambda part: part[..., count:] + part[..., :count] @ change, wanted)
 
     _, matrices = slopes(root, frozen(live), held)

@@ -14,6 +14,7 @@ from ..._given_numbers import given_count
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import brief, shown
+from ..._small_systems import solve
 from ..._types import Lanes, check_float64
 from ...models import Integrator, Isolator, State
 from ..orbit import Orbit, PeriodicDrive, integrator_for, modulus, multipliers, period_map, recorded_sine
@@ -157,7 +158,7 @@ def _fixed_point(
         return jnp.stack(moved) / size - scaled
 
     def improve(_: Array, scaled: Array) -> Array:
-        return scaled - jnp.linalg.solve(jax.jacfwd(gap)(scaled), gap(scaled))
+        return scaled - solve(jax.jacfwd(gap)(scaled), gap(scaled))
 
     return jax.lax.fori_loop(0, _FIXED_POINT_STEPS, improve, orbit.y0 / size) * size
 

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from ..._small_systems import solve
 from ..orbit import value_and_jacobian
 
 _TOLERANCE = 1e-8
@@ -189,11 +190,9 @@ def follow(
     def improve(walk: _Walk) -> _Walk:
         value, slope = value_and_jacobian(equations, walk.here)
         across = jnp.dot(walk.row, walk.here - walk.predicted)
-        change = jnp.linalg.solve(
-            jnp.concatenate([slope, walk.row[None]]), jnp.concatenate([value, across[None]])
-        )
+        change = solve(jnp.concatenate([slope, walk.row[None]]), jnp.concatenate([value, across[None]]))
         moved = walk.here - change
-        ahead = jnp.linalg.solve(jnp.concatenate([slope, walk.tangent[None]]), units[-1])
+        ahead = solve(jnp.concatenate([slope, walk.tangent[None]]), units[-1])
         ahead = ahead / jnp.linalg.norm(ahead)
         starting = walk.followed.found == 0
         span = jnp.linalg.norm(walk.predicted - walk.base)

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._small_systems import solve
 from ..orbit import ShootingMethod, Split, multipliers, split_image, split_jacobian
 from ._criticality import BifurcationKind, critical_direction, criticality, cubic_coefficient, pair_cosine
 from ._parameter_family import ParameterFamily
@@ -112,7 +113,7 @@ class BifurcationSystem(eqx.Module):
             # The kinks are where the shifted motion passes them.
             for _ in range(_FOLLOWING if whole > states else 0):
                 phases = there[states:whole]
-                phases = phases - jnp.linalg.solve(jax.jacfwd(missed)(phases), missed(phases))
+                phases = phases - solve(jax.jacfwd(missed)(phases), missed(phases))
                 there = there.at[states:whole].set(phases)
             return self.matrix(at, there)
 

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._implicit import frozen, with_derivatives
+from ..._small_systems import solve
 from ..orbit import ShootingMethod, half_range, multipliers, trajectory, value_and_jacobian
 from ._branch import BranchPoints
 from ._parameter_family import ParameterFamily
@@ -53,7 +54,7 @@ def moved_across(
     """
     held = method, scale, tangent, unknown
     left, slope = value_and_jacobian(lambda here: _across(here, frozen(family), held)[0], unknown)
-    closed = unknown - jnp.linalg.solve(slope, left)
+    closed = unknown - solve(slope, left)
     return with_derivatives(closed, _across, closed, family, held)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from ..._implicit import frozen
+from ..._small_systems import solve
 
 BifurcationKind = Literal["fold", "period_doubling", "neimark_sacker", "symmetry_breaking"]
 
@@ -95,7 +96,7 @@ def null_direction(matrix: Array) -> Array:
     bordered = jnp.concatenate([matrix, row[None]])
     bordered = jnp.concatenate([bordered, jnp.concatenate([column, jnp.zeros(1)])[:, None]], axis=1)
     wanted = jnp.zeros(size + 1, bordered.dtype).at[-1].set(1.0)
-    vector = jnp.linalg.solve(bordered, wanted)[:size]
+    vector = solve(bordered, wanted)[:size]
     phase = frozen(jnp.sign(vector[jnp.argmax(jnp.abs(vector))]))
     return vector / (phase * jnp.sqrt(jnp.sum(jnp.abs(vector) ** 2)))
 
@@ -152,7 +153,7 @@ def cubic_coefficient(
 
         ahead, behind = jax.vmap(moved)(jnp.array([1.0, -1.0]))
         slope, bend = (ahead - behind) / (2.0 * _SHIFT), (ahead + behind - 2.0 * matrix @ right) / _SHIFT**2
-        answer = jnp.linalg.solve(unit - matrix, slope)
+        answer = solve(unit - matrix, slope)
         size = jnp.linalg.norm(answer)
         return answer / size, (slope, bend, size)
 

@@ -9,6 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
+from ..._small_systems import solve
 from ..._types import Scalar
 from ..orbit import (
     MOST_STEPS_A_PERIOD,
@@ -186,8 +187,8 @@ def _expand(system: BifurcationSystem, family: ParameterFamily, unknown: Array, 
     ahead, behind = jnp.moveaxis(moves[size:].reshape(size, 2, states, -1), 1, 0)
     curved = jnp.moveaxis((ahead - behind) / (2.0 * _DIFFERENCE), 0, -1)
     upper, lower = slope[:states, :whole], slope[states:, :whole]
-    phases = -jnp.linalg.solve(lower[:, states:], lower[:, :states])
-    answer = -jnp.linalg.solve(lower[:, states:].T, upper[:, states:].T).T
+    phases = -solve(lower[:, states:], lower[:, :states])
+    answer = -solve(lower[:, states:].T, upper[:, states:].T).T
     right = jnp.concatenate([jnp.eye(states), phases])
     left = jnp.concatenate([jnp.eye(states), answer], axis=1)
     matrix = upper[:, :states] + upper[:, states:] @ phases
@@ -210,7 +211,7 @@ def _newton(
     last = system.plane(unknown) if missed is None else missed[None]
     residual = jnp.concatenate([gap, system.tests(beside.matrix), last])
     jacobian = jnp.concatenate([closing, rows, plane])
-    return residual, jnp.linalg.solve(jacobian, residual)
+    return residual, solve(jacobian, residual)
 
 
 class _Search(NamedTuple):

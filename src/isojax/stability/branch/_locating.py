@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._quick_jit import quick_jit
+from ..._small_systems import solve
 from ..orbit import ShootingMethod, is_odd, period_map, value_and_jacobian
 from ._branch import BranchEvent, BranchPoints
 from ._branch_point import orbit_at
@@ -131,9 +132,7 @@ def _locate(
                 u = carry[0]
                 left, slope = _slopes(here, method, scale, u)
                 across = jnp.dot(chord, u - guess)
-                step = jnp.linalg.solve(
-                    jnp.concatenate([slope, chord[None]]), jnp.concatenate([left, across[None]])
-                )
+                step = solve(jnp.concatenate([slope, chord[None]]), jnp.concatenate([left, across[None]]))
                 return u - step, slope
 
             # One step more than the point needs, so that the last slope is the point's own.
@@ -144,9 +143,7 @@ def _locate(
         ) -> tuple[Array, Array, Array, Array]:
             low, high = carry[:2]
             middle, slope = correct(0.5 * (low + high))
-            ahead = jnp.linalg.solve(
-                jnp.concatenate([slope, chord[None]]), jnp.zeros(states + 1).at[-1].set(1.0)
-            )
+            ahead = solve(jnp.concatenate([slope, chord[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
             tests = critical_values(slope[:, :states] + jnp.eye(states), ahead)
             if events:
                 orbit = orbit_at(here, method, scale, middle, ahead)

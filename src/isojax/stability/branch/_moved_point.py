@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..._implicit import frozen
+from ..._small_systems import solve
 from ..orbit import ShootingMethod, state_scale, trajectory, value_and_jacobian
 from ._branch import SpecialPoint
 from ._criticality import BifurcationKind
@@ -188,7 +189,7 @@ def corrected(
     def newton(_: Array | int, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
         u = carry[0]
         left, slope = value_and_jacobian(lambda at: family.open_end(method, scale, at), u)
-        change = jnp.linalg.solve(
+        change = solve(
             jnp.concatenate([slope, normal[None]]),
             jnp.concatenate([left, jnp.dot(normal, u - guess)[None]]),
         )
@@ -196,7 +197,7 @@ def corrected(
 
     begin = guess, jnp.zeros((states, states + 1)), jnp.asarray(jnp.inf)
     found, slope, last = jax.lax.fori_loop(0, _CORRECTIONS, newton, begin)
-    ahead = jnp.linalg.solve(jnp.concatenate([slope, normal[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
+    ahead = solve(jnp.concatenate([slope, normal[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
     ahead = ahead / jnp.linalg.norm(ahead)
     value = test(found, slope[:, :states] + jnp.eye(states), ahead)
     return Place(found, ahead, value, last < _FOUND_WITHIN)

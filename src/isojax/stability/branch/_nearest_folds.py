@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Complex, Float
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
+from ..._small_systems import solve
 from ..._types import check_float64
 from ...models import Integrator, Isolator, as_isolator
 from ..orbit import (
@@ -217,7 +218,7 @@ def _orbits(
         def newton(_: Array | int, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
             scaled = carry[0]
             moved, slope = value_and_jacobian(image, scaled)
-            change = jnp.linalg.solve(jnp.eye(scaled.size) - slope, moved - scaled)
+            change = solve(jnp.eye(scaled.size) - slope, moved - scaled)
             size = jnp.max(jnp.abs(change))
             # Far off, a full step may leave the basin of the orbit that the start is near to.
             return scaled + jnp.minimum(1.0, 0.3 / jnp.maximum(size, 1e-300)) * change, size, slope

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._quick_jit import quick_jit
+from ..._small_systems import solve
 from ...models import Integrator
 from ..orbit import fastest_rate, integrator_with, period_map, value_and_jacobian
 from ._orbit_starts import OrbitStarts
@@ -87,7 +88,7 @@ def _improved(
 
         def improve(_: Array | int, here: Array) -> Array:
             gap, slope = value_and_jacobian(lambda own: moved(own * scale) / scale - own, here / scale)
-            step = jnp.linalg.solve(slope, gap)
+            step = solve(slope, gap)
             return here - scale * step * jnp.minimum(1.0, _LARGEST_STEP / jnp.max(jnp.abs(step)))
 
         found = jax.lax.fori_loop(0, steps, improve, state)

@@ -18,6 +18,7 @@ from jaxtyping import Array, Float
 from ..._implicit import frozen
 from ..._quick_jit import quick_jit
 from ..._results import is_successful
+from ..._small_systems import solve
 from ...models import CoefficientErrors, Isolator
 from ..orbit import ShootingMethod, value_and_jacobian
 from ._branch import Branch, SpecialPoint
@@ -118,7 +119,7 @@ def _tests(
         def point(u: Array, t: Array) -> Array:
             moved = moved_across(here, method, scale, u, t)
             _, slope = value_and_jacobian(lambda at: here.open_end(method, scale, at), moved)
-            ahead = jnp.linalg.solve(jnp.concatenate([slope, t[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
+            ahead = solve(jnp.concatenate([slope, t[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
             return critical_values(slope[:, :states] + jnp.eye(states), ahead / jnp.linalg.norm(ahead))
 
         return jax.vmap(point)(unknown, tangent)

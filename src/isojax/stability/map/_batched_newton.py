@@ -16,6 +16,7 @@ from jaxtyping import Array, Complex, Float, Int
 
 from ..._cores import usable_cores
 from ..._quick_jit import quick_jit
+from ..._small_systems import solve
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
 from ..orbit import Sine, half_range, modulus, multipliers, trajectory, with_overtones
@@ -129,10 +130,10 @@ def newton_step(
     missed = jnp.stack(out[states:]) if phases else jnp.zeros(0)
     # The phases that meet the kinks, to first order: p = -lower^-1 (missed + follow z).
     lower = whole[states:, states:]
-    follow = jnp.linalg.solve(lower, whole[states:, :states]) if phases else jnp.zeros((0, states))
-    shift = jnp.linalg.solve(lower, missed) if phases else missed
+    follow = solve(lower, whole[states:, :states]) if phases else jnp.zeros((0, states))
+    shift = solve(lower, missed) if phases else missed
     matrix = matrix - bend @ follow
-    step = jnp.linalg.solve(jnp.eye(states) - matrix, jnp.stack(gap) - bend @ shift)
+    step = solve(jnp.eye(states) - matrix, jnp.stack(gap) - bend @ shift)
     return tuple(step), tuple(-shift - follow @ step), matrix
 
 

@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
+from ..._small_systems import solve
 from ...models import Isolator
 from ..orbit import (
     ShootingMethod,
@@ -208,7 +209,7 @@ def _close(
         def newton(carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
             root, _, count = carry
             left, slope = value_and_jacobian(lambda at: _gap(at, still, way)[0], root)
-            step = jnp.linalg.solve(slope, left)
+            step = solve(slope, left)
             size = jnp.max(jnp.abs(step))
             # Far off, a full step may leave the basin of the orbit.
             return root - step * jnp.minimum(1.0, 0.3 / size), size, count + 1

@@ -129,10 +129,13 @@ def first_grid(
     coarse = integrator.with_steps(2 * (steps // 4 + 2))
     starts = node_starts(model, coarse, half, rest, amplitude, frequency)
     shape = len(band), len(logarithms)
-    kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
     if model.slides:
         # Each orbit is split at events of its own.
-        kinks = SharedKinks(np.zeros((*shape, 0)), kinks.sides[:1], np.ones(shape, bool))
+        still = (jnp.zeros(()),) * (2 + model.internal_states)
+        sides = np.ones((1, len(model.switches(still))))
+        kinks = SharedKinks(np.zeros((*shape, 0)), sides, np.ones(shape, bool))
+    else:
+        kinks = shared_kinks(starts.crossings, shape, math.pi if half else 2.0 * math.pi)
     unknown = filled(starts.unknown.T.reshape(-1, *shape)), np.moveaxis(kinks.phases, -1, 0)
     tables = np.concatenate([*unknown, np.zeros((2, *shape)), np.ones((1, *shape))])
     method = MapMethod(

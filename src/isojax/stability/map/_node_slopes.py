@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._quick_jit import quick_jit
+from ..._small_systems import determinant, solve
 from ...models import Isolator
 from ..orbit import Sine, half_range, trajectory, with_overtones
 from ._map_method import Lane, MapMethod, kinks_between
@@ -135,7 +136,7 @@ def _slopes(
 
         start = jnp.concatenate([found / scale, jnp.zeros(parameters)])
         (left, wanted), values = jax.jacfwd(orbit, has_aux=True)(start)
-        follow = -jnp.linalg.solve(left[:, :count], left[:, count:])
+        follow = -solve(left[:, :count], left[:, count:])
         return values, wanted[:, count:] + wanted[:, :count] @ follow
 
     return jax.vmap(node)(amplitude, frequency, unknown)
@@ -143,7 +144,7 @@ def _slopes(
 
 def _invariants(matrix: Float[Array, "2 2"], half: bool) -> Float[Array, " 2"]:
     """Give sum and product of the multipliers over a period, from the map's derivative or from its half's."""
-    trace, determinant = jnp.trace(matrix), jnp.linalg.det(matrix)
+    total, product = jnp.trace(matrix), determinant(matrix)
     if half:
-        trace, determinant = trace * trace - 2.0 * determinant, determinant * determinant
-    return jnp.stack([trace, determinant])
+        total, product = total * total - 2.0 * product, product * product
+    return jnp.stack([total, product])

@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..._cores import usable_cores
 from ..._quick_jit import quick_jit
+from ..._small_systems import determinant, solve
 from ..._types import Lanes
 from ...models import Integrator, Isolator
 from ..orbit import (
@@ -29,11 +30,12 @@ from ..orbit import (
 )
 from ._map_method import Lane, MapMethod, kinks_between
 
-_MOST_START_STEPS = 12
-"""Steps of Newton's method at most from the balance of one harmonic."""
+_START_STEPS = 6
+"""Steps of Newton's method from the balance of one harmonic."""
 
-_MOST_CLOSING_STEPS = 6
-"""Steps of Newton's method at most from orbits that were read off a coarser grid."""
+_MOST_CLOSING_STEPS, _MOST_TURNING_STEPS = 6, 24
+"""Steps of Newton's method at most from orbits that were read off a coarser grid; from the balance of one
+harmonic under dry friction."""
 
 _NEARLY_CLOSED = 1e-4
 """Relative step of Newton's method after which one more, whose size is its square, is the last."""
@@ -137,13 +139,13 @@ def _starts(
     model: Isolator, integrator: Integrator, half: bool, rest: Array, amplitude: Array, frequency: Array
 ) -> tuple[Array, Crossings]:
     turns = 0.5 if half else 1.0
-    steps = round(integrator.steps_a_period(model) * turns)
 
     def node(a: Array, f: Array) -> tuple[Array, Crossings]:
         guess, cycle, _ = balanced_motion(model, a, f, rest)
         push = jnp.hypot(guess.sine, jnp.asarray(guess.cosine))
         internal = jnp.stack([values[0] for values in cycle]) if cycle else jnp.zeros(0)
         inner = jnp.where(internal == 0.0, a, jnp.abs(internal))
+        omega = 2.0 * math.pi * f
 
         def unpack(unknown: Array) -> tuple[PeriodicDrive, tuple[Lanes, ...]]:
             state = (rest + a, 0.0 * a, *(unknown[2:] * inner))
@@ -151,36 +153,30 @@ def _starts(
 
         def gap(unknown: Array) -> Array:
             drive, state = unpack(unknown)
-            if model.slides:
-                moved, missed, _ = turning_map(model, drive, state, half, steps)
-            else:
-                moved = period_map(model, integrator, drive, state, turns=turns)
-                missed = moved[1] / (a * 2.0 * math.pi * f)
-            gaps = [(m - s) / c for m, s, c in zip(moved, state, (a, a, *inner), strict=True)]
-            return jnp.stack([gaps[0], missed, *gaps[2:]])
+            moved = period_map(model, integrator, drive, state, turns=turns)
+            scale = (a, a * omega, *inner)
+            return jnp.stack([(m - s) / c for m, s, c in zip(moved, state, scale, strict=True)])
 
         start = jnp.concatenate([jnp.stack([guess.sine, guess.cosine]) / push, internal / inner])
 
-        def improve(carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-            unknown, _, count = carry
+        def improve(_: Array | int, unknown: Array) -> Array:
             left, slope = value_and_jacobian(gap, unknown)
-            step = jnp.linalg.solve(slope, left)
+            step = solve(slope, left)
             # Far from the balance of one harmonic a full step may leave the basin.
-            moved = unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
-            return moved, jnp.max(jnp.abs(left)), count + 1
+            return unknown - step * jnp.minimum(1.0, 0.5 / jnp.max(jnp.abs(step)))
 
-        def unfinished(carry: tuple[Array, Array, Array]) -> Array:
-            _, size, count = carry
-            return (size >= _START_CLOSED_TO) & jnp.isfinite(size) & (count < _MOST_START_STEPS)
-
-        # A step further than closed to the limit: the gap is that of the unknown before.
-        found, size, _ = jax.lax.while_loop(unfinished, improve, (start, jnp.full((), 1e300), jnp.asarray(0)))
-        good = jnp.all(jnp.isfinite(found)) & (size < _START_CLOSED_TO)
+        over = jnp.concatenate([jnp.full(2, push), inner]) / a
+        if model.slides:
+            # At its largest displacement, where it starts, friction turns the motion: see `_closed`.
+            nothing = Crossings(jnp.zeros(0), jnp.zeros(0, int), None, jnp.array(True))
+            return start * over, nothing
+        found = jax.lax.fori_loop(0, _START_STEPS, improve, start)
+        good = jnp.all(jnp.isfinite(found)) & (jnp.max(jnp.abs(gap(found))) < _START_CLOSED_TO)
         unknown = jnp.where(good, found, start)
         drive, state = unpack(unknown)
+        steps = round(integrator.steps_a_period(model) * turns)
         end = 2.0 * math.pi * turns
         crossings = follow_events(model, drive, state, end, steps, _MOST_NODE_CROSSINGS).crossings
-        over = jnp.concatenate([jnp.full(2, push), inner]) / a
         return unknown * over, crossings
 
     return jax.vmap(node)(amplitude, frequency)
@@ -246,7 +242,7 @@ def _closed(
     def newton(a: Array, f: Array, scale: Array, unknown: Array) -> tuple[Array, Array]:
         """Give the step of Newton's method and its size."""
         gap, slope = value_and_jacobian(lambda own: left(a, f, scale, own, jnp.zeros(states))[0], unknown)
-        step = jnp.linalg.solve(slope, gap)
+        step = solve(slope, gap)
         size = jnp.max(jnp.abs(step))
         return step * jnp.minimum(1.0, 0.3 / size), size
 
@@ -259,15 +255,15 @@ def _closed(
             return jnp.concatenate([gap, moved, kick[None]])
 
         out, slope = value_and_jacobian(whole, jnp.concatenate([unknown, jnp.zeros(states)]))
-        step = jnp.linalg.solve(slope[:count, :count], out[:count])
+        step = solve(slope[:count, :count], out[:count])
         by_start = slope[:, count:]
         matrix = by_start[count : count + states]
         if count > states:
             # The instants of the kinks follow the disturbance.
-            follow = jnp.linalg.solve(slope[states:count, states:count], by_start[states:count])
+            follow = solve(slope[states:count, states:count], by_start[states:count])
             matrix = matrix - slope[count : count + states, states:count] @ follow
         matrix = matrix.at[:, 1].multiply(out[-1])
-        return step, jnp.max(jnp.abs(step)), jnp.stack([0.5 * jnp.trace(matrix), jnp.linalg.det(matrix)])
+        return step, jnp.max(jnp.abs(step)), jnp.stack([0.5 * jnp.trace(matrix), determinant(matrix)])
 
     def scaled(begin: Array) -> Array:
         push = jnp.full(2, jnp.hypot(begin[0], begin[1]))
@@ -283,9 +279,11 @@ def _closed(
         step, size = jax.vmap(newton)(amplitude, frequency, scale, unknown)
         return unknown - step, size, count + 1
 
+    most = _MOST_TURNING_STEPS if model.slides else _MOST_CLOSING_STEPS
+
     def unfinished(carry: tuple[Array, Array, Array]) -> Array:
         _, size, count = carry
-        return jnp.any((size > _NEARLY_CLOSED) & jnp.isfinite(size)) & (count < _MOST_CLOSING_STEPS)
+        return jnp.any((size > _NEARLY_CLOSED) & jnp.isfinite(size)) & (count < most)
 
     begin = (start / scale, jnp.full(amplitude.shape, 1.0), jnp.asarray(0))
     unknown, _, _ = jax.lax.while_loop(unfinished, body, begin)

@@ -6,13 +6,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jax.sharding import NamedSharding
 from jaxtyping import Array, Float
 
 from ..._cores import usable_cores
 from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
+from ..._small_systems import newton
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator
 from ..orbit import (
@@ -129,12 +129,14 @@ def single_orbits(
         The orbits, each from t = 0 of its recorded drive, without phases of kinks.
     """
     method = ShootingMethod(integrator, 1, half)
-    given = [amplitude, frequency] if starts is None else [amplitude, frequency, starts]
 
     def block(begin: int) -> Found:
-        own = [values[begin : begin + _ORBITS_TOGETHER] for values in given]
-        values = [jnp.asarray(padded(value, _ORBITS_TOGETHER)) for value in own]
-        return Found(*(np.asarray(value)[: own[0].size] for value in _shoot(model, method, *values)))
+        own = slice(begin, begin + _ORBITS_TOGETHER)
+        push, rate = (jnp.asarray(padded(values[own], _ORBITS_TOGETHER)) for values in (amplitude, frequency))
+        # Apart from the search, which is compiled once for starts of either kind.
+        begins = _balanced(model, push, rate) if starts is None else padded(starts[own], _ORBITS_TOGETHER)
+        found = _shoot(model, method, push, rate, jnp.asarray(begins))
+        return Found(*(np.asarray(value)[: amplitude[own].size] for value in found))
 
     first, *others = range(0, amplitude.size, _ORBITS_TOGETHER)
     # The first compiles; then each core runs its own.
@@ -145,11 +147,14 @@ def single_orbits(
 
 
 @quick_jit
+def _balanced(model: Isolator, amplitude: Array, frequency: Array) -> Array:
+    return jax.vmap(lambda push, rate: response_start(model, push, rate))(amplitude, frequency)
+
+
+@quick_jit
 def _shoot(
-    model: Isolator, method: ShootingMethod, amplitude: Array, frequency: Array, starts: Array | None = None
+    model: Isolator, method: ShootingMethod, amplitude: Array, frequency: Array, starts: Array
 ) -> tuple[Array, ...]:
-    if starts is None:
-        return jax.vmap(lambda push, rate: single_orbit(model, method, push, rate))(amplitude, frequency)
     return jax.vmap(lambda *lane: single_orbit(model, method, *lane))(amplitude, frequency, starts)
 
 
@@ -158,7 +163,7 @@ def single_orbit(
     method: ShootingMethod,
     amplitude: Float[Array, ""],
     frequency: Float[Array, ""],
-    start: Float[Array, " state"] | None = None,
+    start: Float[Array, " state"],
 ) -> tuple[Array, ...]:
     """Find one orbit with the accuracy of maps, differentiable by the model and the drive.
 
@@ -167,19 +172,18 @@ def single_orbit(
         method: steps, and how the orbit is closed.
         amplitude: of the drive [N, or m/s^2 for base excitation].
         frequency: of the drive [Hz].
-        start: state at t = 0; the one-harmonic balance if omitted.
+        start: state at t = 0.
 
     Returns:
         The fields of `Found`, from t = 0 of the recorded drive, without phases of kinks.
     """
     goal = method.integrator.orbit_tolerance
     accuracy = Accuracy(method.integrator.map_orbit_tolerance, method.integrator.map_orbit_error)
-    solver, places = optx.Newton(rtol=goal, atol=goal), event_places(model, method.turns)
+    solver, places = newton(goal), event_places(model, method.turns)
     live = model, Harmonic(amplitude, frequency)
     still, known = frozen(live)
     drive = recorded_sine(still, known.amplitude, known.frequency)
-    begin = response_start(still, known.amplitude, known.frequency) if start is None else frozen(start)
-    solution = shoot(still, method, solver, drive, begin, places, accuracy)
+    solution = shoot(still, method, solver, drive, frozen(start), places, accuracy)
     state, matrix = with_derivatives(
         (solution.state, solution.matrix), closing, solution.root, live, (method, solution.split)
     )

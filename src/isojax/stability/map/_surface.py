@@ -178,7 +178,8 @@ def find_surface(
     start, kinks = first.grid, first.kinks
     first = first._replace(ends=_ends_needed(start, window))
     grid = start
-    for level in range(1, 1 + REFINEMENTS):
+    # Under dry friction the first grid itself is not closed.
+    for level in range(0 if model.slides else 1, 1 + REFINEMENTS):
         grid = first.finer(model, grid, level)
         if not kinks.shared.any() or not _needs_doubling(model, grid, window, goal):
             break
@@ -219,6 +220,9 @@ def _with_responses(
     model: Isolator, integrator: Integrator, half: bool, rest: float, grid: Grid
 ) -> Float[np.ndarray, "table frequency displacement"]:
     """Give the tables of a grid with half the peak-to-peak displacements."""
+    if model.slides and half:
+        # The second half of such a motion is minus the first, and each goes from turn to turn.
+        return grid.tables
     frequency, amplitude = np.meshgrid(grid.frequencies, np.exp(grid.logarithms), indexing="ij")
     unknown = grid.tables[: 2 + model.internal_states].reshape(-1, amplitude.size).T
     sizes = node_responses(model, integrator, half, rest, amplitude.ravel(), frequency.ravel(), unknown)

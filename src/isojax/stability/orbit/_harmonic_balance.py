@@ -16,6 +16,7 @@ from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import shown
+from ..._small_systems import newton
 from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
@@ -140,7 +141,7 @@ def harmonic_balance(
     model = as_isolator(model)
     check_float64()
     tolerance = (Integrator() if integrator is None else integrator).orbit_tolerance
-    solver = optx.Newton(rtol=tolerance, atol=tolerance) if solver is None else solver
+    solver = newton(tolerance) if solver is None else solver
     size = 2 + model.internal_states
     if start is not None and len(start) != size:
         raise ValueError(f"Argument `start` must hold {size} states, but holds {len(start)}.")

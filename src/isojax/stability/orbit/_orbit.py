@@ -16,6 +16,7 @@ from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS, is_successful
 from ..._show import amount, brief, declared_numbers, number, shown
+from ..._small_systems import newton
 from ..._types import Lanes, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
@@ -149,7 +150,7 @@ def find_periodic_orbit(
     check_float64()
     integrator = integrator_for(frozen(model), integrator)
     tolerance = integrator.orbit_tolerance
-    solver = optx.Newton(rtol=tolerance, atol=tolerance) if solver is None else solver
+    solver = newton(tolerance) if solver is None else solver
     size = 2 + model.internal_states
     if start is not None and len(start) != size:
         raise ValueError(f"Argument `start` must hold {size} states, but holds {len(start)}.")

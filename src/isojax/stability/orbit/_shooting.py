@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
+from ..._small_systems import solve
 from ...excitations import Harmonic
 from ...models import Isolator, sliding_switch
 from ._event_path import follow_events, same_events
@@ -90,7 +91,7 @@ def _gap_and_transition(
     states = split.scale.size
     left, jacobian = value_and_jacobian(lambda at: _gap(at, method, split, model, drive), unknown)
     upper, lower = jacobian[:states], jacobian[states:]
-    bent = upper[:, states:] @ jnp.linalg.solve(lower[:, states:], lower[:, :states])
+    bent = upper[:, states:] @ solve(lower[:, states:], lower[:, :states])
     return left, jacobian, upper[:, :states] + jnp.eye(states) - bent
 
 
@@ -204,7 +205,7 @@ def _closed(
             steps, wanted = trial
             finer = split._replace(steps=steps)
             left, jacobian, transition = _gap_and_transition(unknown, method, finer, model, drive)
-            step = jnp.linalg.solve(jacobian, left)
+            step = solve(jacobian, left)
             return unknown - jnp.where(wanted, step, 0.0), (transition, jnp.max(jnp.abs(left)))
 
         return jax.lax.scan(body, unknown, (steps, polish))

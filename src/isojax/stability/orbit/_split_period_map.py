@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from ..._small_systems import solve
 from ...models import Isolator, State
 from ._event_path import follow_events
 from ._kink_crossings import Crossings, advance_across_kinks
@@ -92,7 +93,7 @@ def split_jacobian(
     """
     states = split.scale.shape[0]
     upper, lower = jax.jacfwd(lambda u: split_image(model, method, drive, split, u))(unknown)
-    phases = -jnp.linalg.solve(lower[:, states:], lower[:, :states])
+    phases = -solve(lower[:, states:], lower[:, :states])
     return upper[:, :states] + upper[:, states:] @ phases, phases
 
 

@@ -14,6 +14,7 @@ from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import brief, shown
+from ..._small_systems import solve
 from ..._types import check_float64
 from ...models import (
     Band,
@@ -176,7 +177,7 @@ def _resonance(
             left, slope = value_and_jacobian(
                 lambda at: _out_of_resonance(at, (still, at_rest), held)[0], unknown
             )
-            step = jnp.linalg.solve(slope, left)
+            step = solve(slope, left)
             return unknown - step * jnp.minimum(1.0, _AMPLITUDE_STEP / jnp.max(jnp.abs(step)))
 
         quadratures = jnp.stack([start.sine, jnp.asarray(start.cosine)]) / push

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from ..._quick_jit import quick_jit
+from ..._small_systems import solve
 from ...models import CoefficientErrors, Integrator, Isolator
 from ..orbit import (
     Sine,
@@ -290,7 +291,7 @@ def _closed(
             lambda moved: ends(a, f, size, moved), jnp.concatenate([unknown, still])
         )
         by_unknown, by_state, by_step = jnp.split(slope, [count, count + states], axis=1)
-        follow = jnp.linalg.solve(by_unknown, jnp.concatenate([left[:, None], by_step], axis=1))
+        follow = solve(by_unknown, jnp.concatenate([left[:, None], by_step], axis=1))
         step, moves = follow[:, 0], follow[:, 1:]
         values = values - change[:, :count] @ step
         changes = change[:, count + states :] - change[:, :count] @ moves

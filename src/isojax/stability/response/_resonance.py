@@ -12,6 +12,7 @@ from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import amount, brief, number, shown
+from ..._small_systems import determinant, solve
 from ..._types import Scalar, as_float64, check_float64
 from ...excitations import Harmonic
 from ...models import Integrator, Isolator, Modelled, as_isolator
@@ -221,7 +222,7 @@ def _stationary(
 
         def newton(_: Array | int, carry: tuple[Array, Array]) -> tuple[Array, Array]:
             left, slope = value_and_jacobian(lambda at: _residual(at, between, held)[0], carry[0])
-            step = jnp.linalg.solve(slope, left)
+            step = solve(slope, left)
             size = jnp.max(jnp.abs(step))
             return carry[0] - step * jnp.minimum(1.0, 0.1 / size), size
 
@@ -252,4 +253,4 @@ def _residual(
         return jnp.concatenate([jnp.stack(end) / scale - at[:-1], size[None] / scale[0]])
 
     values, slope = value_and_jacobian(motion, unknown)
-    return values.at[-1].set(jnp.linalg.det(slope)), frequency * unknown[-1]
+    return values.at[-1].set(determinant(slope)), frequency * unknown[-1]

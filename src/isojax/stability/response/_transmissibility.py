@@ -13,6 +13,7 @@ from ..._implicit import frozen, with_derivatives
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ..._show import number, shown
+from ..._small_systems import solve
 from ..._types import Lanes, Scalar, as_float64, check_float64
 from ...models import (
     Band,
@@ -263,7 +264,7 @@ def _closed(
 
         def closing(_: Array | int, here: Array) -> Array:
             left, slope = value_and_jacobian(lambda it: _open_end(it, frozen(live), held)[0], here)
-            return here - jnp.linalg.solve(slope, left)
+            return here - solve(slope, left)
 
         near = jax.lax.fori_loop(0, _CLOSING_STEPS, closing, frozen(state))
         return with_derivatives(near, _open_end, near, live, held)
