@@ -34,6 +34,7 @@ def test_rows_are_exchanged():
         solve(jnp.array([[1e-20, 1.0], [1.0, 1.0]]), jnp.array([1.0, 2.0])), [1.0, 1.0]
     )
     assert determinant(jnp.array([[0.0, 2.0], [3.0, 0.0]])) == -6.0
+    assert solve(jnp.zeros((0, 0)), jnp.zeros((0, 2))).shape == (0, 2)
     assert not np.isfinite(solve(jnp.ones((2, 2)), jnp.array([1.0, 2.0]))).all()
 
 

@@ -31,6 +31,8 @@ def solve(
 
     Source: Golub & Van Loan 2013, Matrix Computations, algorithms 3.4.1 and 3.1.2 (partial pivoting).
     """
+    if not matrix.shape[0]:
+        return right
     columns = right if right.ndim == 2 else right[:, None]
 
     def solved(matrix: Array, right: Array) -> Array:
