@@ -208,8 +208,8 @@ CASES: dict[str, Case] = {
     ),
     "coulomb_friction": Case((el.CoulombFriction(4.0, WIDTH),), (rig.CoulombFriction(4.0),)),
     "coulomb_friction on a stiffening spring": Case(
-        (el.CoulombFriction(12.0, WIDTH), el.CubicStiffness(1e11)),
-        (rig.CoulombFriction(12.0), rig.CubicStiffness(1e11)),
+        (el.CoulombFriction(12.0, WIDTH), el.CubicStiffness(2e12)),
+        (rig.CoulombFriction(12.0), rig.CubicStiffness(2e12)),
     ),
     "asymmetric_friction": Case(
         (el.CoulombFriction(4.0, WIDTH), el.AsymmetricFriction(1.5, WIDTH)),

@@ -131,7 +131,7 @@ def first_grid(
     shape = len(band), len(logarithms)
     if model.slides:
         # Each orbit is split at events of its own.
-        still = (jnp.zeros(()),) * (2 + model.internal_states)
+        still = tuple(jnp.zeros(()) for _ in range(2 + model.internal_states))
         sides = np.ones((1, len(model.switches(still))))
         kinks = SharedKinks(np.zeros((*shape, 0)), sides, np.ones(shape, bool))
     else:

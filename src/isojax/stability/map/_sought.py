@@ -20,6 +20,9 @@ from ._surface import MapWindow, Surface, find_surface
 _POOL = 1 << 15
 """Orbits among which those of a sample are chosen."""
 
+_STRICTER = 0.125
+"""Share of the error of a map that the nodes may expect of what is read, where a sample exceeds it."""
+
 
 class MapRun(NamedTuple):
     """How a map is made; see the arguments of `stability_map`."""
@@ -127,7 +130,10 @@ def seek(
         # Where another of several maxima becomes the largest the surface has a step. It gives starts that may
         # be no maxima: neither its numbers nor its order of kinks are those of the orbit.
         read, shared = np.zeros_like(read), np.zeros_like(shared)
-    if read.any():
+    for limit in (integrator.map_error, _STRICTER * integrator.map_error):
+        read &= expected <= limit
+        if not read.any():
+            break
         places = _sample(surface, candidates, np.flatnonzero(read))
         some = _chosen(candidates, places)
         # In the lanes of the map, which then compiles nothing more.
@@ -135,10 +141,16 @@ def seek(
         error, unconfirmed = sampled_error(judge, some, by_reading, window)
         # What finer steps do not find is solved for itself, and judged again.
         read[places[unconfirmed]] = False
-        if not error <= integrator.map_error:
+        if error <= integrator.map_error:
+            break
+        if not model.slides:
             own = sampled_error(split, some, solved_sample(split, some), window).error
-            if not error <= 2.0 * own:
-                read, error = np.zeros_like(read), math.nan
+            if error <= 2.0 * own:
+                break
+    else:
+        read = np.zeros_like(read)
+    if not read.any():
+        error = math.nan
     if read.all():
         return Sought(surface, (Group("read", reader, candidates),), error)
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
