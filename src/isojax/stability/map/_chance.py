@@ -202,17 +202,17 @@ def _read_off(surface: Surface, column: int) -> _Column:
 
 
 class _Curves:
-    """The orbits of several maps at each frequency: of their surfaces where all can be read off."""
+    """The orbits of several maps at each frequency: of their surfaces where these know all of them."""
 
     def __init__(self, found: list[tuple["StabilityMap", Sought]]):
         """Take maps with their surfaces."""
         self.surfaces = [sought.surface for _, sought in found]
-        self.read = np.all([sought.read_columns for _, sought in found], axis=0)
-        self.orbits = [] if self.read.all() else [_MapOrbits(one) for one, _ in found]
+        self.known = np.all([sought.known_columns for _, sought in found], axis=0)
+        self.orbits = [] if self.known.all() else [_MapOrbits(one) for one, _ in found]
 
     def at(self, column: int) -> list[_Column] | None:
         """Give those of one frequency, map by map; None where one map knows too few."""
-        if self.read[column]:
+        if self.known[column]:
             return [_read_off(surface, column) for surface in self.surfaces]
         known = [curve for one in self.orbits if (curve := one.at(column)) is not None]
         return known if len(known) == len(self.orbits) else None

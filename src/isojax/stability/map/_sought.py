@@ -20,6 +20,10 @@ from ._surface import MapWindow, Surface, find_surface
 _POOL = 1 << 15
 """Orbits among which those of a sample are chosen."""
 
+_KNOWN_TO, _KNOWN_SHARE = 1e-3, 0.1
+"""Error of multipliers up to which a surface does for the chances of a map; the same as a share of what
+multipliers are away from where an orbit changes its stability."""
+
 _STRICTER = 0.125
 """Share of the error of a map that the nodes may expect of what is read, where a sample exceeds it."""
 
@@ -56,19 +60,23 @@ class Sought(NamedTuple):
         surface: orbits over displacement and frequency.
         groups: all orbits, by how they are found; none is empty.
         reading_error: largest error of multipliers read off in a sample of cells; NaN where none are.
+        tabled: whether the invariants of the surface give all multipliers, and it has no steps.
     """
 
     surface: Surface
     groups: tuple[Group, ...]
     reading_error: float
+    tabled: bool
 
     @property
-    def read_columns(self) -> Bool[np.ndarray, " frequency"]:
-        """Whether every orbit of a frequency is read off."""
-        columns = np.ones(len(self.surface.frequencies), bool)
-        for _, solver, candidates in self.groups:
-            if not isinstance(solver, SurfaceReader):
-                columns[candidates.frequency] = False
+    def known_columns(self) -> Bool[np.ndarray, " frequency"]:
+        """Whether the surface says well enough of every orbit of a frequency how probable it is."""
+        columns = np.full(len(self.surface.frequencies), self.tabled)
+        for _, _, candidates in self.groups:
+            column, part = candidates.frequency, candidates.part
+            error = self.surface.error[column, part]
+            enough = np.maximum(_KNOWN_TO, _KNOWN_SHARE * self.surface.distance(column, part))
+            columns[column[error > enough]] = False
         return columns
 
     def with_steps(self, steps: int) -> "Sought":
@@ -124,12 +132,11 @@ def seek(
     single = SingleOrbits(model, unsplit, split.surface, split.sharding)
     judge = single if model.slides else split
     expected = surface.error[candidates.frequency, candidates.part]
-    read, error = (expected <= integrator.map_error) & (model.internal_states == 0), math.nan
-    shared = surface.shared[candidates.frequency, candidates.part]
-    if model.harmonics:
-        # Where another of several maxima becomes the largest the surface has a step. It gives starts that may
-        # be no maxima: neither its numbers nor its order of kinks are those of the orbit.
-        read, shared = np.zeros_like(read), np.zeros_like(shared)
+    # Under harmonics of the drive another of several maxima becomes the largest. The surface has a step there,
+    # gives starts that may be no maxima, and neither the numbers nor the order of kinks of the orbit.
+    tabled = model.internal_states == 0 and not model.harmonics
+    read, error = np.full(expected.shape, tabled), math.nan
+    shared = surface.shared[candidates.frequency, candidates.part] & (not model.harmonics)
     for limit in (integrator.map_error, _STRICTER * integrator.map_error):
         read &= expected <= limit
         if not read.any():
@@ -152,13 +159,13 @@ def seek(
     if not read.any():
         error = math.nan
     if read.all():
-        return Sought(surface, (Group("read", reader, candidates),), error)
+        return Sought(surface, (Group("read", reader, candidates),), error, tabled)
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
     if model.splits:
         # Where sharp laws give each orbit events of its own, no compiled step serves all.
         ways = (("read", reader, read), ("single", single, ~read))
     groups = tuple(Group(name, way, _chosen(candidates, own)) for name, way, own in ways if own.any())
-    return Sought(surface, groups, error)
+    return Sought(surface, groups, error, tabled)
 
 
 def _sample(surface: Surface, candidates: Candidates, known: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 from scipy.ndimage import maximum_filter
 
 from ..._quick_jit import quick_jit
@@ -99,6 +99,25 @@ class Surface(NamedTuple):
         share = (places - self.breaks[piece]) / np.diff(self.breaks)[piece]
         own = self.polynomials[column, piece]
         return np.einsum("ptk,pk->tp", own, share[:, None] ** np.arange(own.shape[-1]))
+
+    def distance(
+        self, column: Int[np.ndarray, " place"], part: Int[np.ndarray, " place"]
+    ) -> Float[np.ndarray, " place"]:
+        """Give how far orbits are from any change of stability: what vanishes there.
+
+        Args:
+            column: of the frequencies.
+            part: in which each lies.
+
+        Returns:
+            The least of `|1 - trace + determinant|`, `|1 + trace + determinant|` and `|1 - determinant|` of
+            the derivative of the map, in the middle of the part.
+        """
+        share = (part % PARTS + 0.5) / PARTS
+        own = self.polynomials[column, part // PARTS, -3:-1]
+        half_trace, determinant = np.einsum("ptk,pk->tp", own, share[:, None] ** np.arange(own.shape[-1]))
+        along = np.abs(1.0 + determinant + np.outer([-2.0, 2.0], half_trace))
+        return np.minimum(along.min(axis=0), np.abs(1.0 - determinant))
 
 
 @quick_jit
