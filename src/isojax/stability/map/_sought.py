@@ -132,8 +132,8 @@ def seek(
     single = SingleOrbits(model, unsplit, split.surface, split.sharding)
     judge = single if model.slides else split
     expected = surface.error[candidates.frequency, candidates.part]
-    # Under harmonics of the drive another of several maxima becomes the largest. The surface has a step there,
-    # gives starts that may be no maxima, and neither the numbers nor the order of kinks of the orbit.
+    # Under harmonics of the drive another of several maxima becomes the largest. The surface has a step
+    # there, gives starts that may be no maxima, and neither the numbers nor the order of kinks of the orbit.
     tabled = model.internal_states == 0 and not model.harmonics
     read, error = np.full(expected.shape, tabled), math.nan
     shared = surface.shared[candidates.frequency, candidates.part] & (not model.harmonics)
