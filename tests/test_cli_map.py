@@ -120,8 +120,8 @@ def test_a_further_record_needs_a_share_and_the_fit(z_file, z_map, tmp_path, cap
         assert ended.value.code == 2
         assert f"must be a share of 0 or above, such as 0.005, but is {share}" in capsys.readouterr().err
     monkeypatch.setattr("isojax.stability.stability_map", lambda *_, **__: z_map)
-    assert main([*command, "--next-record"]) == 0
-    assert "The map has no chances: --next-record needs" in capsys.readouterr().err
+    assert main([*command, "--next-record"]) == 2
+    assert "--next-record needs the fit beside the model, but there is no" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

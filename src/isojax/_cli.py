@@ -312,7 +312,7 @@ def _fit_beside(
     beside = path.with_name("fit.json")
     if not beside.exists():
         if calibration is not None:
-            print(f"The map has no chances: --next-record needs {beside}.", file=sys.stderr)
+            raise ValueError(f"--next-record needs the fit beside the model, but there is no {beside}.")
         return None, ""
 
     from .identification import load_fit
@@ -326,6 +326,8 @@ def _fit_beside(
             further = next_record(fit, calibration=calibration)
             return further, further.words
     except ValueError as problem:
+        if calibration is not None:
+            raise ValueError(f"--next-record needs another fit than {beside}. {problem}") from problem
         print(f"The map has no chances: {beside} cannot serve. {problem}", file=sys.stderr)
         return None, ""
     return fit, "of the mean over all fitted records"

@@ -134,6 +134,8 @@ def test_what_makes_no_sense_is_refused(unchecked):
         ij.global_sensitivity(lambda x: 1j * x["a"], CIRCLE, samples=64)
     with pytest.raises(ValueError, match="`confidence` must lie"):
         ij.global_sensitivity(ishigami, CIRCLE, confidence=95.0)
+    with pytest.raises(ValueError, match=r"depend on an input of `ranges`, but is 3.* for all 320 samples"):
+        ij.global_sensitivity(lambda x: 3.0 + 0.0 * x["a"], CIRCLE, samples=64)
 
 
 def test_the_picture_has_two_bars_an_input_and_asks_for_one_entry():

@@ -26,9 +26,9 @@ class Fitted(NamedTuple):
     result: ij.RESULTS
 
 
-def scaled_map(model, force, frequencies, share=SHARE):
+def scaled_map(model, force, frequencies, share=SHARE, like=PAPER):
     """Mass and every coefficient grow together by a standard deviation: all forces grow with them."""
-    numbers = {entry.name: float(entry.value) for entry in PAPER.parameters}
+    numbers = {entry.name: float(entry.value) for entry in like.parameters}
     covariance = share**2 * np.outer(list(numbers.values()), list(numbers.values()))
     fit = Fitted(model, tuple(numbers), covariance, SUCCESS)
     return ij.stability_map(model, force, np.array(frequencies), fit=fit)
@@ -78,6 +78,20 @@ def test_so_it_is_where_orbits_cannot_be_read_off_a_surface():
     found = scaled_map(model, np.linspace(130.0, 210.0, 41), [4.2])
     expected = scaled_folds(np.asarray(found.amplitudes), 4.2)
     np.testing.assert_allclose(found.probability_coexisting[:, 0], expected, atol=0.03)
+
+
+def test_so_it_is_under_dry_friction_and_what_begins_to_slide_is_stable():
+    elements = ij.elements
+    laws = elements.LinearStiffness(3e5), elements.CubicStiffness(4e10), elements.LinearDamping(360.0)
+    model = ij.Isolator(120.0, (*laws, elements.CoulombFriction(6.0, width=1e-4)))
+    # Where branches that are split at each reversal have their folds at 80 N.
+    folds = 9.229747, 10.890493
+    force = np.concatenate([np.linspace(7.0, 12.0, 8), np.linspace(74.0, 86.0, 13)])
+    found = scaled_map(model, force, [6.2, *folds], like=model)
+    above = norm.cdf((force / 80.0 - 1.0) / SHARE)
+    expected = np.stack([0.0 * force, np.where(force > 50.0, 1.0 - above, 0.0), above], axis=1)
+    np.testing.assert_allclose(found.probability_coexisting, expected, atol=0.01)
+    np.testing.assert_allclose(found.probability_stable, 1.0 - expected, atol=0.01)
 
 
 def test_a_cell_is_stable_where_it_holds_one_orbit(smap):

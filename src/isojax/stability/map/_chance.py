@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
+from scipy.ndimage import binary_dilation
 from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
@@ -137,13 +138,14 @@ def find_chances(
         grid = _in_doubt(known, np.linspace(low, high, _DISPLACEMENTS))
         if grid.size:
             table = _tables(known, grid)
-            stable[:, column], coexisting[:, column] = _counted(weights, table, forces)
-            told = _counted(weights[check][None], table, forces)
+            stable[:, column], coexisting[:, column] = _counted(weights, grid, table, forces)
+            told = _counted(weights[check][None], grid, table, forces)
             true = drawn.at(column)
-            if true is not None and true[0].low <= grid[0] and grid[-1] <= true[0].high:
-                seen = _counted(np.ones((1, 1)), _tables(true, grid), forces)
-            else:  # what the draw does there is not known, and counts as told wrongly
+            if true is None:  # what the draw does there is not known, and counts as told wrongly
                 seen = np.subtract(1.0, told)
+            else:  # beyond what is known of it, it neither folds nor becomes unstable
+                reached = np.clip(grid, true[0].low, true[0].high)
+                seen = _counted(np.ones((1, 1)), grid, _tables(true, reached), forces)
             wrong[..., column] = np.abs(np.subtract(told, seen))
         least, most = known[0].response(np.array([low, high]))
         beyond = np.any((still[..., column] < least) | (still[..., column] > most), axis=0)
@@ -151,7 +153,8 @@ def find_chances(
     doubt = np.nansum(stable * (1.0 - stable) + coexisting * (1.0 - coexisting))
     # That one draw shows no wrong cell says that fewer than one a draw are wrong.
     cells = max(wrong[:, np.isfinite(stable)].sum(), 1.0)
-    error = _SHARE_OF_DOUBT * cells / doubt if doubt > 0.0 else np.nan
+    # Where hardly a cell is in doubt the share says nothing; no chance near a half is off by more than this.
+    error = min(_SHARE_OF_DOUBT * cells / doubt, 0.5) if doubt > 0.0 else np.nan
     return Chances(stable, coexisting, _standard_errors(maps, inner), float(error))
 
 
@@ -271,10 +274,14 @@ def _in_doubt(
     force, margin = _tables(curves, grid)
     rise, margin = np.diff(force, axis=1), np.minimum(margin[:, :-1], margin[:, 1:])
     near = np.any([one.min(axis=0) < 2.0 * np.ptp(one, axis=0) for one in (rise, margin)], axis=0)
-    places = np.flatnonzero(near)
+    # A fold may lie within the interval beside.
+    places = np.flatnonzero(binary_dilation(near))
     if not places.size:
         return np.zeros(0)
-    return np.linspace(grid[places[0]], grid[places[-1] + 1], _DOUBTFUL)
+    each = -(-_DOUBTFUL // places.size)
+    inner = grid[places, None] + np.diff(grid)[places, None] * np.arange(each) / each
+    # Between what is in doubt all draws rise, or all fall: one interval says as much as many.
+    return np.union1d(inner, grid[places + 1])
 
 
 def _tables(
@@ -286,11 +293,12 @@ def _tables(
 
 def _counted(
     weights: Float[np.ndarray, "draw map"],
+    grid: Float[np.ndarray, " displacement"],
     table: Float[np.ndarray, "2 map displacement"],
     forces: Float[np.ndarray, " amplitude"],
 ) -> tuple[Float[np.ndarray, " amplitude"], Float[np.ndarray, " amplitude"]]:
     """Give the chances at one frequency, by counting what each draw has at each force."""
-    force, margin = weights @ table[0], weights @ table[1]
+    force, margin = _with_folds(grid, weights @ table[0]), weights @ table[1]
     rank = np.searchsorted(forces, force)
     falls = rank[:, 1:] < rank[:, :-1]
     # The unstable part of each interval: whole where the force falls, else as far as the margin is negative.
@@ -304,6 +312,20 @@ def _counted(
     # Between two folds the force falls, and an orbit that rises to it lies on either side.
     several = _passed(rank[:, :-1], rank[:, 1:], falls, forces.size)
     return np.mean(unstable == 0, axis=0), np.mean(several > 0, axis=0)
+
+
+def _with_folds(
+    grid: Float[np.ndarray, " displacement"], force: Float[np.ndarray, "draw displacement"]
+) -> Float[np.ndarray, "draw displacement"]:
+    """Give log forces whose largest and least ones are those of a parabola through their neighbours."""
+    before, after = np.diff(grid)[:-1], np.diff(grid)[1:]
+    left, right = force[:, 1:-1] - force[:, :-2], force[:, 2:] - force[:, 1:-1]
+    over = before * after * (before + after)
+    bend, slope = (right * before - left * after) / over, (right * before**2 + left * after**2) / over
+    extreme = left * right < 0.0
+    moved = force.copy()
+    moved[:, 1:-1] -= np.where(extreme, slope**2 / (4.0 * np.where(extreme, bend, 1.0)), 0.0)
+    return moved
 
 
 def _passed(
