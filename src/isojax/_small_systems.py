@@ -13,7 +13,7 @@ import lineax as lx
 import optimistix as optx
 from jaxtyping import Array, Float
 
-_UNROLLED = 4
+_WRITTEN_OUT = 4
 """Unknowns up to which the elimination is written out instead of looped over."""
 
 
@@ -76,7 +76,7 @@ def _eliminated(wide: Float[Array, "unknown wide"]) -> tuple[Float[Array, "unkno
         share = jnp.where(index > place, rows[:, place] / pivot[place], 0.0)
         return rows - jnp.outer(share, pivot), jnp.where(largest == place, sign, -sign)
 
-    return jax.lax.fori_loop(0, count, eliminate, (wide, jnp.ones(())), unroll=count <= _UNROLLED)
+    return jax.lax.fori_loop(0, count, eliminate, (wide, jnp.ones(())), unroll=count <= _WRITTEN_OUT)
 
 
 def _substituted(upper: Float[Array, "unknown wide"]) -> Float[Array, "unknown right"]:
@@ -89,7 +89,7 @@ def _substituted(upper: Float[Array, "unknown wide"]) -> Float[Array, "unknown r
         rest = right[place] - triangle[place] @ solution
         return solution.at[place].set(rest / triangle[place, place])
 
-    return jax.lax.fori_loop(0, count, substitute, jnp.zeros_like(right), unroll=count <= _UNROLLED)
+    return jax.lax.fori_loop(0, count, substitute, jnp.zeros_like(right), unroll=count <= _WRITTEN_OUT)
 
 
 class Elimination(lx.AbstractLinearSolver):

@@ -16,7 +16,7 @@ from .._types import check_float64
 from ..models import Isolator
 from ._evaluate import NOT_FINITE, evaluate
 
-_SAME = 1e-12
+_UNMOVED = 1e-12
 """Standard deviation of a quantity over its mean, up to which it does not depend on the inputs."""
 
 _RESAMPLES = 999
@@ -186,7 +186,7 @@ def global_sensitivity(
     rows = values.reshape(samples, len(names) + 2, -1)[kept].astype(float)
     mean = rows[:, :2].mean(axis=(0, 1))
     variance = rows[:, :2].var(axis=(0, 1))
-    if not np.any(variance > (_SAME * np.abs(mean)) ** 2):
+    if not np.any(variance > (_UNMOVED * np.abs(mean)) ** 2):
         raise ValueError(
             f"Argument `quantity` must depend on an input of `ranges`, but is {brief(mean.reshape(shape))} "
             f"for all {len(flat)} samples."

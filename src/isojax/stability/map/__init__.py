@@ -4,13 +4,12 @@ In: an isolator, drive amplitudes and frequencies. Out: `StabilityMap`, one orbi
 every cell. Read _surface (orbits over displacement, where they do not fold, on _grids of _nodes through
 which _spline lays splines), _shared_kinks, _starts (which orbit of the surface a force holds), _reader
 (multipliers read off the surface), _batched_newton (those that cannot be, all at once; _map_method integrates
-them), _map_error (a sample of cells against finer steps), _sought (which orbits are found by which), _chunks
-(long maps, kept on disk), and _map, which calls them and gives what _stability_map describes; then
-_found_again (the cells of a known map for another model, in pure JAX) and _read_slopes (derivatives of cells
-read off tables of _node_slopes).
+them), _single_orbits (those of sharp laws; _states_at_zero gives their starts), _map_error (a sample of cells
+against finer steps), _sought (which orbits are found by which), _chunks (long maps, kept on disk), and _map,
+which calls them and gives what _stability_map describes; then _found_again (the cells of a known map for
+another model, in pure JAX) and _read_slopes (derivatives of cells read off tables of _node_slopes).
 """
 
-from ._batched_newton import states_at_zero as states_at_zero
 from ._chance import chance_words as chance_words
 from ._found_again import FoundCells as FoundCells
 from ._found_again import cells_again as cells_again
@@ -28,5 +27,6 @@ from ._read_slopes import relative_error as relative_error
 from ._stability_map import StabilityMap as StabilityMap
 from ._stability_map import incomplete_words as incomplete_words
 from ._stability_map import unconfirmed_words as unconfirmed_words
+from ._states_at_zero import states_at_zero as states_at_zero
 from ._surface import MapWindow as MapWindow
 from ._window_steps import window_integrator as window_integrator

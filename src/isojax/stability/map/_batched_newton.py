@@ -20,7 +20,7 @@ from ..._small_systems import solve
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
 from ..orbit import Sine, half_range, modulus, multipliers, trajectory, with_overtones
-from ._map_method import Lane, MapMethod, advance, kinks_between
+from ._map_method import Lane, MapMethod, kinks_between
 from ._starts import Candidates, PlacedSurface, joined, read_surface
 from ._surface import Surface
 
@@ -387,30 +387,3 @@ def cell_solvers(
     split = MapMethod(integrator, half, jnp.asarray(surface.sides), steps)
     whole = MapMethod(integrator, half, None, WHOLE_STEPS * steps)
     return CellSolver(model, split, placed, cells), CellSolver(model, whole, placed, cells)
-
-
-@quick_jit
-def states_at_zero(model: Isolator, method: MapMethod, lanes: Lane) -> State:
-    """Give the states of orbits at t = 0 of the recorded drive.
-
-    Args:
-        model: the isolator.
-        method: how to integrate.
-        lanes: the orbits, a lane each.
-
-    Returns:
-        Displacement, velocity, internal states.
-    """
-
-    def one(lane: Lane) -> State:
-        drive = lane.drive
-        lead = jnp.arctan2(drive.cosine, drive.sine) + drive.angular_frequency * model.shift()
-        whole = 2.0 * math.pi
-        target = jnp.mod(-lead, whole)
-        turned = method.half & (target >= math.pi)
-        target = jnp.where(turned, target - math.pi, target)
-        acting = with_overtones(model, drive)
-        state = advance(model, method.integrator, acting, lane.state, target, 4 * method.steps)
-        return tuple(jnp.where(turned, -value, value) for value in state)
-
-    return jax.vmap(one)(lanes)

@@ -15,12 +15,12 @@ from ._batched_newton import (
     Found,
     blanked,
     padded,
-    states_at_zero,
 )
 from ._map_error import lanes_of
 from ._map_method import MapMethod
 from ._single_orbits import single_orbits
 from ._starts import Candidates, joined
+from ._states_at_zero import states_at_zero
 from ._surface import MapWindow
 
 _TRIED = 128

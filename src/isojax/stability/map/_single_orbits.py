@@ -37,11 +37,11 @@ from ._batched_newton import (
     STICKS,
     Found,
     padded,
-    states_at_zero,
     surface_lanes,
 )
 from ._map_method import Lane, MapMethod
 from ._starts import Candidates, PlacedSurface, joined
+from ._states_at_zero import states_at_zero
 
 _ORBITS_TOGETHER = 128
 """Orbits found at once."""

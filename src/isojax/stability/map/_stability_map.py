@@ -13,9 +13,9 @@ from ..._results import RESULTS, cell_results
 from ..._show import number, shown
 from ...models import Integrator, Isolator
 from ..orbit import Sine
-from ._batched_newton import states_at_zero
 from ._chance import chance_words
 from ._map_method import Lane, MapMethod
+from ._states_at_zero import states_at_zero
 
 _OF_EACH_ORBIT = ("spectral_radius", "multipliers", "start", "direction", "phases", "split", "response")
 """Fields with an axis `orbit` where coexisting orbits are sought."""
