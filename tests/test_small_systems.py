@@ -27,6 +27,18 @@ def test_solutions_and_determinants_are_those_of_numpy(size):
     np.testing.assert_allclose(jax.vmap(determinant)(matrices), np.linalg.det(matrices), rtol=1e-9)
 
 
+def test_complex_systems_are_solved_with_their_derivatives():
+    rng = np.random.default_rng(1)
+    matrix = jnp.asarray(rng.normal(size=(3, 3)) + 1j * rng.normal(size=(3, 3)))
+    right = jnp.array([1.0, 2.0j, 3.0])
+    inverse = np.linalg.inv(matrix)
+    np.testing.assert_allclose(solve(matrix, right), inverse @ right, rtol=1e-12)
+    np.testing.assert_allclose(
+        jax.jacfwd(solve, argnums=1, holomorphic=True)(matrix, right), inverse, atol=1e-12
+    )
+    np.testing.assert_allclose(determinant(matrix), np.linalg.det(matrix), rtol=1e-12)
+
+
 def test_rows_are_exchanged():
     # Without pivoting the first is 0/0 and the second loses all digits.
     np.testing.assert_allclose(solve(jnp.array([[0.0, 2.0], [3.0, 0.0]]), jnp.array([4.0, 9.0])), [3.0, 2.0])

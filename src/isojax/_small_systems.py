@@ -11,15 +11,15 @@ import jax
 import jax.numpy as jnp
 import lineax as lx
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Inexact
 
 _WRITTEN_OUT = 4
 """Unknowns up to which the elimination is written out instead of looped over."""
 
 
 def solve(
-    matrix: Float[Array, "unknown unknown"], right: Float[Array, "unknown ..."]
-) -> Float[Array, "unknown ..."]:
+    matrix: Inexact[Array, "unknown unknown"], right: Inexact[Array, "unknown ..."]
+) -> Inexact[Array, "unknown ..."]:
     """Solve linear equations.
 
     Args:
@@ -48,7 +48,7 @@ def solve(
     return solution if right.ndim == 2 else solution[:, 0]
 
 
-def determinant(matrix: Float[Array, "unknown unknown"]) -> Float[Array, ""]:
+def determinant(matrix: Inexact[Array, "unknown unknown"]) -> Inexact[Array, ""]:
     """Give the determinant of a matrix.
 
     Args:
@@ -61,7 +61,7 @@ def determinant(matrix: Float[Array, "unknown unknown"]) -> Float[Array, ""]:
     return sign * jnp.prod(jnp.diagonal(upper))
 
 
-def _eliminated(wide: Float[Array, "unknown wide"]) -> tuple[Float[Array, "unknown wide"], Array]:
+def _eliminated(wide: Inexact[Array, "unknown wide"]) -> tuple[Inexact[Array, "unknown wide"], Array]:
     """Give an upper triangle by elimination with partial pivoting, and the sign of its order of rows."""
     count = wide.shape[0]
     index = jnp.arange(count)
@@ -79,7 +79,7 @@ def _eliminated(wide: Float[Array, "unknown wide"]) -> tuple[Float[Array, "unkno
     return jax.lax.fori_loop(0, count, eliminate, (wide, jnp.ones(())), unroll=count <= _WRITTEN_OUT)
 
 
-def _substituted(upper: Float[Array, "unknown wide"]) -> Float[Array, "unknown right"]:
+def _substituted(upper: Inexact[Array, "unknown wide"]) -> Inexact[Array, "unknown right"]:
     """Give the solution of an upper triangle with its right side."""
     count = upper.shape[0]
     triangle, right = upper[:, :count], upper[:, count:]
