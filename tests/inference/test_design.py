@@ -218,6 +218,8 @@ def test_mistakes_are_refused(unchecked):
     ):
         with pytest.raises(ValueError, match=words):
             ij.design(MODEL, stiffness, free=free)
+    with pytest.raises(ValueError, match="`objective` or `subject_to` must be given"):
+        ij.design(MODEL, free=WIDE)
     with pytest.raises(ValueError, match="one number"):
         ij.design(MODEL, lambda model: jnp.stack([model[K], model[K]]), free=WIDE)
     with pytest.raises(ValueError, match="one limit or one for each of 1"):

@@ -64,7 +64,8 @@ def design(
         beyond it, as a fold that is gone.
 
     Raises:
-        ValueError: if a bound, name or constraint is not what it must be, or a quantity is not finite at the
+        ValueError: if neither an objective nor a constraint is given, a bound, name or constraint is not what
+            it must be, or a quantity is not finite at the
             start, or wherever the search goes from a point that keeps the limits: with the quantity and the
             coefficients.
         RuntimeError: if JAX is not in 64-bit mode.
@@ -91,6 +92,10 @@ def design(
     bounds = given_bounds(model, free)
     as_isolator(model, recorded=set(model.conditions) <= set(bounds))
     constraints = _constraints(subject_to)
+    if objective is None and not constraints:
+        raise ValueError(
+            "Argument `objective` or `subject_to` must be given, but both are missing: nothing would change."
+        )
     scan, seed = given_count("scan", scan, least=2), given_count("seed", seed, least=0)
     if fit is None and any(one.chance is not None for one in constraints):
         raise ValueError("Argument `fit` must be given where a constraint asks for a chance, but is missing.")
