@@ -205,11 +205,6 @@ class CellSolver(eqx.Module):
         """Count of states of the model."""
         return 2 + self.model.internal_states
 
-    @property
-    def sampled(self) -> int:
-        """Count of orbits that are confirmed to learn the error of a map."""
-        return SAMPLED
-
     def confirmed(self, lanes: Lane, count: int) -> Found:
         """Find orbits with steps several times finer.
 

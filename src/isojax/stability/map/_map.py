@@ -51,6 +51,9 @@ from ._window_steps import check_steps, window_integrator
 _READING_SHARE = 0.2
 """Of the error that a map may have, where its orbits are read off: there steps cost little."""
 
+_SLIDING_STEPS = 160
+"""Steps a period of a first surface with dry friction: the fewest with which it mostly does."""
+
 _INSTEAD = (
     "Make the map outside: `isojax.find_again(smap, model)` finds its cells again under jax.jit, jax.vmap, "
     "jax.jacfwd and jax.grad, and `isojax.sensitivity(smap)` differentiates them."
@@ -191,14 +194,14 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     half = is_odd(model, largest)
     integrator, least = run.integrator, fewest_steps(model)
     if integrator is None:
-        usual = integrator_for(model, None)
+        usual = integrator_for(model, None, _SLIDING_STEPS) if model.slides else integrator_for(model, None)
         integrator = window_integrator(model, usual, window)
         if integrator.steps_per_period > usual.steps_per_period:
             least = integrator.steps_per_period
     sought = seek(model, integrator, half, window, integrator.map_error, run)
-    # Where friction begins to hold the mass a surface has a kink, near which more steps gain nothing.
-    goal = (1.0 if model.slides else _READING_SHARE) * integrator.map_error
-    if run.integrator is None and sought.reading_error > goal:
+    goal = _READING_SHARE * integrator.map_error
+    # Where friction begins to hold the mass a surface has a kink, near which more steps gain little.
+    if run.integrator is None and sought.reading_error > (integrator.map_error if model.slides else goal):
         integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
         sought = seek(model, integrator, half, window, goal, run)
     first = sought.groups[0]

@@ -58,7 +58,7 @@ def sampled_error(
     good = np.flatnonzero(found.code == FOUND)
     if not good.size:
         return SampledError(math.nan, good)
-    picked = good[np.unique(np.linspace(0, good.size - 1, solver.sampled).astype(int))]
+    picked = good[np.unique(np.linspace(0, good.size - 1, SAMPLED).astype(int))]
     finer = solver.confirmed(lanes_of(found, candidates, window, picked), picked.size)
     distance = np.abs(found.multipliers[picked][:, :, None] - finer.multipliers[:, None, :])
     distance.sort(axis=2)

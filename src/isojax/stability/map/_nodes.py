@@ -223,16 +223,16 @@ def _closed(
     states = 2 + model.internal_states
 
     def left(a: Array, f: Array, scale: Array, unknown: Array, shift: Array) -> tuple[Array, Array, Array]:
-        """Give what is missing, the scaled state at the end, and the kick that the start gives a velocity."""
+        """Give what is missing, the scaled state at the end, and the saltation at the start."""
         real = unknown * scale
         sizes = jnp.concatenate([jnp.stack([a, a * 2.0 * math.pi * f]), a * scale[2:states]])
         state = jnp.concatenate([jnp.stack([rest + a, 0.0 * a]), a * real[2:states]]) + shift * sizes
         drive = Sine(a * real[0], a * real[1], f)
         if model.slides:
             acting, steps = with_overtones(model, drive), method.steps_over_map
-            moved, late, kick = turning_map(model, acting, tuple(state), method.half, steps)
+            moved, late, saltation = turning_map(model, acting, tuple(state), method.half, steps)
             end = jnp.stack(moved) / sizes
-            return (end - state / sizes).at[1].set(late), end, kick
+            return (end - state / sizes).at[1].set(late), end, saltation
         assert method.sides is not None
         lane = Lane(tuple(state), drive, tuple(real[states:]), a)
         moved, reached = method.moved_past(model, lane, kinks_between(method.sides))
@@ -251,8 +251,8 @@ def _closed(
         count = unknown.size
 
         def whole(own: Array) -> Array:
-            gap, moved, kick = left(a, f, scale, own[:count], own[count:])
-            return jnp.concatenate([gap, moved, kick[None]])
+            gap, moved, saltation = left(a, f, scale, own[:count], own[count:])
+            return jnp.concatenate([gap, moved, saltation[None]])
 
         out, slope = value_and_jacobian(whole, jnp.concatenate([unknown, jnp.zeros(states)]))
         step = solve(slope[:count, :count], out[:count])

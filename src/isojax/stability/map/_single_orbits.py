@@ -67,11 +67,6 @@ class SingleOrbits(eqx.Module):
         """Count of states of the model."""
         return 2 + self.model.internal_states
 
-    @property
-    def sampled(self) -> int:
-        """Count of orbits that are confirmed to learn the error of a map: an orbit takes far longer here."""
-        return _ORBITS_TOGETHER
-
     def confirmed(self, lanes: Lane, count: int) -> Found:
         """Find orbits from others near them.
 

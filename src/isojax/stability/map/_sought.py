@@ -24,9 +24,6 @@ _KNOWN_TO, _KNOWN_SHARE = 1e-3, 0.1
 """Error of multipliers up to which a surface does for the chances of a map; the same as a share of what
 multipliers are away from where an orbit changes its stability."""
 
-_STRICTER = 0.125
-"""Share of the error of a map that the nodes may expect of what is read, where a sample exceeds it."""
-
 
 class MapRun(NamedTuple):
     """How a map is made; see the arguments of `stability_map`."""
@@ -137,10 +134,8 @@ def seek(
     tabled = model.internal_states == 0 and not model.harmonics
     read, error = np.full(expected.shape, tabled), math.nan
     shared = surface.shared[candidates.frequency, candidates.part] & (not model.harmonics)
-    for limit in (integrator.map_error, _STRICTER * integrator.map_error):
-        read &= expected <= limit
-        if not read.any():
-            break
+    read &= expected <= integrator.map_error
+    if read.any():
         places = _sample(surface, candidates, np.flatnonzero(read))
         some = _chosen(candidates, places)
         # In the lanes of the map, which then compiles nothing more.
@@ -148,16 +143,12 @@ def seek(
         error, unconfirmed = sampled_error(judge, some, by_reading, window)
         # What finer steps do not find is solved for itself, and judged again.
         read[places[unconfirmed]] = False
-        if error <= integrator.map_error:
-            break
-        if not model.slides:
-            own = sampled_error(split, some, solved_sample(split, some), window).error
-            if error <= 2.0 * own:
-                break
-    else:
-        read = np.zeros_like(read)
-    if not read.any():
-        error = math.nan
+        if not error <= integrator.map_error:
+            own = integrator.map_error
+            if not model.slides:  # single orbits take the steps that they need
+                own = sampled_error(split, some, solved_sample(split, some), window).error
+            if not error <= 2.0 * own:
+                read, error = np.zeros_like(read), math.nan
     if read.all():
         return Sought(surface, (Group("read", reader, candidates),), error, tabled)
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))

@@ -27,13 +27,13 @@ class TurnedMotion(NamedTuple):
     Attributes:
         state: a period later, or minus the state half a period later.
         late: phase from there to where it turns, negative where it has turned before [rad].
-        kick: what the turn at its start, where there is none at its end, makes of a disturbance of the
+        saltation: what the turn at its start, where there is none at its end, makes of a disturbance of the
             velocity, else 1; NaN where it rises from its start, which is no largest displacement.
     """
 
     state: State
     late: Float[Array, ""]
-    kick: Float[Array, ""]
+    saltation: Float[Array, ""]
 
 
 def turning_map(
@@ -69,6 +69,6 @@ def turning_map(
         model.acceleration(state, at, law_beside(model, tuple(own)))
         for own in (begin, begin.at[place].set(1.0))
     )
-    kick = jnp.where(jnp.any(turns), 1.0, after / before)
+    saltation = jnp.where(jnp.any(turns), 1.0, after / before)
     moved = tuple(-value for value in motion.end) if half else motion.end
-    return TurnedMotion(moved, late, jnp.where(begin[place] <= 0.0, kick, jnp.nan))
+    return TurnedMotion(moved, late, jnp.where(begin[place] <= 0.0, saltation, jnp.nan))
