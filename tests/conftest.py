@@ -5,8 +5,10 @@ import gc
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FunctionType
+from typing import Any
 
 import jax
 import jaxlib.version
@@ -45,6 +47,27 @@ os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
+
+
+def _check_shapes_only(check: Callable[..., Any]) -> Callable[..., Any]:
+    """Check functions whose signature tells shapes; types are checked before anything runs.
+
+    Functions inside functions are left out: they would be prepared for it anew at every call.
+    """
+
+    def jaxtyped(function: Any = None, **options: Any) -> Any:
+        if function is None:
+            return lambda function: jaxtyped(function, **options)
+        if isinstance(function, FunctionType):
+            tells_shapes = "jaxtyping" in repr(function.__annotations__)
+            if not tells_shapes or "<locals>" in function.__qualname__:
+                return function
+        return check(function, **options)
+
+    return jaxtyped
+
+
+jaxtyping.jaxtyped = _check_shapes_only(jaxtyping.jaxtyped)  # what the hook puts before each function
 install_import_hook("isojax", "beartype.beartype")
 
 
