@@ -49,25 +49,21 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
-def _check_shapes_only(check: Callable[..., Any]) -> Callable[..., Any]:
-    """Check functions whose signature tells shapes; types are checked before anything runs.
-
-    Functions inside functions are left out: they would be prepared for it anew at every call.
-    """
+def _sparing(check: Callable[..., Any]) -> Callable[..., Any]:
+    """Leave out functions inside functions that tell no shape: each call would prepare them for the check."""
 
     def jaxtyped(function: Any = None, **options: Any) -> Any:
         if function is None:
             return lambda function: jaxtyped(function, **options)
-        if isinstance(function, FunctionType):
-            tells_shapes = "jaxtyping" in repr(function.__annotations__)
-            if not tells_shapes or "<locals>" in function.__qualname__:
-                return function
+        is_inside = isinstance(function, FunctionType) and "<locals>" in function.__qualname__
+        if is_inside and "jaxtyping" not in repr(function.__annotations__):
+            return function
         return check(function, **options)
 
     return jaxtyped
 
 
-jaxtyping.jaxtyped = _check_shapes_only(jaxtyping.jaxtyped)  # what the hook puts before each function
+jaxtyping.jaxtyped = _sparing(jaxtyping.jaxtyped)  # what the hook puts before each function
 install_import_hook("isojax", "beartype.beartype")
 
 

@@ -65,9 +65,8 @@ def design(
 
     Raises:
         ValueError: if neither an objective nor a constraint is given, a bound, name or constraint is not what
-            it must be, or a quantity is not finite at the
-            start, or wherever the search goes from a point that keeps the limits: with the quantity and the
-            coefficients.
+            it must be, or a quantity is not finite at the start, or wherever the search goes from a point
+            that keeps the limits: with the quantity and the coefficients.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Kraft 1988, DFVLR-FB 88-28 (SLSQP).

@@ -52,7 +52,8 @@ _READING_SHARE = 0.2
 """Of the error that a map may have, where its orbits are read off: there steps cost little."""
 
 _SLIDING_STEPS = 160
-"""Steps a period of a first surface with dry friction: the fewest with which it mostly does."""
+"""Steps a period of a first surface with dry friction, under which an orbit has kinks that smooth ones lack.
+With the usual 128 the error of a map was just above what it may be, so that a second surface was sought."""
 
 _INSTEAD = (
     "Make the map outside: `isojax.find_again(smap, model)` finds its cells again under jax.jit, jax.vmap, "
@@ -201,7 +202,10 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     sought = seek(model, integrator, half, window, integrator.map_error, run)
     goal = _READING_SHARE * integrator.map_error
     # Where friction begins to hold the mass a surface has a kink, near which more steps gain little.
-    if run.integrator is None and sought.reading_error > (integrator.map_error if model.slides else goal):
+    enough = integrator.map_error if model.slides else goal
+    # Without friction orbits that are not read off are as well integrated together; with it each takes long.
+    asked = run.integrator is None and (sought.reads or model.slides)
+    if asked and sought.reading_error > enough:
         integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
         sought = seek(model, integrator, half, window, goal, run)
     first = sought.groups[0]
@@ -243,7 +247,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
 
 def _known_cells(sought: Sought, window: MapWindow, run: MapRun) -> tuple[Cells, list[float], int]:
     """Give the orbits of all groups, the errors of these, and how many of a sample finer steps deny."""
-    parts, errors, unconfirmed = [], [sought.reading_error], 0
+    parts, errors, unconfirmed = [], [sought.reading_error] if sought.reads else [], 0
     for name, solver, candidates in sought.groups:
         part = run_chunks(solver, candidates, run.chunk, run.folder, name, run.progress)
         if isinstance(solver, CellSolver):

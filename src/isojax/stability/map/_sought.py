@@ -56,7 +56,8 @@ class Sought(NamedTuple):
     Attributes:
         surface: orbits over displacement and frequency.
         groups: all orbits, by how they are found; none is empty.
-        reading_error: largest error of multipliers read off in a sample of cells; NaN where none are.
+        reading_error: largest error of multipliers read off in a sample of cells, also where it is too large
+            for any to be read off; NaN without a sample.
         tabled: whether the invariants of the surface give all multipliers, and it has no steps.
     """
 
@@ -64,6 +65,11 @@ class Sought(NamedTuple):
     groups: tuple[Group, ...]
     reading_error: float
     tabled: bool
+
+    @property
+    def reads(self) -> bool:
+        """Whether any orbits are read off the surface."""
+        return any(group.name == "read" for group in self.groups)
 
     @property
     def known_columns(self) -> Bool[np.ndarray, " frequency"]:
@@ -143,12 +149,11 @@ def seek(
         error, unconfirmed = sampled_error(judge, some, by_reading, window)
         # What finer steps do not find is solved for itself, and judged again.
         read[places[unconfirmed]] = False
-        if not error <= integrator.map_error:
-            own = integrator.map_error
-            if not model.slides:  # single orbits take the steps that they need
-                own = sampled_error(split, some, solved_sample(split, some), window).error
-            if not error <= 2.0 * own:
-                read, error = np.zeros_like(read), math.nan
+        allowed = integrator.map_error
+        if not (error <= allowed or model.slides):  # single orbits take the steps that they need
+            allowed = 2.0 * sampled_error(split, some, solved_sample(split, some), window).error
+        if not error <= allowed:
+            read = np.zeros_like(read)
     if read.all():
         return Sought(surface, (Group("read", reader, candidates),), error, tabled)
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
