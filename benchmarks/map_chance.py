@@ -79,7 +79,7 @@ def main() -> None:
     run = MapRun(True, plain.integrator, 32768, None, None, None)
 
     def find(model: ij.Isolator, amplitudes: np.ndarray) -> tuple[ij.stability.StabilityMap, Sought]:
-        return solve_map(model, MapWindow(amplitudes, band, 3.0), run)
+        return solve_map(model, MapWindow(amplitudes, band), run)
 
     ij.stability_map(fit.model, forces, band, coexisting=True, fit=fit)
     seconds = []

@@ -13,7 +13,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from isojax import Harmonic, Isolator, elements, find_again, find_periodic_orbit, paper, stability_map
+from isojax import (
+    Harmonic,
+    Isolator,
+    continue_branch,
+    elements,
+    find_again,
+    find_periodic_orbit,
+    paper,
+    stability_map,
+)
 from isojax._results import RESULTS
 from isojax.stability.map._batched_newton import FOUND, NOT_CONVERGED, CellSolver, Found, blanked
 from isojax.stability.map._chunks import fingerprint
@@ -88,6 +97,21 @@ def test_no_orbit_in_or_beside_the_lens_is_further_off_than_the_reported_error()
                 polynomial = np.abs((ours[:, None] - theirs[None]).prod(axis=1))
                 error = np.max(polynomial / np.maximum(np.abs(theirs[0] - theirs[1]), 0.1))
                 assert error <= min(smap.error, most)
+
+
+def test_orbits_hide_neither_in_a_narrow_dip_of_the_force_nor_next_to_a_fold():
+    # At resonance a lightly damped mount needs a small part of the force that it needs to either side.
+    laws = elements.LinearStiffness(3e5), elements.CubicStiffness(4e10), elements.LinearDamping(60.0)
+    model = Isolator(120.0, laws)
+    axis = dict(parameter="amplitude", start=1.0, stop=80.0, other_periods=())
+    for frequency in (8.5, 9.0):
+        folds = continue_branch(model, frequency=frequency, **axis).special_points
+        low, high = sorted(float(fold.amplitude) for fold in folds)
+        assert low < 0.2 * high
+        rows = [(1.0 - 1e-5) * low, (1.0 + 1e-5) * low, (1.0 - 1e-5) * high, (1.0 + 1e-5) * high]
+        for forces, counts in ((rows, [1, 3, 3, 1]), (rows[:2], [1, 3]), ([1e-4, rows[2]], [1, 3])):
+            smap = stability_map(model, forces, [frequency, 12.0], coexisting=True)
+            np.testing.assert_array_equal(smap.count[:, 0], counts)
 
 
 def test_cells_that_cannot_be_read_off_are_solved_for_themselves():
@@ -216,7 +240,6 @@ def test_the_size_of_the_chunks_changes_no_number():
             {"model": paper.y_direction().replace(mass=math.nan)},
             "Argument `model` must hold finite numbers, but mass is nan.",
         ),
-        ({"reach": 0.5}, "Argument `reach` must be at least 1, but is 0.5."),
         ({"chunk": 0}, "Argument `chunk` must be a positive count, but is 0."),
     ],
 )
@@ -319,7 +342,7 @@ def test_of_starts_that_led_to_one_orbit_one_is_left(small):
     found = Found(*(np.stack(own) for own in rows), np.ones(4), sizes, np.full(4, FOUND, np.int8))
     column, row, order = np.full(4, 3), np.full(4, 4), np.arange(4)
     cells = Cells(Candidates(row, column, column, order), found, np.zeros(4, bool))
-    window = MapWindow(FORCES, BAND, 3.0)
+    window = MapWindow(FORCES, BAND)
     left = without_repeats(small.model, small.integrator, True, window, cells)
     np.testing.assert_array_equal(left.found.code == FOUND, [True, False, False, True])
     np.testing.assert_array_equal(np.isnan(left.found.response), [False, True, True, False])

@@ -163,12 +163,15 @@ def test_a_map_with_friction_holds_all_orbits_between_the_folds(monkeypatch):
     monkeypatch.setattr("isojax.stability.map._single_orbits._ORBITS_TOGETHER", 6)
     laws = elements.LinearStiffness(3e5), elements.CubicStiffness(4e10), elements.LinearDamping(360.0)
     model = Isolator(120.0, (*laws, elements.CoulombFriction(6.0, 1e-4)))
-    smap = stability_map(model, [60.0, 80.0], [8.0, 10.0], coexisting=True)
-    np.testing.assert_array_equal(smap.count, [[1, 1], [1, 3]])
+    smap = stability_map(model, [3.0, 60.0, 80.0], [8.0, 10.0], coexisting=True)
+    np.testing.assert_array_equal(smap.count, [[0, 0], [1, 1], [1, 3]])
+    held = [RESULTS.sticks, RESULTS.no_further_orbit, RESULTS.no_further_orbit]
+    for place, expected in enumerate(held):
+        assert bool((smap.result[place, 0] == expected).all())
     own = rig.LinearStiffness(3e5), rig.CubicStiffness(4e10), rig.LinearDamping(360.0)
     plant = rig.Plant((*own, rig.CoulombFriction(6.0)), 120.0)
     for place in range(3):
-        exact = rig_orbit(plant, 80.0, 10.0, np.asarray(smap.y0)[place, 1, 1])
+        exact = rig_orbit(plant, 80.0, 10.0, np.asarray(smap.y0)[place, 2, 1])
         assert exact.closed
-        error = multiplier_error(np.asarray(smap.multipliers)[place, 1, 1], exact.multipliers)
+        error = multiplier_error(np.asarray(smap.multipliers)[place, 2, 1], exact.multipliers)
         assert error < smap.error < 5e-6

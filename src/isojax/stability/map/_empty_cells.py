@@ -2,16 +2,20 @@
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 from scipy.ndimage import distance_transform_edt
 
+from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
+from ..orbit import is_held, recorded_sine
 from ._batched_newton import (
     FOUND,
     NO_FURTHER_ORBIT,
     NOT_CONVERGED,
+    STICKS,
     Found,
     blanked,
     padded,
@@ -33,7 +37,7 @@ _SAME = 1e-5
 """Distance of two orbits, over their size, up to which they are one."""
 
 _STARTS_TOGETHER = 1024
-"""Lanes of the compiled step from a start to t = 0."""
+"""Lanes of the compiled step from a start to t = 0, and of whether friction holds the mass."""
 
 _NEIGHBOURING = 1e-3
 """Relative difference of the sizes of two motions up to which they are looked at as one."""
@@ -74,11 +78,17 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
     candidates, found = cells.candidates, Found(*(np.array(values) for values in cells.found))
     split = cells.split.copy()
     place = candidates.force.astype(int) * shape[1] + candidates.frequency
+
+    def lost_cells() -> np.ndarray:
+        full = np.zeros(shape[0] * shape[1], bool)
+        full[place[found.code == FOUND]] = True
+        return np.flatnonzero(~full[place] & (candidates.order == 0) & (found.code != STICKS))
+
+    lost = lost_cells()
+    found.code[lost[_are_held(model, window, candidates, lost)]] = STICKS
     for attempt in range(1 + _RETRIES):
-        held = np.zeros(shape[0] * shape[1], bool)
-        held[place[found.code == FOUND]] = True
-        lost = np.flatnonzero(~held[place] & (candidates.order == 0))
-        if not lost.size or (attempt and not held.any()):
+        lost = lost_cells()
+        if not lost.size or (attempt and not (found.code == FOUND).any()):
             break
         beside = _beside(model, method, window, Cells(candidates, found, split), lost) if attempt else None
         filled = 0
@@ -144,6 +154,26 @@ def without_repeats(
         alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= _SAME * scale[apart:], axis=1)
         gone.append(np.maximum(order[:-apart], order[apart:])[alike])
     return Cells(candidates, blanked(found, np.concatenate(gone), NO_FURTHER_ORBIT), split)
+
+
+def _are_held(
+    model: Isolator, window: MapWindow, candidates: Candidates, picked: Int[np.ndarray, " cell"]
+) -> Bool[np.ndarray, " cell"]:
+    """Say in which cells dry friction holds the mass."""
+    if not model.slides:
+        return np.zeros(picked.size, bool)
+    held = []
+    for begin in range(0, picked.size, _STARTS_TOGETHER):
+        block = picked[begin : begin + _STARTS_TOGETHER]
+        own = padded(block, _STARTS_TOGETHER)
+        push, rate = window.amplitudes[candidates.force[own]], window.frequencies[candidates.frequency[own]]
+        held.append(np.asarray(_held(model, jnp.asarray(push), jnp.asarray(rate)))[: block.size])
+    return np.concatenate([np.zeros(0, bool), *held])
+
+
+@quick_jit
+def _held(model: Isolator, amplitude: Array, frequency: Array) -> Array:
+    return jax.vmap(lambda push, rate: is_held(model, recorded_sine(model, push, rate)))(amplitude, frequency)
 
 
 def _blocks(count: int) -> list[np.ndarray]:

@@ -75,7 +75,6 @@ def stability_map(
     frequencies: Any,
     *,
     coexisting: bool = False,
-    reach: float = 3.0,
     integrator: Integrator | None = None,
     chunk: int = 32768,
     checkpoint: str | Path | None = None,
@@ -97,8 +96,6 @@ def stability_map(
         frequencies: ascending and positive [Hz].
         coexisting: whether to give every orbit of a cell; else the one of the smallest motion, to which rest
             leads as the drive grows.
-        reach: displacement up to which orbits are sought, over the largest that grows from rest without a
-            jump anywhere in the window.
         integrator: steps a period; RK4 with as many as a sample of orbits needs if omitted.
         chunk: orbits computed at once by each core; bounds the memory.
         checkpoint: folder in which finished chunks are kept; a run that was killed goes on from there and
@@ -114,7 +111,7 @@ def stability_map(
 
     Raises:
         ValueError: if JAX traces or differentiates the model or a grid (see `find_again`), a grid is empty,
-            not positive or not ascending, `reach` is below one, `chunk` is no positive count, the checkpoint
+            not positive or not ascending, `chunk` is no positive count, the checkpoint
             is of another map or of other code, or the fit failed, leaves a coefficient undetermined or is of
             another model.
         RuntimeError: if JAX is not in 64-bit mode.
@@ -132,7 +129,6 @@ def stability_map(
     refuse_transformed(model, _INSTEAD)
     for name, axis in (("amplitudes", amplitudes), ("frequencies", frequencies)):
         refuse_transformed(axis, _INSTEAD_OF_AXES, name)
-    refuse_transformed(reach, "Give one number: no orbit moves with it.", "reach")
     for entry in list_parameters(model):
         if not np.all(np.isfinite(np.asarray(entry.value))):
             raise ValueError(f"Argument `model` must hold finite numbers, but {entry.name} is {entry.value}.")
@@ -140,10 +136,8 @@ def stability_map(
         integrator = integrator_for(model, integrator)
     carried = None if fit is None else coefficient_errors(fit, model)
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
-    if not 1.0 <= reach < math.inf:
-        raise ValueError(f"Argument `reach` must be at least 1, but is {reach}.")
     chunk = given_count("chunk", chunk)
-    window = MapWindow(forces, band, reach)
+    window = MapWindow(forces, band)
     if integrator is not None:
         check_steps(model, integrator, window)
     folder = None if checkpoint is None else Path(checkpoint)
@@ -184,15 +178,14 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
 
     Args:
         model: the isolator.
-        window: its axes, and how far orbits are sought.
+        window: its axes.
         run: how it is made.
 
     Returns:
         The map, and the surface from which its orbits came.
     """
-    forces, band, _ = window
-    *_, largest = displacements(model, window)
-    half = is_odd(model, largest)
+    forces, band = window
+    half = is_odd(model, displacements(model, window).largest)
     integrator, least = run.integrator, fewest_steps(model)
     if integrator is None:
         usual = integrator_for(model, None, _SLIDING_STEPS) if model.slides else integrator_for(model, None)
@@ -217,8 +210,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     if run.progress is not None:
         run.progress("orbits over displacement and frequency found")
     if run.folder is not None:
-        axes = forces, band, run.coexisting, window.reach
-        claim_folder(run.folder, fingerprint(model, integrator, *axes, run.chunk))
+        claim_folder(run.folder, fingerprint(model, integrator, forces, band, run.coexisting, run.chunk))
     known, errors, unconfirmed = _known_cells(sought, window, run)
     filled = fill_empty(model, integrator, half, window, known)
     candidates, found, split = without_repeats(model, integrator, half, window, filled)
@@ -304,7 +296,8 @@ def _gridded(
         arrays[public] = onto_grid(getattr(found, name), np.nan)
     arrays["split"] = onto_grid(split, False)
     code = onto_grid(found.code, NO_FURTHER_ORBIT)
-    arrays["count"] = (code == FOUND).reshape(orbits, rows, columns).sum(axis=0)
-    nothing = (arrays["count"] == 0) & (code == NO_FURTHER_ORBIT)
-    arrays["code"] = np.where(nothing, NOT_CONVERGED, code)
+    cells = code.reshape(orbits, rows, columns)
+    arrays["count"] = (cells == FOUND).sum(axis=0)
+    answered = np.isin(cells, (FOUND, STICKS)).any(axis=0)
+    arrays["code"] = np.where(~answered & (code == NO_FURTHER_ORBIT), NOT_CONVERGED, code)
     return arrays

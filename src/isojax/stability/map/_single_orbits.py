@@ -21,7 +21,6 @@ from ..orbit import (
     closing,
     event_places,
     half_range,
-    is_held,
     modulus,
     multipliers,
     recorded_sine,
@@ -34,7 +33,6 @@ from ._batched_newton import (
     NOT_ACCURATE,
     NOT_CONVERGED,
     NOT_FINITE,
-    STICKS,
     Found,
     padded,
     surface_lanes,
@@ -185,7 +183,7 @@ def single_orbit(
     drive = recorded_sine(model, amplitude, frequency)
     path = trajectory(model, method.integrator, drive, tuple(state), turns=method.turns)
     finite = jnp.all(jnp.isfinite(path[0])) & jnp.all(jnp.isfinite(matrix))
-    failed = jnp.where(is_held(still, drive), STICKS, jnp.where(finite, NOT_CONVERGED, NOT_FINITE))
+    failed = jnp.where(finite, NOT_CONVERGED, NOT_FINITE)
     code = jnp.where(solution.accurate, FOUND, NOT_ACCURATE)
     code = jnp.where(finite & solution.found, code, failed)
     blank = jnp.where(code == FOUND, 1.0, jnp.nan)

@@ -173,7 +173,7 @@ def _sample(surface: Surface, candidates: Candidates, known: np.ndarray) -> np.n
     known = np.flatnonzero(kept)
     column, part = candidates.frequency[known], candidates.part[known]
     count = min(SAMPLED // 3, known.size)
-    ends = surface.force[column, part], surface.force[column, part + 1]
+    ends = surface.forces.ends[column, part], surface.forces.ends[column, part + 1]
     # Next to a fold the force hardly changes along a part, and any error is seen through a lens.
     flat = np.abs(np.log(ends[1] / ends[0]))
     picked = [

@@ -189,5 +189,5 @@ def incomplete_words(smap: StabilityMap) -> str:
     """Say how many cells lack an orbit for sure."""
     return (
         f"{np.sum(smap.incomplete)} cells hold an even number of orbits: folds come in pairs, so one is "
-        "missing, or lies beyond `reach`"
+        "missing"
     )

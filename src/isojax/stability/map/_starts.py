@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._types import Lanes
-from ._surface import PARTS, Surface
+from ._forces import PARTS
+from ._surface import Surface
 
 _POLISHING = 2
 """Steps of Newton's method on the polynomial of a piece, after the parabola of a part."""
@@ -38,14 +39,20 @@ class Candidates(NamedTuple):
     Attributes:
         force: place of the drive amplitude in the window.
         frequency: place of the frequency.
-        part: of the surface's displacement amplitudes, in which the orbit lies.
+        leg: twice the part of the surface's displacement amplitudes in which the orbit lies, and one more
+            where the force rises there: the force may turn within a part.
         order: which of the orbits of its cell, by rising displacement.
     """
 
     force: Int[np.ndarray, " candidate"]
     frequency: Int[np.ndarray, " candidate"]
-    part: Int[np.ndarray, " candidate"]
+    leg: Int[np.ndarray, " candidate"]
     order: Int[np.ndarray, " candidate"]
+
+    @property
+    def part(self) -> Int[np.ndarray, " candidate"]:
+        """The part of the surface's displacement amplitudes."""
+        return self.leg >> 1
 
 
 class PlacedSurface(NamedTuple):
@@ -69,12 +76,25 @@ class PlacedSurface(NamedTuple):
 def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexisting: bool) -> Candidates:
     """Find every orbit of the surface that a force of the window holds, or that of the smallest motion."""
     # The count of forces below the surface; between two ends it changes by the forces that are passed.
-    rank = np.searchsorted(forces, surface.force).astype(np.int32)
+    rank = np.searchsorted(forces, surface.forces.ends).astype(np.int32)
     risen = np.diff(rank, axis=1)
-    column, part = np.nonzero(risen)
-    risen = risen[column, part]
+    # Where the force turns beyond both ends of a part, that has two legs.
+    column, part, turned = surface.forces.turns
+    legs = np.stack([rank[column, part], np.searchsorted(forces, turned), rank[column, part + 1]], axis=1)
+    two = (legs[:, 1] - legs[:, 0]) * (legs[:, 1] - legs[:, 2]) > 0
+    risen[column[two], part[two]] = 0
+    place = np.flatnonzero(risen)
+    begin = rank.ravel()[place + place // risen.shape[1]]
+    end = begin + risen.ravel()[place]
+    twice, legs = np.repeat(column[two] * risen.shape[1] + part[two], 2), legs[two].astype(np.int32)
+    at = np.searchsorted(place, twice)
+    place, begin, end = (
+        np.insert(values, at, more)
+        for values, more in ((place, twice), (begin, legs[:, :2].ravel()), (end, legs[:, 1:].ravel()))
+    )
+    column, part = np.divmod(place, risen.shape[1])
     # Along one run up or down a force is passed once.
-    up = risen > 0
+    up = end > begin
     new = np.ones(up.size, bool)
     new[1:] = (up[1:] != up[:-1]) | (column[1:] != column[:-1])
     first = np.maximum.accumulate(
@@ -82,20 +102,20 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexi
     )
     runs = np.cumsum(new)
     run = runs - runs[first] if up.size else runs
-    part = part.astype(np.int32)
-    low = np.minimum(rank[column, part], rank[column, part + 1])
+    leg = (2 * part + up).astype(np.int32)
+    low, risen = np.minimum(begin, end), np.abs(end - begin)
     shape = len(forces), len(surface.frequencies)
     counts = np.zeros(shape[0] * shape[1], np.int8)
     cells: list[np.ndarray] = []
     for place in range(int(run.max(initial=0)) + 1):
         own = run == place
-        passed = np.abs(risen[own])
+        passed = risen[own]
         begins = np.cumsum(passed) - passed
         cell = np.repeat((low[own] - begins) * shape[1] + column[own], passed)
         cell += np.arange(0, cell.size * shape[1], shape[1])
         if not cells:
             cells.append(np.full(counts.size, -1, np.int32))
-            cells[0][cell] = np.repeat(part[own], passed)
+            cells[0][cell] = np.repeat(leg[own], passed)
             counts += cells[0] >= 0
             continue
         order = counts[cell]
@@ -103,16 +123,16 @@ def find_candidates(surface: Surface, forces: Float[np.ndarray, " force"], coexi
             if count == len(cells):
                 cells.append(np.full(counts.size, -1, np.int32))
             which = order == count
-            cells[count][cell[which]] = np.repeat(part[own], passed)[which]
+            cells[count][cell[which]] = np.repeat(leg[own], passed)[which]
         counts[cell] += 1
     held = cells if coexisting else cells[:1]
     lists = []
-    for order, parts in enumerate(held):
+    for order, legs in enumerate(held):
         force, column = np.indices(shape, np.int32).reshape(2, -1)
-        has = parts >= 0
+        has = legs >= 0
         if not has.all():
-            force, column, parts = force[has], column[has], parts[has]
-        lists.append(Candidates(force, column, parts, np.full(force.size, order, np.int32)))
+            force, column, legs = force[has], column[has], legs[has]
+        lists.append(Candidates(force, column, legs, np.full(force.size, order, np.int32)))
     return joined(lists)
 
 
@@ -135,7 +155,7 @@ def read_surface(
     states: int,
     force: Int[Array, " candidate"],
     column: Int[Array, " candidate"],
-    part: Int[Array, " candidate"],
+    leg: Int[Array, " candidate"],
 ) -> ReadOrbits:
     """Give candidates as read off the surface.
 
@@ -144,14 +164,15 @@ def read_surface(
         states: count of states.
         force: place of the drive amplitude of each candidate in the window.
         column: place of its frequency.
-        part: of the displacements.
+        leg: see `Candidates`.
 
     Returns:
         What the surface says of them.
     """
     _, pieces, tables, powers = surface.polynomials.shape
     # Unsigned, and promised to exist: the wrapping of negative places costs more than the reading.
-    force, column, part = (jnp.asarray(places, jnp.uint32) for places in (force, column, part))
+    force, column, leg = (jnp.asarray(places, jnp.uint32) for places in (force, column, leg))
+    part, rises = leg >> 1, (leg & 1).astype(bool)
     piece, share = part // PARTS, (part % PARTS) / PARTS
     base = (column * pieces + piece) * (tables * powers)
     flat = surface.polynomials.ravel()
@@ -168,7 +189,7 @@ def read_surface(
     )
     own = [polynomial(table) for table in range(tables)]
     # Gathered apart from what follows, which then runs in vector registers.
-    own, push, begin, end, share = jax.lax.optimization_barrier((own, push, begin, end, share))
+    own, push, begin, end, share, rises = jax.lax.optimization_barrier((own, push, begin, end, share, rises))
 
     def value(own: list[Array], at: Array) -> Array:
         total = own[-1]
@@ -188,9 +209,9 @@ def read_surface(
         return value(drive[0], at) ** 2 + value(drive[1], at) ** 2
 
     # The parabola through both ends and the middle of the part: which of its roots is known by the slope.
-    left, middle, right = (jnp.sqrt(square(share + k / PARTS)) - push for k in (0.0, 0.5, 1.0))
+    left, middle, right = (square(share + k / PARTS) - push * push for k in (0.0, 0.5, 1.0))
     bend, rise = 2.0 * (left + right - 2.0 * middle), 4.0 * middle - 3.0 * left - right
-    root = jnp.where(right >= left, 1.0, -1.0) * jnp.sqrt(jnp.maximum(rise * rise - 4.0 * bend * left, 0.0))
+    root = jnp.where(rises, 1.0, -1.0) * jnp.sqrt(jnp.maximum(rise * rise - 4.0 * bend * left, 0.0))
     same = rise * root >= 0.0
     over = jnp.where(same, rise + root, 2.0 * bend)
     passed = jnp.where(same, -2.0 * left, root - rise) / jnp.where(over == 0.0, 1.0, over)

@@ -12,11 +12,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
-from ..orbit import answer_scale, response_amplitudes, rest_displacement
+from ..orbit import answer_scale, balanced_motion, rest_displacement
+from ._forces import PARTS, Forces, forces_along
 from ._grids import REFINEMENTS, Grid, filled, first_grid, node_at
 from ._nodes import node_responses
 from ._shared_kinks import AROUND
@@ -25,10 +26,6 @@ from ._spline import spline_matrix, spline_pieces
 _FEW = 0.002
 """Share of the nodes whose orbits may be left to Newton's method."""
 
-_NODES_AN_ORBIT, _MORE_NODES = 8, 4
-"""Under dry friction: nodes that are closed in the time of one single orbit; nodes of a grid for each of the
-one before."""
-
 _LARGEST_RESPONSE = 2.0
 """Half the peak-to-peak displacement over the largest from rest, beyond which a motion did not close: it
 starts at its largest displacement."""
@@ -36,11 +33,14 @@ starts at its largest displacement."""
 _ROWS_BEYOND = 2
 """Nodes of the first grid beyond the largest displacement that is held."""
 
+_ROOM = 3.0
+"""Largest displacement sought, over the largest that the drives hold by the balance of one harmonic."""
+
+_FIRST_ERROR = 0.05
+"""Share by which the drive may be off in the balance of one harmonic and on the first grid, at resonance."""
+
 _TOLD_APART = 1e-3
 """Share by which the drive of a motion exceeds that of the smallest, below which no motion is told apart."""
-
-PARTS = 8
-"""Parts of a spline's piece between whose ends roots are sought."""
 
 
 class MapWindow(NamedTuple):
@@ -49,12 +49,10 @@ class MapWindow(NamedTuple):
     Attributes:
         amplitudes: drive amplitudes, ascending [N, or m/s^2 for base excitation].
         frequencies: ascending [Hz].
-        reach: largest displacement sought, over the largest that grows from rest without a jump.
     """
 
     amplitudes: Float[np.ndarray, " amplitude"]
     frequencies: Float[np.ndarray, " frequency"]
-    reach: float
 
 
 class Surface(NamedTuple):
@@ -70,7 +68,7 @@ class Surface(NamedTuple):
         breaks: logarithm of displacement over rest [m] where one piece ends and the next begins.
         frequencies: [Hz].
         polynomials: of the tables; powers of the share of a piece that is passed.
-        force: drive amplitude [N, or m/s^2 for base excitation] at the ends of equal parts of the pieces.
+        forces: drive amplitude along the displacements, over equal parts of the pieces.
         sides: signs of the kinks between those that are passed.
         shared: whether the orbits of a part pass the kinks in this order.
         error: of multipliers read off, by the nodes that a coarser grid lacked; infinite where none can be.
@@ -80,7 +78,7 @@ class Surface(NamedTuple):
     breaks: Float[np.ndarray, " break"]
     frequencies: Float[np.ndarray, " frequency"]
     polynomials: Float[np.ndarray, "frequency piece table power"]
-    force: Float[np.ndarray, "frequency end"]
+    forces: Forces
     sides: Float[np.ndarray, "piece kink"]
     shared: Bool[np.ndarray, "frequency part"]
     error: Float[np.ndarray, "frequency part"]
@@ -120,10 +118,31 @@ class Surface(NamedTuple):
         return np.minimum(along.min(axis=0), np.abs(1.0 - determinant))
 
 
+class Displacements(NamedTuple):
+    """The displacement amplitudes of a window of force and frequency, by the balance of one harmonic.
+
+    Attributes:
+        rest: displacement at rest [m].
+        least: smallest amplitude that a drive holds [m].
+        grown: largest to which a motion grows from rest without a jump [m].
+        largest: largest that a drive holds, with some room [m].
+    """
+
+    rest: float
+    least: float
+    grown: float
+    largest: float
+
+
 @quick_jit
-def _forces(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Array, Array]:
+def _drives(model: Isolator, frequencies: Array, amplitudes: Array) -> tuple[Array, Array, Array]:
     rest = rest_displacement(model)
-    return rest, response_amplitudes(model, frequencies, amplitudes, rest)
+
+    def drive(amplitude: Array) -> tuple[Array, Array]:
+        held = balanced_motion(model, amplitude + 0.0 * frequencies, frequencies, rest).drive
+        return jnp.asarray(held.sine) + 0.0 * frequencies, jnp.asarray(held.cosine) + 0.0 * frequencies
+
+    return rest, *jax.vmap(drive)(amplitudes)
 
 
 @quick_jit
@@ -142,10 +161,10 @@ def displacement_at_rest(model: Isolator, half: bool) -> float:
     Returns:
         The displacement, from which those of a surface count.
     """
-    return 0.0 if half else float(_forces(model, jnp.ones(1), jnp.array([1e-9]))[0])
+    return 0.0 if half else float(_drives(model, jnp.ones(1), jnp.array([1e-9]))[0])
 
 
-def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, float]:
+def displacements(model: Isolator, window: MapWindow) -> Displacements:
     """Give rest and the displacement amplitudes that the forces of a window can hold.
 
     Args:
@@ -153,7 +172,7 @@ def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, flo
         window: of the map.
 
     Returns:
-        The displacement at rest, the least amplitude and the largest [m].
+        The amplitudes.
     """
     least, most, frequencies = (
         float(window.amplitudes.min()),
@@ -162,7 +181,8 @@ def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, flo
     )
     band = jnp.asarray(np.linspace(frequencies[0], frequencies[-1], 24 if len(frequencies) > 1 else 1))
     grid = float(_largest_scale(model, band, jnp.asarray(most))) * np.logspace(-9.0, 4.0, 400)
-    rest, needed = (np.asarray(value) for value in _forces(model, band, jnp.asarray(grid)))
+    rest, sine, cosine = (np.asarray(value) for value in _drives(model, band, jnp.asarray(grid)))
+    needed = np.hypot(sine, cosine)
     # Connected with rest: from small motion up to the first that needs more than the largest force.
     beyond = np.maximum.accumulate(needed >= most, axis=0)
     reached = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(grid) - 1)
@@ -170,7 +190,15 @@ def displacements(model: Isolator, window: MapWindow) -> tuple[float, float, flo
     enough = np.maximum(least, (1.0 + _TOLD_APART) * needed[0])
     below = np.minimum.accumulate(needed < enough, axis=0).sum(axis=0)
     low = grid[max(int(below.min()) - 1, 0)]
-    return float(rest), 0.5 * low, window.reach * float(grid[int(reached.max())])
+    # Next to a resonance only the part out of phase, which the damping takes, is left of the drive.
+    above = (cosine > 0.0).astype(np.uint8)
+    resonant = maximum_filter(above, 3) != minimum_filter(above, 3)
+    held = np.flatnonzero(
+        np.any((needed <= most) | (resonant & (np.abs(sine) <= (1.0 + _FIRST_ERROR) * most)), axis=1)
+    )
+    grown = float(grid[int(reached.max())])
+    largest = max(grown, float(grid[int(held.max(initial=0))]))
+    return Displacements(float(rest), 0.5 * low, grown, _ROOM * largest)
 
 
 def find_surface(
@@ -191,8 +219,8 @@ def find_surface(
     Returns:
         The surface.
     """
-    rest, low, high = displacements(model, window)
-    ends = math.log(low), math.log(high)
+    sizes = displacements(model, window)
+    rest, ends = sizes.rest, (math.log(sizes.least), math.log(sizes.largest))
     first = first_grid(model, integrator, half, rest, ends, window.frequencies)
     start, kinks = first.grid, first.kinks
     first = first._replace(ends=_ends_needed(start, window))
@@ -200,7 +228,7 @@ def find_surface(
     # Under dry friction the first grid itself is not closed.
     for level in range(0 if model.slides else 1, 1 + REFINEMENTS):
         grid = first.finer(model, grid, level)
-        if not kinks.shared.any() or not _needs_doubling(model, grid, window, goal):
+        if not kinks.shared.any() or not _needs_doubling(grid, window, goal):
             break
     pieces = spline_pieces(grid.logarithms)
     tables = _with_responses(model, integrator, half, rest, grid)
@@ -209,13 +237,7 @@ def find_surface(
     basis = (tables @ pieces.to_basis.T).transpose(1, 0, 2).reshape(len(grid.frequencies), -1)
     basis = spline_matrix(grid.frequencies, window.frequencies) @ basis
     polynomials = pieces.polynomials(basis.reshape(columns, count, -1))
-    shares = (np.arange(PARTS)[:, None] / PARTS) ** np.arange(polynomials.shape[-1])
-    drive = np.moveaxis(polynomials[:, :, :2], 2, 0) @ shares.T
-    last = polynomials[:, -1, :2].sum(axis=-1)
-    square = np.concatenate(
-        [(drive**2).sum(axis=0).reshape(columns, -1), (last**2).sum(axis=1)[:, None]], axis=1
-    )
-    force = np.sqrt(square)
+    forces = forces_along(polynomials[:, :, :2])
     parts = np.linspace(pieces.breaks[:-1], pieces.breaks[1:], 2 * PARTS + 1, axis=1)[:, 1::2].ravel()
     shared = kinks.shared[
         np.ix_(node_at(start.frequencies, window.frequencies), node_at(start.logarithms, parts))
@@ -224,15 +246,21 @@ def find_surface(
         np.ix_(node_at(grid.frequencies, window.frequencies), node_at(grid.logarithms, parts))
     ]
     error = np.where(shared, error, np.inf)
-    return Surface(rest, pieces.breaks, window.frequencies, polynomials, force, kinks.sides, shared, error)
+    return Surface(rest, pieces.breaks, window.frequencies, polynomials, forces, kinks.sides, shared, error)
 
 
 def _ends_needed(grid: Grid, window: MapWindow) -> tuple[float, float]:
     """Give the least and largest logarithm of the displacements that the forces hold, with some room."""
-    force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
-    held = np.flatnonzero((force <= window.amplitudes[-1]).any(axis=0))
-    last = min(int(held.max(initial=0)) + _ROWS_BEYOND, len(grid.logarithms) - 1)
-    return float(grid.logarithms[0]), float(grid.logarithms[last])
+    pieces = spline_pieces(grid.logarithms)
+    drive = (grid.tables[:2] * np.exp(grid.logarithms)) @ pieces.to_basis.T
+    ends, turns = forces_along(pieces.polynomials(drive.swapaxes(0, 1)))
+    largest = (1.0 + _FIRST_ERROR) * window.amplitudes[-1]
+    held = np.flatnonzero((ends <= window.amplitudes[-1]).any(axis=0))
+    # Near resonance the force may dip between two ends.
+    last = max(int(held.max(initial=0)), int(turns.part[turns.force <= largest].max(initial=-1)) + 1)
+    behind = np.interp([last / PARTS], np.arange(pieces.breaks.size), pieces.breaks)
+    node = min(int(node_at(grid.logarithms, behind)[0]) - 1 + _ROWS_BEYOND, grid.logarithms.size - 1)
+    return float(grid.logarithms[0]), float(grid.logarithms[node])
 
 
 def _with_responses(
@@ -256,15 +284,8 @@ def _around(error: Float[np.ndarray, "frequency node"]) -> Float[np.ndarray, "fr
     return maximum_filter(error, [2 * reach + 1 for reach in AROUND])
 
 
-def _needs_doubling(model: Isolator, grid: Grid, window: MapWindow, goal: float) -> bool:
+def _needs_doubling(grid: Grid, window: MapWindow, goal: float) -> bool:
     """Say whether more of the orbits that are asked for than a few cannot be read off."""
     force = np.exp(grid.logarithms) * np.hypot(grid.tables[0], grid.tables[1])
-    if model.slides:
-        # Next to a kink of the surface orbits are found for themselves however near the nodes are.
-        passed = np.abs(np.diff(np.searchsorted(window.amplitudes, force), axis=1))
-        lost = passed[_around(grid.error)[:, 1:] > goal].sum() * (
-            window.frequencies.size / grid.frequencies.size
-        )
-        return bool(_NODES_AN_ORBIT * lost > _MORE_NODES * grid.error.size)
     asked = (force >= window.amplitudes[0]) & (force <= window.amplitudes[-1])
     return bool(asked.any() and np.mean(grid.error[asked] > goal) > _FEW)

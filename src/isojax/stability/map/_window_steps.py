@@ -21,8 +21,8 @@ def window_integrator(model: Isolator, integrator: Integrator, window: MapWindow
     Returns:
         The integrator.
     """
-    _, *sizes = displacements(model, window._replace(reach=1.0))
-    return integrator_over(model, integrator, sizes, window.frequencies)
+    sizes = displacements(model, window)
+    return integrator_over(model, integrator, [sizes.least, sizes.grown], window.frequencies)
 
 
 def check_steps(model: Isolator, integrator: Integrator, window: MapWindow) -> None:

@@ -13,6 +13,7 @@ from ..._small_systems import solve
 from ...excitations import Harmonic
 from ...models import Isolator, sliding_switch
 from ._event_path import follow_events, same_events
+from ._held import is_held
 from ._jacobian import value_and_jacobian, with_matrix
 from ._period_map import period_map, trajectory
 from ._shooting_method import ShootingMethod
@@ -171,12 +172,15 @@ def shoot(
     first = blank._replace(state=begun[0], agrees=jnp.array(False), rounds=begun[1])
     last = jax.lax.while_loop(again, body, first)
     matrix = last.split.scale[:, None] * last.transition / last.split.scale[None, :]
+    accurate = last.agrees & (last.error <= accuracy.limit)
     found = jnp.isfinite(last.mismatch) & (last.mismatch < integrator.residual_tolerance)
     if model.slides:
-        # Held throughout, the mass may rest anywhere within the friction: that is no orbit of its own.
+        # Held throughout, the mass may rest anywhere within the friction: that is no orbit of its own. On
+        # the way to rest it may still creep to the first event.
         assert last.split.crossings.sides is not None
-        found = found & jnp.any(last.split.crossings.sides[:, sliding_switch(model)] != 0.0)
-    accurate = last.agrees & (last.error <= accuracy.limit)
+        found = found & jnp.any(last.split.crossings.sides[1:, sliding_switch(model)] != 0.0)
+        # Nor is what closes by laws continued past their sides, beside a mass at rest.
+        found = found & (accurate | ~is_held(model, drive))
     return ShootingSolution(last.root, last.split, last.state, matrix, last.error, found, accurate)
 
 

@@ -163,7 +163,7 @@ def transmissibility(
     if held.ndim or not np.isfinite(held) or not held > 0.0:
         raise ValueError(f"Argument `amplitude` must be one positive number, but is {amplitude}.")
     if integrator is None:
-        steps = window_integrator(frozen(model), steps, MapWindow(held[None], grid, 1.0))
+        steps = window_integrator(frozen(model), steps, MapWindow(held[None], grid))
     every = stability_map(frozen(model), held[None], grid, coexisting=True, integrator=steps)
     orbits = every if coexisting else every.smallest()
 
