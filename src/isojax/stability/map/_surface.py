@@ -33,7 +33,7 @@ starts at its largest displacement."""
 _ROWS_BEYOND = 2
 """Nodes of the first grid beyond the largest displacement that is held."""
 
-_ROOM = 3.0
+_BEYOND_BALANCE = 3.0
 """Largest displacement sought, over the largest that the drives hold by the balance of one harmonic."""
 
 _FIRST_ERROR = 0.05
@@ -198,7 +198,7 @@ def displacements(model: Isolator, window: MapWindow) -> Displacements:
     )
     grown = float(grid[int(reached.max())])
     largest = max(grown, float(grid[int(held.max(initial=0))]))
-    return Displacements(float(rest), 0.5 * low, grown, _ROOM * largest)
+    return Displacements(float(rest), 0.5 * low, grown, _BEYOND_BALANCE * largest)
 
 
 def find_surface(
