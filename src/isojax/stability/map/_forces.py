@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 PARTS = 8
 """Parts of a spline's piece between whose ends roots are sought."""
 
-_BISECTIONS = 24
+_TURN_BISECTIONS = 24
 """Halvings of the part in which the force turns: the force there is then known to the last digit."""
 
 
@@ -64,7 +64,7 @@ def forces_along(drive: Float[np.ndarray, "frequency piece 2 power"]) -> Forces:
     once = np.unique(column * rises.shape[1] + part, return_index=True)[1]
     column, part, falls_first = column[once], part[once], rises[column, end][once]
     low, high = np.zeros(part.size), np.ones(part.size)
-    for _ in range(_BISECTIONS):
+    for _ in range(_TURN_BISECTIONS):
         middle = 0.5 * (low + high)
         before = (_square(drive, column, part, middle)[1] < 0.0) == falls_first
         low, high = np.where(before, middle, low), np.where(before, high, middle)
