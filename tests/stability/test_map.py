@@ -360,3 +360,10 @@ def test_an_even_count_of_orbits_is_printed_as_one_that_lacks_some(lens_map):
     lacking = eqx.tree_at(lambda smap: smap.count, lens_map, lens_map.count.at[0, 1].set(2))
     assert "1 with an even count of them" in " ".join(repr(lacking).split())
     assert "1 cells hold an even number of orbits: folds come in pairs" in repr(lacking)
+
+
+def test_other_places_of_rest_are_named_in_millimetres():
+    laws = elements.LinearStiffness(1e6), elements.CubicStiffness(-1e11), elements.LinearDamping(1e4)
+    smap = stability_map(Isolator(800.0, laws), [50.0, 60.0], [4.0, 5.0])
+    np.testing.assert_allclose(smap.other_rests, [-1e-5 * math.sqrt(1e5), 1e-5 * math.sqrt(1e5)], rtol=1e-4)
+    assert "without a drive the mass also rests at -3.16, 3.16 mm" in repr(smap)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...stability import FoldCurve, StabilityMap
-from ...stability.map import chance_words, incomplete_words, unconfirmed_words
+from ...stability.map import chance_words, elsewhere_words, incomplete_words, unconfirmed_words
 from ..plots import drive_unit, quantity
 from ._map_files import result_codes
 
@@ -66,6 +66,8 @@ def map_summary(
     elif several.any():
         lines.append(("folds", "not followed; --folds draws their curve and finds its cusps"))
     lines.append(("not found", _missing(smap, count, coexisting)))
+    if smap.other_rests.size:
+        lines.append(("not sought", elsewhere_words(smap)))
     for name, (compiling, running) in (seconds or {}).items():
         words = f"{compiling + running:.1f} s: {compiling:.1f} s compiling, {running:.1f} s running"
         lines.append((f"time, {name}", words))

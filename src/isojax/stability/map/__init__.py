@@ -25,6 +25,7 @@ from ._read_slopes import fewest_nodes as fewest_nodes
 from ._read_slopes import multiplier_slopes as multiplier_slopes
 from ._read_slopes import relative_error as relative_error
 from ._stability_map import StabilityMap as StabilityMap
+from ._stability_map import elsewhere_words as elsewhere_words
 from ._stability_map import incomplete_words as incomplete_words
 from ._stability_map import unconfirmed_words as unconfirmed_words
 from ._states_at_zero import states_at_zero as states_at_zero

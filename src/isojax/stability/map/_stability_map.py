@@ -12,16 +12,20 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from ..._results import RESULTS, cell_results
 from ..._show import number, shown
 from ...models import Integrator, Isolator
-from ..orbit import Sine
+from ..orbit import Sine, rest_displacements
 from ._chance import chance_words
 from ._map_method import Lane, MapMethod
 from ._states_at_zero import states_at_zero
+from ._surface import displacement_at_rest
 
 _OF_EACH_ORBIT = ("spectral_radius", "multipliers", "start", "direction", "phases", "split", "response")
 """Fields with an axis `orbit` where coexisting orbits are sought."""
 
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
+
+_BESIDE = 100.0
+"""Distance up to which other rests are looked for, over the largest motion of a map."""
 
 
 @shown
@@ -92,6 +96,20 @@ class StabilityMap(eqx.Module):
         """Whether a cell of a map of all orbits lacks one: folds come in pairs, so their count is odd."""
         count = np.asarray(self.count)
         return self._all_sought & (count > 0) & (count % 2 == 0)
+
+    @property
+    def other_rests(self) -> Float[np.ndarray, " rest"]:
+        """Where else the mass rests without a drive, within a hundred times the largest motion [m].
+
+        A map holds the orbits about the rest next to zero; those about others only where no such orbit was
+        found.
+        """
+        size = float(np.nanmax(np.asarray(self.response), initial=0.0))
+        own = displacement_at_rest(self.model, self.symmetric)
+        rests = rest_displacements(self.model, abs(own) + _BESIDE * size)
+        if not rests.size:
+            return rests
+        return np.delete(rests, np.argmin(np.abs(rests - own)))
 
     @property
     def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
@@ -174,6 +192,7 @@ class StabilityMap(eqx.Module):
             *([f"  with all orbits of a cell, {chances}"] if chances else []),
             *([f"  {unconfirmed_words(self)}"] if self.unconfirmed else []),
             *([f"  {incomplete_words(self)}"] if self.incomplete.any() else []),
+            *([f"  {elsewhere_words(self)}"] if self.other_rests.size else []),
         ]
 
 
@@ -191,3 +210,9 @@ def incomplete_words(smap: StabilityMap) -> str:
         f"{np.sum(smap.incomplete)} cells hold an even number of orbits: folds come in pairs, so one is "
         "missing"
     )
+
+
+def elsewhere_words(smap: StabilityMap) -> str:
+    """Say where else the mass rests."""
+    places = ", ".join(f"{1e3 * place:.3g}" for place in smap.other_rests)
+    return f"without a drive the mass also rests at {places} mm; motions about these places are not sought"
