@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +15,20 @@ from ._types import as_float64
 
 _SHORT = 60
 """Letters up to which a message shows an argument as it was written."""
+
+
+def refuse_not_positive(name: str, value: Any) -> None:
+    """Refuse a number, or any of several, that is zero or below; a traced one passes unseen.
+
+    Args:
+        name: of the argument.
+        value: what was given.
+
+    Raises:
+        ValueError: if it is.
+    """
+    if eqx.is_array_like(value) and not isinstance(value, Tracer) and not np.all(np.asarray(value) > 0):
+        raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
 
 
 def given_count(name: str, value: Any, least: int = 1) -> int:

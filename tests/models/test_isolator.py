@@ -13,6 +13,7 @@ from isojax.elements import (
     AbstractElement,
     CoulombFriction,
     CubicStiffness,
+    EndStop,
     LinearDamping,
     LinearStiffness,
     SensorGain,
@@ -87,6 +88,7 @@ def test_elements_are_appended_and_the_rest_kept():
     ("arguments", "message"),
     [
         ((0.0, ()), r"`mass` must be positive, but is 0.0"),
+        ((1.0, (EndStop(1e6, 1e-3, 0.0, 0.0),)), r"`end_stop.width` must be positive, but is 0.0"),
         ((-800.0, ()), r"`mass` must be positive, but is -800.0"),
         ((float("nan"), ()), r"`mass` must be positive, but is nan"),
         ((800.0, (LinearStiffness, 3.0)), r"`elements` must hold elements, but elements\[0\]"),

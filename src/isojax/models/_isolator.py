@@ -5,10 +5,9 @@ from typing import Literal, cast
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from .._given_numbers import refuse_not_positive
 from .._parameters import (
     Parameter,
     element_names,
@@ -67,7 +66,7 @@ class Isolator(eqx.Module):
     excitation: Literal["force", "base_acceleration"] = eqx.field(static=True, default="force")
 
     def __check_init__(self):
-        """Refuse what is no isolator; a traced mass passes unseen."""
+        """Refuse what is no isolator; traced numbers pass unseen."""
         if self.excitation not in ("force", "base_acceleration"):
             raise ValueError(
                 f'Argument `excitation` must be "force" or "base_acceleration", but is {self.excitation!r}.'
@@ -77,9 +76,9 @@ class Isolator(eqx.Module):
                 raise ValueError(
                     f"Argument `elements` must hold elements, but elements[{place}] = {entry!r}."
                 )
-        known = eqx.is_array(self.mass) and not isinstance(self.mass, Tracer)
-        if known and not np.all(np.asarray(self.mass) > 0):
-            raise ValueError(f"Argument `mass` must be positive, but is {self.mass}.")
+            # The rounding of a kink, by which laws divide.
+            refuse_not_positive(f"{entry.name}.width", getattr(entry, "width", 1.0))
+        refuse_not_positive("mass", self.mass)
 
     @property
     def internal_states(self) -> int:

@@ -19,8 +19,9 @@ from ..._quick_jit import quick_jit
 from ..._small_systems import solve
 from ..._types import Lanes
 from ...models import Integrator, Isolator, State
-from ..orbit import Sine, half_range, modulus, multipliers, trajectory, with_overtones
+from ..orbit import Sine, modulus, multipliers
 from ._map_method import Lane, MapMethod, kinks_between
+from ._sizes import motion_sizes
 from ._starts import Candidates, PlacedSurface, joined, read_surface
 from ._surface import Surface
 
@@ -155,18 +156,6 @@ def _newton_steps(
     return moved, phases, size, roots, modulus(roots[..., 0])
 
 
-@quick_jit
-def _sizes(model: Isolator, method: MapMethod, states: Array, push: Array, frequency: Array) -> Lanes:
-    turns = 0.5 if method.half else 1.0
-
-    def one(state: Array, push: Array, frequency: Array) -> Array:
-        drive = with_overtones(model, Sine(push[0], push[1], frequency))
-        path = trajectory(model, method.integrator, drive, tuple(state), turns=turns)
-        return half_range(model, drive, path, turns)
-
-    return jax.vmap(one)(states, push, frequency)
-
-
 @functools.partial(quick_jit, options=_WIDE)
 def surface_lanes(model: Isolator, surface: PlacedSurface, where: Any) -> Lane:
     """Give starts as the surface has them.
@@ -256,13 +245,8 @@ class CellSolver(eqx.Module):
         # Where orbits share no order of kinks the surface is rough, and an orbit may lie far from its start.
         push = np.asarray(self.surface.amplitudes)[candidates.force, None] * found.direction
         frequency = np.asarray(self.surface.frequencies)[candidates.frequency]
-        response = np.empty(found.response.shape)
-        for begin in range(0, response.size, CELLS_TOGETHER):
-            own = slice(begin, begin + CELLS_TOGETHER)
-            rows = [padded(values[own], CELLS_TOGETHER) for values in (found.states, push, frequency)]
-            sizes = _sizes(self.model, self.method, *jax.device_put(rows, self.sharding))
-            response[own] = np.asarray(sizes)[: response[own].size]
-        return found._replace(response=response)
+        sizes = motion_sizes(self.model, self.method, found.states, push, frequency, self.sharding)
+        return found._replace(response=sizes)
 
     def in_blocks(self, work: Callable[[slice], Found], count: int) -> Found:
         """Find orbits block by block, as many blocks at once as there are cores.

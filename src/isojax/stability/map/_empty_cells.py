@@ -1,4 +1,4 @@
-"""Empty cells of a map tried as single orbits: from their own start, then from the cells beside."""
+"""Empty cells of a map tried as single orbits: from their own starts, then from the cells beside."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
-from ..orbit import is_held, recorded_sine
+from ..orbit import is_held, recorded_sine, settled
 from ._batched_newton import (
     FOUND,
     NO_FURTHER_ORBIT,
@@ -35,6 +35,9 @@ _RETRIES = 8
 
 _SAME = 1e-5
 """Distance of two orbits, over their size, up to which they are one."""
+
+_REPEATED = 0.05
+"""The same for two readings off the surface, over the distance of the maxima from which they are read."""
 
 _STARTS_TOGETHER = 1024
 """Lanes of the compiled step from a start to t = 0, and of whether friction holds the mass."""
@@ -86,16 +89,19 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
 
     lost = lost_cells()
     found.code[lost[_are_held(model, window, candidates, lost)]] = STICKS
-    for attempt in range(1 + _RETRIES):
+    for attempt in range(2 + _RETRIES):
         lost = lost_cells()
-        if not lost.size or (attempt and not (found.code == FOUND).any()):
+        near = attempt > 1
+        if not lost.size or (near and not (found.code == FOUND).any()):
             break
-        beside = _beside(model, method, window, Cells(candidates, found, split), lost) if attempt else None
+        beside = _beside(model, method, window, Cells(candidates, found, split), lost) if near else None
         filled = 0
         for some in _blocks(lost.size):
             push = window.amplitudes[candidates.force[lost[some]]]
             rate = window.frequencies[candidates.frequency[lost[some]]]
             starts = None if beside is None else beside[some]
+            if attempt == 1:
+                starts = _settled_states(model, integrator, push, rate)
             got = single_orbits(model, integrator, half, push, rate, starts)
             good = got.code == FOUND
             own = lost[some][good]
@@ -107,7 +113,7 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
             split[own], filled = False, filled + own.size
             if not filled:
                 break
-        if attempt and not filled:
+        if near and not filled:
             break
     return Cells(candidates, found, split)
 
@@ -128,13 +134,11 @@ def without_repeats(
         The orbits, each once.
     """
     candidates, found, split = cells
-    good = found.code == FOUND
-    single = np.flatnonzero(good & ~split)
-    if not single.size:
-        return cells
-    # Orbits that are read off, or split alike, differ by how they are found.
     place = candidates.force.astype(int) * len(window.frequencies) + candidates.frequency
-    good = np.flatnonzero(good & np.isin(place, place[single]))
+    good = np.flatnonzero(found.code == FOUND)
+    good = good[np.bincount(place[good], minlength=1)[place[good]] > 1]
+    if not good.size:
+        return cells
     order = good[np.lexsort((found.response[good], place[good]))]
     size = found.response[order]
     close = (np.diff(place[order]) == 0) & (np.diff(size) <= _NEIGHBOURING * size[1:])
@@ -151,9 +155,31 @@ def without_repeats(
     gone = []
     for apart in range(1, int(lengths.max())):
         alike = run[:-apart] == run[apart:]
-        alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= _SAME * scale[apart:], axis=1)
+        # A motion of several maxima lies on the surface once for each of them: read off there, it is far more
+        # alike than they are. Two orbits next to a fold differ as much as their maxima.
+        one, other = order[:-apart], order[apart:]
+        turns = np.abs(found.states[one, 0] - found.states[other, 0]) / found.response[other]
+        both = split[one] & split[other]
+        allowed = np.where(both, np.maximum(_SAME, _REPEATED * turns), _SAME)
+        alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= allowed[:, None] * scale[apart:], axis=1)
         gone.append(np.maximum(order[:-apart], order[apart:])[alike])
     return Cells(candidates, blanked(found, np.concatenate(gone), NO_FURTHER_ORBIT), split)
+
+
+def _settled_states(
+    model: Isolator, integrator: Integrator, push: np.ndarray, rate: np.ndarray
+) -> Float[np.ndarray, "cell state"]:
+    """Give where motions from rest are after many periods."""
+    states = []
+    for begin in range(0, push.size, _TRIED):
+        own = [jnp.asarray(padded(axis[begin : begin + _TRIED], _TRIED)) for axis in (push, rate)]
+        states.append(np.asarray(_settled(model, integrator, *own))[: push[begin : begin + _TRIED].size])
+    return np.concatenate(states)
+
+
+@quick_jit
+def _settled(model: Isolator, integrator: Integrator, push: Array, rate: Array) -> Array:
+    return jax.vmap(lambda *drive: settled(model, integrator, *drive))(push, rate)
 
 
 def _are_held(

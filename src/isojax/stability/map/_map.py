@@ -41,11 +41,13 @@ from ._chance import find_chances, quasi_draws
 from ._chunks import claim_folder, fingerprint, run_chunks
 from ._empty_cells import Cells, fill_empty, without_repeats
 from ._map_error import sampled_error, steps_for, steps_needed
+from ._map_method import MapMethod
 from ._single_orbits import SingleOrbits
+from ._sizes import motion_sizes
 from ._sought import MapRun, Sought, seek
 from ._stability_map import StabilityMap
 from ._starts import Candidates, joined
-from ._surface import MapWindow, displacements
+from ._surface import MapWindow, Surface, displacements
 from ._window_steps import check_steps, window_integrator
 
 _READING_SHARE = 0.2
@@ -211,7 +213,8 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         run.progress("orbits over displacement and frequency found")
     if run.folder is not None:
         claim_folder(run.folder, fingerprint(model, integrator, forces, band, run.coexisting, run.chunk))
-    known, errors, unconfirmed = _known_cells(sought, window, run)
+    measuring = MapMethod(integrator, half, None, jnp.asarray(integrator.steps_a_period(model)))
+    known, errors, unconfirmed = _known_cells(model, measuring, sought, window, run)
     filled = fill_empty(model, integrator, half, window, known)
     candidates, found, split = without_repeats(model, integrator, half, window, filled)
     if np.sum(filled.found.code == FOUND) > np.sum(known.found.code == FOUND):
@@ -237,7 +240,9 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     return smap, sought
 
 
-def _known_cells(sought: Sought, window: MapWindow, run: MapRun) -> tuple[Cells, list[float], int]:
+def _known_cells(
+    model: Isolator, measuring: MapMethod, sought: Sought, window: MapWindow, run: MapRun
+) -> tuple[Cells, list[float], int]:
     """Give the orbits of all groups, the errors of these, and how many of a sample finer steps deny."""
     parts, errors, unconfirmed = [], [sought.reading_error] if sought.reads else [], 0
     for name, solver, candidates in sought.groups:
@@ -249,12 +254,33 @@ def _known_cells(sought: Sought, window: MapWindow, run: MapRun) -> tuple[Cells,
             unconfirmed += denied.size
         elif isinstance(solver, SingleOrbits):
             errors.append(solver.method.integrator.map_orbit_error)
+        if name in ("read", "split"):
+            part = _measured(model, measuring, sought.surface, window, candidates, part)
         parts.append(part)
     lists = [group.candidates for group in sought.groups]
     split = np.repeat(
         [group.name not in ("whole", "single") for group in sought.groups], [own.force.size for own in lists]
     )
     return Cells(joined(lists), joined(parts), split), errors, unconfirmed
+
+
+def _measured(
+    model: Isolator,
+    method: MapMethod,
+    surface: Surface,
+    window: MapWindow,
+    candidates: Candidates,
+    found: Found,
+) -> Found:
+    """Measure the motions of which the surface does not tell the size."""
+    some = np.flatnonzero((found.code == FOUND) & ~surface.sized[candidates.frequency, candidates.part])
+    if not some.size:
+        return found
+    push = window.amplitudes[candidates.force[some], None] * found.direction[some]
+    frequency = window.frequencies[candidates.frequency[some]]
+    response = np.array(found.response)
+    response[some] = motion_sizes(model, method, found.states[some], push, frequency)
+    return found._replace(response=response)
 
 
 def _endings() -> list[RESULTS]:

@@ -116,7 +116,7 @@ def single_orbits(
         half: whether symmetric orbits are closed over half a period.
         amplitude: of the drive of each [N, or m/s^2 for base excitation].
         frequency: of the drive of each [Hz].
-        starts: states at t = 0; the one-harmonic balance if omitted.
+        starts: states at t = 0; those of the one-harmonic balance if omitted.
 
     Returns:
         The orbits, each from t = 0 of its recorded drive, without phases of kinks.

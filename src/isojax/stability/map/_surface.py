@@ -18,13 +18,16 @@ from ..._quick_jit import quick_jit
 from ...models import Integrator, Isolator
 from ..orbit import answer_scale, balanced_motion, rest_displacement
 from ._forces import PARTS, Forces, forces_along
-from ._grids import REFINEMENTS, Grid, filled, first_grid, node_at
+from ._grids import GAIN, REFINEMENTS, Grid, filled, first_grid, node_at
 from ._nodes import node_responses
 from ._shared_kinks import AROUND
 from ._spline import spline_matrix, spline_pieces
 
 _FEW = 0.002
 """Share of the nodes whose orbits may be left to Newton's method."""
+
+_SIZED_TO = 1e-6
+"""Error of half the peak-to-peak displacement, over the largest from rest, up to which it is read off."""
 
 _LARGEST_RESPONSE = 2.0
 """Half the peak-to-peak displacement over the largest from rest, beyond which a motion did not close: it
@@ -72,6 +75,8 @@ class Surface(NamedTuple):
         sides: signs of the kinks between those that are passed.
         shared: whether the orbits of a part pass the kinks in this order.
         error: of multipliers read off, by the nodes that a coarser grid lacked; infinite where none can be.
+        sized: whether the peak-to-peak displacement can be read off: it bends where another of several
+            maxima becomes the largest.
     """
 
     rest: float
@@ -82,6 +87,7 @@ class Surface(NamedTuple):
     sides: Float[np.ndarray, "piece kink"]
     shared: Bool[np.ndarray, "frequency part"]
     error: Float[np.ndarray, "frequency part"]
+    sized: Bool[np.ndarray, "frequency part"]
 
     def at(self, column: int, places: Float[np.ndarray, " place"]) -> Float[np.ndarray, "table place"]:
         """Give the tables of one frequency.
@@ -232,6 +238,11 @@ def find_surface(
             break
     pieces = spline_pieces(grid.logarithms)
     tables = _with_responses(model, integrator, half, rest, grid)
+    every = 1 if grid.frequencies is window.frequencies else 2
+    fewer = spline_matrix(grid.frequencies[::every], grid.frequencies) @ (
+        tables[-1, ::every, ::2] @ spline_matrix(grid.logarithms[::2], grid.logarithms).T
+    )
+    rough = _around(np.abs(fewer - tables[-1]) / GAIN) > _SIZED_TO
     tables[:2] *= np.exp(grid.logarithms)
     count, columns = tables.shape[0], len(window.frequencies)
     basis = (tables @ pieces.to_basis.T).transpose(1, 0, 2).reshape(len(grid.frequencies), -1)
@@ -242,11 +253,12 @@ def find_surface(
     shared = kinks.shared[
         np.ix_(node_at(start.frequencies, window.frequencies), node_at(start.logarithms, parts))
     ]
-    error = _around(grid.error)[
-        np.ix_(node_at(grid.frequencies, window.frequencies), node_at(grid.logarithms, parts))
-    ]
-    error = np.where(shared, error, np.inf)
-    return Surface(rest, pieces.breaks, window.frequencies, polynomials, forces, kinks.sides, shared, error)
+    nodes = np.ix_(node_at(grid.frequencies, window.frequencies), node_at(grid.logarithms, parts))
+    error = np.where(shared, _around(grid.error)[nodes], np.inf)
+    sized = ~rough[nodes]
+    return Surface(
+        rest, pieces.breaks, window.frequencies, polynomials, forces, kinks.sides, shared, error, sized
+    )
 
 
 def _ends_needed(grid: Grid, window: MapWindow) -> tuple[float, float]:

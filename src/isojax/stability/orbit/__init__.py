@@ -43,6 +43,7 @@ from ._orbit import find_periodic_orbit as find_periodic_orbit
 from ._period_map import period_map as period_map
 from ._period_map import trajectory as trajectory
 from ._rests import rest_displacements as rest_displacements
+from ._settled import settled as settled
 from ._shooting import Accuracy as Accuracy
 from ._shooting import closing as closing
 from ._shooting import shoot as shoot

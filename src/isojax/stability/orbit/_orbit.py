@@ -28,6 +28,7 @@ from ._harmonic_balance import harmonic_balance
 from ._held import is_held
 from ._known_numbers import is_traced
 from ._period_map import split_trajectory
+from ._settled import settled
 from ._shooting import ShootingSolution, closing, shoot
 from ._shooting_method import ShootingMethod
 from ._sine import highest_order, integrator_for, need_fundamental, recorded_sine
@@ -217,8 +218,10 @@ def _sought(
             samples=max(128, 16 * order),
             integrator=method.integrator,
         )
-        if is_successful(balance.result):
-            solution = _shoot(model, drive, method, solver, balance.y0, places)
+        starts = [balance.y0] if is_successful(balance.result) else []
+        for start in (*starts, _settled(model, drive, method.integrator)):
+            if not solution.found:
+                solution = _shoot(model, drive, method, solver, start, places)
     return method, solution, jnp.asarray(stiff)
 
 
@@ -247,6 +250,11 @@ def _shoot(
         start = response_start(model, excitation.amplitude, excitation.frequency)
     drive = recorded_sine(model, excitation.amplitude, excitation.frequency)
     return shoot(model, method, solver, drive, start, places)
+
+
+@quick_jit
+def _settled(model: Isolator, drive: Harmonic, integrator: Integrator) -> Array:
+    return settled(model, integrator, jnp.asarray(drive.amplitude), jnp.asarray(drive.frequency))
 
 
 @quick_jit

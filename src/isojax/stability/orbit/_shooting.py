@@ -173,7 +173,8 @@ def shoot(
     last = jax.lax.while_loop(again, body, first)
     matrix = last.split.scale[:, None] * last.transition / last.split.scale[None, :]
     accurate = last.agrees & (last.error <= accuracy.limit)
-    found = jnp.isfinite(last.mismatch) & (last.mismatch < integrator.residual_tolerance)
+    # Where the search ran away no round was begun.
+    found = jnp.all(jnp.isfinite(last.state)) & (last.mismatch < integrator.residual_tolerance)
     if model.slides:
         # Held throughout, the mass may rest anywhere within the friction: that is no orbit of its own. On
         # the way to rest it may still creep to the first event.
