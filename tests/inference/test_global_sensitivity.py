@@ -148,3 +148,8 @@ def test_the_picture_has_two_bars_an_input_and_asks_for_one_entry():
     np.testing.assert_allclose(widths, [*found.first[::-1, 1], *found.total[::-1, 1]])
     with pytest.raises(ValueError, match="`index` must lead to one number"):
         ij.plot.global_sensitivity(found)
+
+
+def test_two_answers_of_a_quantity_are_two_columns():
+    both = ij.global_sensitivity(lambda x: (x["a"], x["a"] + x["b"]), CIRCLE, samples=64)
+    np.testing.assert_allclose(both.first, [[1.0, 0.5], [0.0, 0.5], [0.0, 0.0]], atol=0.1)

@@ -99,7 +99,7 @@ def test_one_record_shows_no_scatter(fit):
         ij.next_record(alone)
 
 
-@pytest.mark.parametrize("calibration", [-0.01, float("nan")])
+@pytest.mark.parametrize("calibration", [-0.01, float("nan"), 5.0])
 def test_a_calibration_is_a_share(fit, calibration):
-    with pytest.raises(ValueError, match=f"must be 0 or above, but is {calibration}"):
+    with pytest.raises(ValueError, match="`calibration` must be a share from 0 to below 1, but is "):
         ij.next_record(fit, calibration=calibration)

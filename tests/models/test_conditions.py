@@ -1,5 +1,6 @@
 """An isolator at a pressure: its dependence goes into plain coefficients, as linear response shows."""
 
+import math
 from types import SimpleNamespace
 
 import equinox as eqx
@@ -57,6 +58,12 @@ def test_each_coefficient_changes_by_its_share_and_one_that_is_absent_appears():
     assert eqx.tree_equal(MODEL.at(pressure=REFERENCE), ij.Isolator(MASS, LAWS))
 
 
+def test_a_stiffness_at_a_pressure_moves_with_its_slope():
+    moved = ij.sensitivity(lambda model: model.at(pressure=2.4e5)["k1"], MODEL)
+    assert float(moved.by("value", "pressure_stiffness.change")) == pytest.approx(0.2, rel=1e-12)
+    assert float(moved.by("value", "k1")) == pytest.approx(1.0, rel=1e-12)
+
+
 def test_the_force_in_a_record_is_that_of_the_isolator_at_its_pressure():
     model = ij.Isolator(
         MASS, (*LAWS, CubicStiffness(1e11), *FOLLOWERS, PressureCubicStiffness(4e10, REFERENCE))
@@ -104,7 +111,8 @@ def test_what_has_no_pressure_says_how_to_give_one(ask):
             {"pressure": 2e5, "temperature": 300.0},
             r"`temperature` must not be given.* follows pressure",
         ),
-        (MODEL, {"pressure": 0.0}, r"`pressure` must be positive, but is 0"),
+        (MODEL, {"pressure": 0.0}, r"`pressure` must be positive and finite, but is 0"),
+        (MODEL, {"pressure": math.inf}, r"`pressure` must be positive and finite, but is inf"),
         (MODEL, {"pressure": [2e5, 3e5]}, r"`pressure` must be one real number, but has shape \(2,\)"),
         (MODEL, {"pressure": "2 bar"}, r"`pressure` must be one real number, but is '2 bar'"),
         (ij.Isolator(MASS, LAWS), {"pressure": 2e5}, r"`pressure` must not be given.* follows nothing"),

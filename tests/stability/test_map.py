@@ -234,6 +234,11 @@ def test_the_size_of_the_chunks_changes_no_number():
             "Argument `frequencies` must ascend, but frequencies[1] = 4.0 follows 4.0.",
         ),
         ({"frequencies": [np.nan]}, "Argument `frequencies` must be positive, but frequencies[0] = nan."),
+        (
+            {"amplitudes": ["1", "2"]},
+            "Argument `amplitudes` must be a list of real numbers, but is ['1', '2'].",
+        ),
+        ({"amplitudes": [True]}, "Argument `amplitudes` must be a list of real numbers, but is [True]."),
         ({"amplitudes": ["a"]}, "Argument `amplitudes` must be a list of real numbers, but is ['a']."),
         ({"amplitudes": [1j]}, "Argument `amplitudes` must be a list of real numbers, but is [1j]."),
         (

@@ -171,7 +171,8 @@ def global_sensitivity(
     def at(numbers: Float[Array, " input"]) -> tuple[Array, RESULTS | None]:
         own = {name: numbers[place] for place, name in enumerate(names)}
         answer = quantity(own if model is None else _moved(model, own))
-        value, result = answer if isinstance(answer, tuple) else (answer, None)
+        told = isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], RESULTS)
+        value, result = answer if told else (answer, None)
         return as_numbers("quantity", value), result
 
     (values, result), raised = evaluate(at, flat, progress)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from .._given_numbers import given_number
 from .._parameters import list_parameters
 from .._results import RESULTS, is_successful
 from .._show import Row, shown
@@ -70,7 +71,7 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
 
     Raises:
         ValueError: if the fit failed, a single record shows no scatter of the stiffness, `calibration` is
-            negative or not finite, or is given under base excitation.
+            no share from 0 to below 1, or is given under base excitation.
 
     Source: Gelman et al. 2013, Bayesian Data Analysis, sec. 5.4 (prediction for a further group).
 
@@ -84,8 +85,9 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
     held = fit if isinstance(fit, SavedFit) else as_fit(fit)
     if not is_successful(held.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[held.result]}")
-    if not (np.isfinite(calibration) and calibration >= 0.0):
-        raise ValueError(f"Argument `calibration` must be 0 or above, but is {calibration}.")
+    calibration = given_number(
+        "calibration", calibration, "be a share from 0 to below 1", lambda share: 0.0 <= share < 1.0
+    )
     model, listed = held.model, list_parameters(held.model)
     if calibration and model.excitation != "force":
         raise ValueError(

@@ -1,5 +1,6 @@
 """Coefficients that follow an operating condition, such as the chamber pressure, at given values of it."""
 
+import math
 from collections.abc import Mapping
 from typing import cast
 
@@ -39,8 +40,8 @@ def plain_elements(
             followed = " and ".join(known) if known else "nothing"
             raise ValueError(f"Argument `{name}` must not be given: the model follows {followed}.")
         one = given_scalar(name, value)
-        if not isinstance(one, Tracer) and not one > 0.0:
-            raise ValueError(f"Argument `{name}` must be positive, but is {value}.")
+        if not isinstance(one, Tracer) and not 0.0 < one < math.inf:
+            raise ValueError(f"Argument `{name}` must be positive and finite, but is {value}.")
     for name in known:
         if name not in conditions:
             raise ValueError(f"Argument `{name}` must be given: a coefficient of the model follows it.")

@@ -159,4 +159,4 @@ def as_subject(what: object, model: Isolator | None) -> Subject:
             "Argument `subject` must be an orbit, a map, a special point, a resonance or a function of an "
             f"isolator, but is of type {type(what).__name__}."
         )
-    return _of_function(cast("Any", what), as_isolator(model))
+    return _of_function(cast("Any", what), as_isolator(model, recorded=True))

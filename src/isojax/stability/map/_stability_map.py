@@ -48,7 +48,8 @@ class StabilityMap(eqx.Module):
         split: whether an orbit was split there; else it was integrated with four times the steps.
         response: half the peak-to-peak displacement [m].
         count: orbits found in each cell.
-        result: how the search ended in each cell, in words: `smap.result[i, j]`; beside NaN, why.
+        result: how the search ended in each cell, in words: `smap.result[i, j]`, of all orbits
+            `smap.result[k, i, j]`; beside NaN, why.
         error: of a multiplier at most, from a sample of cells against steps three times finer; of `response`
             and the states it says nothing.
         unconfirmed: orbits of this sample that finer steps did not find. They are left out, as not accurate;

@@ -29,7 +29,10 @@ def ascending(name: str, values: Any, *, positive: bool = True) -> Float[np.ndar
             f"np.linspace({first}, {last}, 100), for these two values [{first}, {last}]."
         )
     try:
-        axis = np.asarray(values, dtype=float)
+        given = np.asarray(values)
+        if given.dtype.kind in "bUSc":
+            raise TypeError(f"{given.dtype} is no number")
+        axis = np.asarray(given, dtype=float)
     except (TypeError, ValueError) as problem:
         raise ValueError(f"Argument `{name}` must be a list of real numbers, but is {values!r}.") from problem
     if axis.ndim != 1 or not axis.size:
