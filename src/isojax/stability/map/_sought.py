@@ -79,7 +79,8 @@ class Sought(NamedTuple):
             column, part = candidates.frequency, candidates.part
             error = self.surface.error[column, part]
             enough = np.maximum(_KNOWN_TO, _KNOWN_SHARE * self.surface.distance(column, part))
-            columns[column[error > enough]] = False
+            # Where the size of a motion cannot be read off it has several maxima, and as many places there.
+            columns[column[(error > enough) | ~self.surface.sized[column, part]]] = False
         return columns
 
     def with_steps(self, steps: int) -> "Sought":
