@@ -245,6 +245,14 @@ def test_the_size_of_the_chunks_changes_no_number():
             {"model": paper.y_direction().replace(mass=math.nan)},
             "Argument `model` must hold finite numbers, but mass is nan.",
         ),
+        *(
+            (
+                {"devices": given},
+                "Argument `devices` must list devices of JAX, such as jax.local_devices()[:1], "
+                f"but is {given!r}.",
+            )
+            for given in ([], "cpu", 3)
+        ),
         ({"chunk": 0}, "Argument `chunk` must be a positive count, but is 0."),
     ],
 )

@@ -139,6 +139,14 @@ def stability_map(
     carried = None if fit is None else coefficient_errors(fit, model)
     forces, band = ascending("amplitudes", amplitudes), ascending("frequencies", frequencies)
     chunk = given_count("chunk", chunk)
+    if coexisting not in (True, False):
+        raise ValueError(f"Argument `coexisting` must be True or False, but is {coexisting!r}.")
+    given = np.ravel(np.asarray(jax.local_devices() if devices is None else devices, dtype=object))
+    if not given.size or not all(isinstance(one, jax.Device) for one in given):
+        raise ValueError(
+            "Argument `devices` must list devices of JAX, such as jax.local_devices()[:1], "
+            f"but is {devices!r}."
+        )
     window = MapWindow(forces, band)
     if integrator is not None:
         check_steps(model, integrator, window)

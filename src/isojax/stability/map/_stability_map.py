@@ -209,7 +209,7 @@ def incomplete_words(smap: StabilityMap) -> str:
     """Say how many cells lack an orbit for sure."""
     return (
         f"{np.sum(smap.incomplete)} cells hold an even number of orbits: folds come in pairs, so one is "
-        "missing"
+        "missing or counted twice"
     )
 
 
