@@ -89,18 +89,23 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
 
     lost = lost_cells()
     found.code[lost[_are_held(model, window, candidates, lost)]] = STICKS
-    for attempt in range(2 + _RETRIES):
+    spreading = ("beside",) * _RETRIES
+    spread = False
+    for way in ("balance", *spreading, "settled", *spreading):
         lost = lost_cells()
-        near = attempt > 1
-        if not lost.size or (near and not (found.code == FOUND).any()):
+        if not lost.size:
             break
-        beside = _beside(model, method, window, Cells(candidates, found, split), lost) if near else None
+        if way == "beside" and (spread or not (found.code == FOUND).any()):
+            continue
+        beside = None
+        if way == "beside":
+            beside = _beside(model, method, window, Cells(candidates, found, split), lost)
         filled = 0
         for some in _blocks(lost.size):
             push = window.amplitudes[candidates.force[lost[some]]]
             rate = window.frequencies[candidates.frequency[lost[some]]]
             starts = None if beside is None else beside[some]
-            if attempt == 1:
+            if way == "settled":
                 starts = _settled_states(model, integrator, push, rate)
             got = single_orbits(model, integrator, half, push, rate, starts)
             good = got.code == FOUND
@@ -113,8 +118,7 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
             split[own], filled = False, filled + own.size
             if not filled:
                 break
-        if near and not filled:
-            break
+        spread = way != "balance" and not filled
     return Cells(candidates, found, split)
 
 
