@@ -36,7 +36,7 @@ _RETRIES = 8
 _SAME = 1e-5
 """Distance of two orbits, over their size, up to which they are one."""
 
-_REPEATED = 0.05
+_READ_TWICE = 0.05
 """The same for two readings off the surface, over the distance of the maxima from which they are read."""
 
 _STARTS_TOGETHER = 1024
@@ -164,7 +164,7 @@ def without_repeats(
         one, other = order[:-apart], order[apart:]
         turns = np.abs(found.states[one, 0] - found.states[other, 0]) / found.response[other]
         both = split[one] & split[other]
-        allowed = np.where(both, np.maximum(_SAME, _REPEATED * turns), _SAME)
+        allowed = np.where(both, np.maximum(_SAME, _READ_TWICE * turns), _SAME)
         alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= allowed[:, None] * scale[apart:], axis=1)
         gone.append(np.maximum(order[:-apart], order[apart:])[alike])
     return Cells(candidates, blanked(found, np.concatenate(gone), NO_FURTHER_ORBIT), split)

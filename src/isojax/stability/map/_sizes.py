@@ -11,7 +11,7 @@ from ...models import Isolator
 from ..orbit import Sine, half_range, trajectory, with_overtones
 from ._map_method import MapMethod
 
-_TOGETHER = 1024
+_MEASURED_TOGETHER = 1024
 """Lanes of the compiled measurement."""
 
 
@@ -37,11 +37,13 @@ def motion_sizes(
         The sizes [m].
     """
     sizes = np.empty(frequency.shape)
-    for begin in range(0, sizes.size, _TOGETHER):
-        own = slice(begin, begin + _TOGETHER)
+    for begin in range(0, sizes.size, _MEASURED_TOGETHER):
+        own = slice(begin, begin + _MEASURED_TOGETHER)
         count = sizes[own].size
         rows = [values[own] for values in (states, drive, frequency)]
-        rows = [np.concatenate([row, np.repeat(row[-1:], _TOGETHER - count, axis=0)]) for row in rows]
+        rows = [
+            np.concatenate([row, np.repeat(row[-1:], _MEASURED_TOGETHER - count, axis=0)]) for row in rows
+        ]
         sizes[own] = np.asarray(_sizes(model, method, *jax.device_put(rows, sharding)))[:count]
     return sizes
 

@@ -24,7 +24,7 @@ _OF_EACH_ORBIT = ("spectral_radius", "multipliers", "start", "direction", "phase
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
 
-_BESIDE = 100.0
+_RESTS_WITHIN = 100.0
 """Distance up to which other rests are looked for, over the largest motion of a map."""
 
 
@@ -107,7 +107,7 @@ class StabilityMap(eqx.Module):
         """
         size = float(np.nanmax(np.asarray(self.response), initial=0.0))
         own = displacement_at_rest(self.model, self.symmetric)
-        rests = rest_displacements(self.model, abs(own) + _BESIDE * size)
+        rests = rest_displacements(self.model, abs(own) + _RESTS_WITHIN * size)
         if not rests.size:
             return rests
         return np.delete(rests, np.argmin(np.abs(rests - own)))

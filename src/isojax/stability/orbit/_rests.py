@@ -8,10 +8,10 @@ from jaxtyping import Array, Float
 from ..._quick_jit import quick_jit
 from ...models import Instant, Isolator
 
-_TRIED = 2000
+_RESTS_TRIED = 2000
 """Displacements to either side between which a balance of the static forces is looked for."""
 
-_SMALLEST = 1e-6
+_NEAREST_REST = 1e-6
 """Smallest of them over the largest."""
 
 
@@ -25,7 +25,7 @@ def rest_displacements(model: Isolator, within: float) -> Float[np.ndarray, " re
     Returns:
         The displacements, ascending [m]; two closer than a half per cent may be missed.
     """
-    side = within * np.geomspace(_SMALLEST, 1.0, _TRIED)
+    side = within * np.geomspace(_NEAREST_REST, 1.0, _RESTS_TRIED)
     places = np.concatenate([-side[::-1], side])
     push = np.asarray(_static_accelerations(model, jnp.asarray(places)))
     before = np.flatnonzero((push[:-1] > 0.0) != (push[1:] > 0.0))

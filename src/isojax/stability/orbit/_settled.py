@@ -8,7 +8,7 @@ from ._describing_function import rest_displacement
 from ._period_map import period_map
 from ._sine import recorded_sine
 
-_PERIODS = 200.0
+_SETTLED_AFTER = 200.0
 """Drive periods a motion is given: with a quality factor of a hundred it is then at its orbit to 0.2 %."""
 
 
@@ -29,4 +29,4 @@ def settled(
     still = jnp.zeros(())
     start = (rest_displacement(model), *(still,) * (1 + model.internal_states))
     drive = recorded_sine(model, amplitude, frequency)
-    return jnp.stack(period_map(model, integrator, drive, start, turns=_PERIODS))
+    return jnp.stack(period_map(model, integrator, drive, start, turns=_SETTLED_AFTER))
