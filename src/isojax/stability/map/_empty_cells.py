@@ -164,7 +164,7 @@ def without_repeats(
         one, other = order[:-apart], order[apart:]
         turns = np.abs(found.states[one, 0] - found.states[other, 0]) / found.response[other]
         both = split[one] & split[other]
-        allowed = np.where(both, np.maximum(_SAME, _READ_TWICE * turns), _SAME)
+        allowed = np.where(both, _READ_TWICE * turns, _SAME)
         alike &= np.all(np.abs(states[:-apart] - states[apart:]) <= allowed[:, None] * scale[apart:], axis=1)
         gone.append(np.maximum(order[:-apart], order[apart:])[alike])
     return Cells(candidates, blanked(found, np.concatenate(gone), NO_FURTHER_ORBIT), split)

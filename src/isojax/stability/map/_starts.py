@@ -12,7 +12,7 @@ from ._forces import PARTS
 from ._surface import Surface
 
 _POLISHING = 2
-"""Steps of Newton's method on the polynomial of a piece, after the parabola of a part."""
+"""Steps on the polynomial of a piece, after the parabola of a part."""
 
 
 class ReadOrbits(NamedTuple):
@@ -203,6 +203,19 @@ def read_surface(
             total = total * at + power * own[power]
         return total
 
+    def curvature(own: list[Array], at: Array) -> Array:
+        total = (powers - 1) * (powers - 2) * own[-1]
+        for power in range(powers - 2, 1, -1):
+            total = total * at + power * (power - 1) * own[power]
+        return total
+
+    def passed_to_root(gap: Array, steep: Array, bend: Array) -> Array:
+        """Give how far the root of a parabola lies at which it rises or falls as the leg does."""
+        root = jnp.where(rises, 1.0, -1.0) * jnp.sqrt(jnp.maximum(steep * steep - 2.0 * bend * gap, 0.0))
+        same = steep * root >= 0.0
+        over = jnp.where(same, steep + root, bend)
+        return jnp.where(same, -2.0 * gap, root - steep) / jnp.where(over == 0.0, 1.0, over)
+
     drive = own[:2]
 
     def square(at: Array) -> Array:
@@ -210,17 +223,15 @@ def read_surface(
 
     # The parabola through both ends and the middle of the part: which of its roots is known by the slope.
     left, middle, right = (square(share + k / PARTS) - push * push for k in (0.0, 0.5, 1.0))
-    bend, rise = 2.0 * (left + right - 2.0 * middle), 4.0 * middle - 3.0 * left - right
-    root = jnp.where(rises, 1.0, -1.0) * jnp.sqrt(jnp.maximum(rise * rise - 4.0 * bend * left, 0.0))
-    same = rise * root >= 0.0
-    over = jnp.where(same, rise + root, 2.0 * bend)
-    passed = jnp.where(same, -2.0 * left, root - rise) / jnp.where(over == 0.0, 1.0, over)
-    at = share + jnp.clip(passed, 0.0, 1.0) / PARTS
+    bend, rise = 4.0 * (left + right - 2.0 * middle), 4.0 * middle - 3.0 * left - right
+    at = share + jnp.clip(passed_to_root(left, rise, bend), 0.0, 1.0) / PARTS
     for _ in range(_POLISHING):
-        parts = [(value(one, at), slope(one, at)) for one in drive]
-        steep = 2.0 * (parts[0][0] * parts[0][1] + parts[1][0] * parts[1][1])
+        # Steps of second order: next to a fold those of Newton's method would lead both legs to one root.
+        parts = [(value(one, at), slope(one, at), curvature(one, at)) for one in drive]
         gap = parts[0][0] ** 2 + parts[1][0] ** 2 - push * push
-        at = jnp.clip(at - gap / jnp.where(steep == 0.0, 1.0, steep), share, share + 1.0 / PARTS)
+        steep = 2.0 * (parts[0][0] * parts[0][1] + parts[1][0] * parts[1][1])
+        bends = [2.0 * (own[1] ** 2 + own[0] * own[2]) for own in parts]
+        at = jnp.clip(at + passed_to_root(gap, steep, bends[0] + bends[1]), share, share + 1.0 / PARTS)
     size = jnp.exp(begin + at * (end - begin))
     sine, cosine = (value(one, at) for one in drive)
     internal = tuple(value(own[table], at) * size for table in range(2, states))
