@@ -25,7 +25,14 @@ from ...models import (
     as_isolator,
     coefficient_errors,
 )
-from ..orbit import ascending, fewest_steps, integrator_for, is_odd, refuse_transformed
+from ..orbit import (
+    ascending,
+    fewest_steps,
+    integrator_for,
+    is_odd,
+    refuse_transformed,
+    rest_displacements,
+)
 from ._batched_newton import (
     FOUND,
     NO_FURTHER_ORBIT,
@@ -47,7 +54,7 @@ from ._sizes import motion_sizes
 from ._sought import MapRun, Sought, seek
 from ._stability_map import StabilityMap
 from ._starts import Candidates, joined
-from ._surface import MapWindow, Surface, displacements
+from ._surface import MapWindow, Surface, displacement_at_rest, displacements
 from ._window_steps import check_steps, window_integrator
 
 _READING_SHARE = 0.2
@@ -69,6 +76,10 @@ _INSTEAD_OF_AXES = (
     "again for any drive under jax.jit, jax.vmap, jax.jacfwd and jax.grad."
 )
 """What to use where JAX transforms the drive of a map."""
+
+
+_RESTS_WITHIN = 100.0
+"""Distance up to which other rests are looked for, over the largest motion of a map."""
 
 
 def stability_map(
@@ -243,9 +254,19 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         sides=jnp.asarray(sought.surface.sides),
         symmetric=half,
         integrator=integrator,
+        other_rests=_other_rests(model, displacement_at_rest(model, half), arrays["response"]),
         **fields,
     )
     return smap, sought
+
+
+def _other_rests(
+    model: Isolator, rest: float, response: Float[np.ndarray, "*orbit force frequency"]
+) -> Float[np.ndarray, " rest"]:
+    """Give where the mass also rests without a drive, within some times the largest motion."""
+    size = float(np.nanmax(response, initial=0.0))
+    rests = rest_displacements(model, abs(rest) + _RESTS_WITHIN * size)
+    return np.delete(rests, np.argmin(np.abs(rests - rest))) if rests.size else rests
 
 
 def _known_cells(

@@ -12,20 +12,16 @@ from jaxtyping import Array, Bool, Complex, Float, Int
 from ..._results import RESULTS, cell_results
 from ..._show import number, shown
 from ...models import Integrator, Isolator
-from ..orbit import Sine, rest_displacements
+from ..orbit import Sine
 from ._chance import chance_words
 from ._map_method import Lane, MapMethod
 from ._states_at_zero import states_at_zero
-from ._surface import displacement_at_rest
 
 _OF_EACH_ORBIT = ("spectral_radius", "multipliers", "start", "direction", "phases", "split", "response")
 """Fields with an axis `orbit` where coexisting orbits are sought."""
 
 _ROWS, _COLUMNS = 12, 60
 """Size of the map in characters."""
-
-_RESTS_WITHIN = 100.0
-"""Distance up to which other rests are looked for, over the largest motion of a map."""
 
 
 @shown
@@ -63,6 +59,8 @@ class StabilityMap(eqx.Module):
             orbits may appear or vanish.
         chance_error: of a chance near a half, at most, on average over the map, where a fit was given: what a
             map of one draw of all coefficients shows. Where it is large, map drawn models and count.
+        other_rests: where else the mass rests without a drive, within a hundred times the largest motion [m].
+            The orbits are those about the rest next to zero, others only where no such orbit was found.
     """
 
     model: Isolator
@@ -86,6 +84,7 @@ class StabilityMap(eqx.Module):
     probability_coexisting: Float[Array, "amplitude frequency"] | None = None
     standard_errors: Mapping[str, Float[Array, "*orbit amplitude frequency"]] | None = None
     chance_error: float | None = None
+    other_rests: Float[np.ndarray, " rest"] = eqx.field(default_factory=lambda: np.zeros(0))
 
     @property
     def stable(self) -> Array:
@@ -97,20 +96,6 @@ class StabilityMap(eqx.Module):
         """Whether a cell of a map of all orbits lacks one: folds come in pairs, so their count is odd."""
         count = np.asarray(self.count)
         return self._all_sought & (count > 0) & (count % 2 == 0)
-
-    @property
-    def other_rests(self) -> Float[np.ndarray, " rest"]:
-        """Where else the mass rests without a drive, within a hundred times the largest motion [m].
-
-        A map holds the orbits about the rest next to zero; those about others only where no such orbit was
-        found.
-        """
-        size = float(np.nanmax(np.asarray(self.response), initial=0.0))
-        own = displacement_at_rest(self.model, self.symmetric)
-        rests = rest_displacements(self.model, abs(own) + _RESTS_WITHIN * size)
-        if not rests.size:
-            return rests
-        return np.delete(rests, np.argmin(np.abs(rests - own)))
 
     @property
     def y0(self) -> Float[Array, "*orbit amplitude frequency state"]:
