@@ -54,6 +54,18 @@ def after_a_period(plant: rig.Plant, amplitude: float, frequency: float, y0: np.
     Returns:
         The state.
     """
+    start, size, state, coefficients, _, _ = _steps_of_a_period(plant, amplitude, frequency, y0)[-1]
+    return np.asarray(state) + np.asarray(coefficients)[:, 0] * (1.0 / frequency - start) / size
+
+
+def displacements_of_a_period(
+    plant: rig.Plant, amplitude: float, frequency: float, y0: np.ndarray
+) -> np.ndarray:
+    """Give the displacement at the beginning of each step of a drive period; see `after_a_period`."""
+    return np.array([step[2][0] for step in _steps_of_a_period(plant, amplitude, frequency, y0)])
+
+
+def _steps_of_a_period(plant: rig.Plant, amplitude: float, frequency: float, y0: np.ndarray) -> list:
     period = 1.0 / frequency
     drive: Sequence[ForcePiece] = [
         rig.Tones(0.0, period, 0.0, (amplitude,), (2.0 * math.pi * frequency,), (0.0,))
@@ -62,9 +74,7 @@ def after_a_period(plant: rig.Plant, amplitude: float, frequency: float, y0: np.
         drive = instrument.acting(drive, frequency)
     integrator = PlantIntegrator(EquationOfMotion(plant), TOLERANCE)
     integrator._largest[:] = np.maximum(np.abs(y0), 1e-3 * np.abs(y0).max() * _units(y0, frequency))
-    path = integrator.run(drive, y0)
-    start, size, state, coefficients, _, _ = path._steps[-1]
-    return np.asarray(state) + np.asarray(coefficients)[:, 0] * (period - start) / size
+    return integrator.run(drive, y0)._steps
 
 
 def _units(y0: np.ndarray, frequency: float) -> np.ndarray:

@@ -245,7 +245,7 @@ class CellSolver(eqx.Module):
         # Where orbits share no order of kinks the surface is rough, and an orbit may lie far from its start.
         push = np.asarray(self.surface.amplitudes)[candidates.force, None] * found.direction
         frequency = np.asarray(self.surface.frequencies)[candidates.frequency]
-        sizes = motion_sizes(self.model, self.method, found.states, push, frequency, self.sharding)
+        sizes = motion_sizes(self.model, self.method, found.states, push, frequency)
         return found._replace(response=sizes)
 
     def in_blocks(self, work: Callable[[slice], Found], count: int) -> Found:

@@ -22,6 +22,7 @@ from ._batched_newton import (
 )
 from ._map_error import lanes_of
 from ._map_method import MapMethod
+from ._nodes import in_blocks
 from ._single_orbits import single_orbits
 from ._starts import Candidates, joined
 from ._states_at_zero import states_at_zero
@@ -40,7 +41,7 @@ _READ_TWICE = 0.05
 """The same for two readings off the surface, over the distance of the maxima from which they are read."""
 
 _STARTS_TOGETHER = 1024
-"""Lanes of the compiled step from a start to t = 0, and of whether friction holds the mass."""
+"""Lanes of the compiled step from a start to t = 0."""
 
 _NEIGHBOURING = 1e-3
 """Relative difference of the sizes of two motions up to which they are looked at as one."""
@@ -88,7 +89,9 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
         return np.flatnonzero(~full[place] & (candidates.order == 0) & (found.code != STICKS))
 
     lost = lost_cells()
-    found.code[lost[_are_held(model, window, candidates, lost)]] = STICKS
+    if model.slides and lost.size:
+        push, rate = window.amplitudes[candidates.force[lost]], window.frequencies[candidates.frequency[lost]]
+        found.code[lost[in_blocks(lambda *drive: _held(model, *drive), push, rate)]] = STICKS
     spreading = ("beside",) * _RETRIES
     spread = False
     for way in ("balance", *spreading, "settled", *spreading):
@@ -106,7 +109,7 @@ def fill_empty(model: Isolator, integrator: Integrator, half: bool, window: MapW
             rate = window.frequencies[candidates.frequency[lost[some]]]
             starts = None if beside is None else beside[some]
             if way == "settled":
-                starts = _settled_states(model, integrator, push, rate)
+                starts = in_blocks(lambda *drive: _settled(model, integrator, *drive), push, rate)
             got = single_orbits(model, integrator, half, push, rate, starts)
             good = got.code == FOUND
             own = lost[some][good]
@@ -170,35 +173,9 @@ def without_repeats(
     return Cells(candidates, blanked(found, np.concatenate(gone), NO_FURTHER_ORBIT), split)
 
 
-def _settled_states(
-    model: Isolator, integrator: Integrator, push: np.ndarray, rate: np.ndarray
-) -> Float[np.ndarray, "cell state"]:
-    """Give where motions from rest are after many periods."""
-    states = []
-    for begin in range(0, push.size, _TRIED):
-        own = [jnp.asarray(padded(axis[begin : begin + _TRIED], _TRIED)) for axis in (push, rate)]
-        states.append(np.asarray(_settled(model, integrator, *own))[: push[begin : begin + _TRIED].size])
-    return np.concatenate(states)
-
-
 @quick_jit
 def _settled(model: Isolator, integrator: Integrator, push: Array, rate: Array) -> Array:
     return jax.vmap(lambda *drive: settled(model, integrator, *drive))(push, rate)
-
-
-def _are_held(
-    model: Isolator, window: MapWindow, candidates: Candidates, picked: Int[np.ndarray, " cell"]
-) -> Bool[np.ndarray, " cell"]:
-    """Say in which cells dry friction holds the mass."""
-    if not model.slides:
-        return np.zeros(picked.size, bool)
-    held = []
-    for begin in range(0, picked.size, _STARTS_TOGETHER):
-        block = picked[begin : begin + _STARTS_TOGETHER]
-        own = padded(block, _STARTS_TOGETHER)
-        push, rate = window.amplitudes[candidates.force[own]], window.frequencies[candidates.frequency[own]]
-        held.append(np.asarray(_held(model, jnp.asarray(push), jnp.asarray(rate)))[: block.size])
-    return np.concatenate([np.zeros(0, bool), *held])
 
 
 @quick_jit

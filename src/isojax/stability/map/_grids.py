@@ -61,6 +61,19 @@ class Grid(NamedTuple):
         )
         return rows @ (self.tables @ columns.T)
 
+    def from_fewer(self, band: Float[np.ndarray, " frequency"]) -> Float[np.ndarray, "table frequency node"]:
+        """Give the tables as read from every second node, whose distance from them tells the error.
+
+        At the frequencies of the map itself no spline is needed over them.
+
+        Args:
+            band: frequencies of the map [Hz].
+        """
+        every = 1 if self.frequencies is band else 2
+        axes = self.logarithms[::2], self.frequencies[::every]
+        fewer = Grid(*axes, self.tables[:, ::every, ::2], self.error)
+        return fewer.at(self.logarithms, self.frequencies)
+
 
 class FirstGrid(NamedTuple):
     """Orbits that are not split, from which those at closer nodes start.
@@ -96,8 +109,7 @@ class FirstGrid(NamedTuple):
         own = self.kinks.shared[
             np.ix_(node_at(self.grid.frequencies, nodes[1]), node_at(self.grid.logarithms, nodes[0]))
         ]
-        every = 1 if nodes[1] is self.frequencies else 2
-        return _closed_grid(model, self.method, self.rest, coarse, nodes, every, own)
+        return _closed_grid(model, self.method, self.rest, coarse, nodes, self.frequencies, own)
 
 
 def first_grid(
@@ -192,12 +204,12 @@ def _closed_grid(
     rest: float,
     coarse: Grid,
     nodes: tuple[np.ndarray, np.ndarray],
-    every: int,
+    band: Float[np.ndarray, " frequency"],
     shared: Bool[np.ndarray, "frequency node"],
 ) -> Grid:
     """Close the orbits at other nodes that share the order of kinks; the others stay as the grid has them.
 
-    The error is that of a spline through every second displacement, and every so many frequencies.
+    The error is that of a spline through every second node.
     """
     tables, error = coarse.at(*nodes), np.full(shared.shape, np.inf)
     if not shared.any():
@@ -208,10 +220,9 @@ def _closed_grid(
     closed[shared] = found.closed
     tables[:-1, closed] = np.concatenate([found.unknown, found.invariants], axis=1)[found.closed].T
     tables[-3:-1] = filled(np.where(closed, tables[-3:-1], np.nan))
-    # At the frequencies of the map itself no spline is needed over them.
-    fewer = Grid(nodes[0][::2], nodes[1][::every], tables[:, ::every, ::2], error)
+    fewer = Grid(*nodes, tables, error).from_fewer(band)
     gain = _KINK_GAIN if model.slides else GAIN
-    error[closed] = _reading_error(fewer.at(*nodes), tables, nodes[0], method.half)[closed] / gain
+    error[closed] = _reading_error(fewer, tables, nodes[0], method.half)[closed] / gain
     return Grid(*nodes, tables, error)
 
 

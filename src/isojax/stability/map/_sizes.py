@@ -2,7 +2,6 @@
 
 import jax
 import numpy as np
-from jax.sharding import NamedSharding
 from jaxtyping import Array, Float
 
 from ..._quick_jit import quick_jit
@@ -10,9 +9,7 @@ from ..._types import Lanes
 from ...models import Isolator
 from ..orbit import Sine, half_range, trajectory, with_overtones
 from ._map_method import MapMethod
-
-_MEASURED_TOGETHER = 1024
-"""Lanes of the compiled measurement."""
+from ._nodes import in_blocks
 
 
 def motion_sizes(
@@ -21,7 +18,6 @@ def motion_sizes(
     states: Float[np.ndarray, "orbit state"],
     drive: Float[np.ndarray, "orbit 2"],
     frequency: Float[np.ndarray, " orbit"],
-    sharding: NamedSharding | None = None,
 ) -> Float[np.ndarray, " orbit"]:
     """Give half the peak-to-peak displacement of orbits.
 
@@ -31,21 +27,11 @@ def motion_sizes(
         states: a state of each.
         drive: sine and cosine from there on [N, or m/s^2 for base excitation].
         frequency: [Hz].
-        sharding: how lanes are spread over devices.
 
     Returns:
         The sizes [m].
     """
-    sizes = np.empty(frequency.shape)
-    for begin in range(0, sizes.size, _MEASURED_TOGETHER):
-        own = slice(begin, begin + _MEASURED_TOGETHER)
-        count = sizes[own].size
-        rows = [values[own] for values in (states, drive, frequency)]
-        rows = [
-            np.concatenate([row, np.repeat(row[-1:], _MEASURED_TOGETHER - count, axis=0)]) for row in rows
-        ]
-        sizes[own] = np.asarray(_sizes(model, method, *jax.device_put(rows, sharding)))[:count]
-    return sizes
+    return in_blocks(lambda *rows: _sizes(model, method, *rows), states, drive, frequency)
 
 
 @quick_jit

@@ -238,11 +238,8 @@ def find_surface(
             break
     pieces = spline_pieces(grid.logarithms)
     tables = _with_responses(model, integrator, half, rest, grid)
-    every = 1 if grid.frequencies is window.frequencies else 2
-    fewer = spline_matrix(grid.frequencies[::every], grid.frequencies) @ (
-        tables[-1, ::every, ::2] @ spline_matrix(grid.logarithms[::2], grid.logarithms).T
-    )
-    rough = _around(np.abs(fewer - tables[-1]) / GAIN) > _SIZED_TO
+    fewer = grid._replace(tables=tables[-1:]).from_fewer(window.frequencies)
+    rough = _around(np.abs(fewer - tables[-1:])[0] / GAIN) > _SIZED_TO
     tables[:2] *= np.exp(grid.logarithms)
     count, columns = tables.shape[0], len(window.frequencies)
     basis = (tables @ pieces.to_basis.T).transpose(1, 0, 2).reshape(len(grid.frequencies), -1)

@@ -218,10 +218,11 @@ def _sought(
             samples=max(128, 16 * order),
             integrator=method.integrator,
         )
-        starts = [balance.y0] if is_successful(balance.result) else []
-        for start in (*starts, _settled(model, drive, method.integrator)):
-            if not solution.found:
-                solution = _shoot(model, drive, method, solver, start, places)
+        if is_successful(balance.result):
+            solution = _shoot(model, drive, method, solver, balance.y0, places)
+        if not solution.found:
+            start = _settled(model, drive, method.integrator)
+            solution = _shoot(model, drive, method, solver, start, places)
     return method, solution, jnp.asarray(stiff)
 
 
