@@ -61,7 +61,7 @@ class Grid(NamedTuple):
         )
         return rows @ (self.tables @ columns.T)
 
-    def from_fewer(self, band: Float[np.ndarray, " frequency"]) -> Float[np.ndarray, "table frequency node"]:
+    def from_fewer(self, band: Float[np.ndarray, " frequency"]) -> Float[np.ndarray, "table row node"]:
         """Give the tables as read from every second node, whose distance from them tells the error.
 
         At the frequencies of the map itself no spline is needed over them.
@@ -205,7 +205,7 @@ def _closed_grid(
     coarse: Grid,
     nodes: tuple[np.ndarray, np.ndarray],
     band: Float[np.ndarray, " frequency"],
-    shared: Bool[np.ndarray, "frequency node"],
+    shared: Bool[np.ndarray, "row node"],
 ) -> Grid:
     """Close the orbits at other nodes that share the order of kinks; the others stay as the grid has them.
 
