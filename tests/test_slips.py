@@ -129,6 +129,7 @@ def test_a_fit_comes_back_from_its_file(made, tmp_path):
     loaded = ij.load_fit(tmp_path / "fit.json")
     assert loaded.to_dict() == before.to_dict()
     np.testing.assert_array_equal(loaded.covariance, before.covariance)
+    np.testing.assert_array_equal(loaded.mixture.covariances, before.mixture.covariances)
     assert [float(one.value) for one in loaded.model.parameters] == [
         float(one.value) for one in before.model.parameters
     ]

@@ -40,10 +40,10 @@ def mean_of(readings, noise, spread, inflation=1.0):
     )
 
 
-def half_width(readings, noise, about, error_at=None):
+def half_width(readings, noise, about, error_at=None, level=0.95):
     """The same by quadrature: readings of a mean with the variance noise^2 + scatter^2 [all in UNIT].
 
-    `error_at` gives the standard error at a scatter; that of the mean if omitted.
+    `error_at` gives the standard error at a scatter; that of the mean if omitted. `level` is the chance.
     """
     readings, count = np.array(readings), len(readings)
     centre, squares = readings.mean(), np.sum((readings - readings.mean()) ** 2)
@@ -64,7 +64,7 @@ def half_width(readings, noise, about, error_at=None):
 
         return integral(inside) / integral(lambda _: 1.0)
 
-    return brentq(lambda width: held(width) - 0.95, 1e-3, 300.0)
+    return brentq(lambda width: held(width) - level, 1e-3, 300.0)
 
 
 @pytest.mark.parametrize("readings", [(-0.4, 0.5), (0.1, 0.12), (-3.0, 1.0, 2.5), (-0.2, 0.4, 0.1, -0.3)])
@@ -75,6 +75,20 @@ def test_the_interval_of_a_mean_is_that_of_quadrature(readings, spread):
     # The fit's own mean, alike at every scatter because the records weigh alike.
     expected = half_width(readings, noise, float(np.mean(readings)))
     assert norm.ppf(0.975) * error == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.8, 0.99, 0.999])
+@pytest.mark.parametrize("readings", [(-0.4, 0.5), (0.1, 0.12), (-3.0, 1.0, 2.5), (-0.2, 0.4, 0.1, -0.3)])
+def test_the_interval_of_a_mean_is_that_of_quadrature_at_other_confidences(readings, level):
+    noise = 0.2
+    law = mean_of(readings, noise, 1e-5).mixture
+    expected = half_width(readings, noise, float(np.mean(readings)), level=level)
+    assert law.half_width(np.ones(1), level) == pytest.approx(expected, rel=0.02)
+    draws = law.draw(
+        np.random.default_rng(1).random(40_000), np.random.default_rng(2).normal(size=(40_000, 1))
+    )
+    outside = np.mean(np.abs(draws) > expected)
+    assert outside == pytest.approx(1.0 - level, abs=5.0 * np.sqrt(level * (1.0 - level) / 40_000))
 
 
 @pytest.mark.parametrize("readings", [(-0.4, 0.5), (-3.0, 1.0, 2.5), (-0.2, 0.4, 0.1, -0.3)])
@@ -137,13 +151,19 @@ def test_the_likelihood_of_a_mean_is_that_of_quadrature(spread):
 def test_intervals_cover_where_the_scatter_is_drawn_from_its_prior(count):
     draw = np.random.default_rng(count)
     repeats, noise, inside, known = 800, 0.2, 0, 0
+    levels = np.array([0.5, 0.8, 0.99])
+    held = np.zeros(levels.size)
     for scatter in halfcauchy.rvs(scale=PRIOR / UNIT, size=repeats, random_state=draw):
         readings = tuple(draw.normal(size=count) * np.hypot(noise, scatter))
-        error = float(mean_of(readings, noise, 1e-5).standard_error[0])
+        found = mean_of(readings, noise, 1e-5)
+        error = float(found.standard_error[0])
+        held += abs(np.mean(readings)) < found.mixture.half_width(np.ones((3, 1)), levels)
         inside += abs(np.mean(readings)) < norm.ppf(0.975) * error
         moments = np.sqrt(np.maximum(np.var(readings, ddof=1), noise**2) / count)
         known += abs(np.mean(readings)) < norm.ppf(0.975) * moments
     assert inside / repeats == pytest.approx(0.95, abs=0.023)
+    np.testing.assert_allclose(held / repeats, levels, atol=3.0 * np.sqrt(0.25 / repeats))
+    assert held[2] / repeats == pytest.approx(0.99, abs=0.0105)
     # An estimate of the scatter taken as known covers less.
     assert known < inside
 

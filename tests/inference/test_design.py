@@ -29,6 +29,7 @@ class Uncertain(NamedTuple):
     free: tuple[str, ...]
     covariance: np.ndarray
     result: ij.RESULTS = ij.RESULTS.successful
+    mixture: ij.models.NormalMixture | None = None
 
 
 def test_the_stiffest_spring_that_keeps_the_motion_small_is_that_of_the_closed_form():
@@ -201,6 +202,18 @@ def test_a_chance_is_kept_by_the_error_of_the_fit_which_grows_with_the_coefficie
     assert found.values[0] == pytest.approx(1e6 / (1.0 - 0.05 * norm.ppf(0.99)), rel=1e-5)
     assert found.outcomes[0].bound[0] == pytest.approx(1e6, rel=1e-5)
     assert "with a chance of 0.99" in repr(found)
+    # A tenth of the weight with a deviation three times as large: as wide at 95 %, wider at 98 %.
+    weights, share = np.array([0.9, 0.1]), np.array([1.0, 3.0])
+
+    def width(level):
+        return brentq(lambda x: weights @ (2.0 * norm.cdf(x / share) - 1.0) - level, 0.0, 40.0)
+
+    parts = np.square(share * norm.ppf(0.975) / width(0.95))[:, None, None] * fit.covariance
+    few = fit._replace(mixture=ij.models.NormalMixture(weights, np.zeros((2, 2)), parts, np.zeros(2)))
+    found = ij.design(MODEL, stiffness, limit, free=WIDE, fit=few, scan=8)
+    room = 0.05 * norm.ppf(0.975) * width(0.98) / width(0.95)
+    assert room > 1.1 * 0.05 * norm.ppf(0.99)
+    assert found.values[0] == pytest.approx(1e6 / (1.0 - room), rel=1e-5)
     with pytest.raises(ValueError, match="`fit` must be given"):
         ij.design(MODEL, stiffness, limit, free=WIDE)
 

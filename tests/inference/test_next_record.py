@@ -6,6 +6,8 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import norm
 
 import isojax as ij
 from isojax._cli import main
@@ -33,6 +35,21 @@ def test_the_stiffness_of_a_further_record_deviates_by_its_scatter(fit):
     assert found.scatter > fit.stats.stiffness_scatter
     others = [name for name in fit.free if name != STIFFNESS]
     assert [variance_of(found, name) for name in others] == [variance_of(fit, name) for name in others]
+
+
+def test_intervals_of_any_confidence_are_those_of_the_scatters_that_the_records_allow(fit):
+    law, found = fit.mixture, ij.next_record(fit)
+    place, value = fit.free.index(STIFFNESS), float(fit.model[STIFFNESS])
+    spread = np.sqrt(law.covariances[:, place, place] + (law.scatters * value) ** 2)
+
+    def beyond(width, level):
+        sides = [norm.sf(width, sign * law.means[:, place], spread) for sign in (1.0, -1.0)]
+        return float(law.weights @ (sides[0] + sides[1])) - (1.0 - level)
+
+    for level in (0.8, 0.95, 0.99):
+        answer = ij.uncertainty(found, lambda model: model[STIFFNESS], confidence=level)
+        exact = brentq(beyond, 0.0, 0.5 * value, args=(level,))
+        np.testing.assert_allclose(answer.interval - value, [-exact, exact], rtol=0.03)
 
 
 def test_a_force_known_to_a_per_cent_is_a_linear_amplitude_known_to_a_per_cent(fit):

@@ -29,7 +29,7 @@ def wide(fit, tmp_path_factory):
     covariance = np.zeros_like(saved.covariance)
     place = saved.free.index(STIFFNESS)
     covariance[place, place] = (0.1 * float(saved.model[STIFFNESS])) ** 2
-    return saved._replace(covariance=covariance)
+    return saved._replace(covariance=covariance, mixture=None)
 
 
 def test_of_a_linear_quantity_the_error_is_that_of_the_covariance(fit):
@@ -55,6 +55,33 @@ def test_of_a_curved_quantity_the_interval_is_that_of_its_distribution(wide):
     spread = np.exp(8.0 + 0.32) * np.sqrt(np.expm1(0.64))
     assert found.standard_error[1] == pytest.approx(spread, rel=0.05)
     assert found.standard_error[0] == pytest.approx(0.1, rel=1e-9)
+
+
+def test_the_tails_of_few_records_widen_intervals_of_other_confidences(wide):
+    """Nine tenths of the weight with a small deviation, a tenth with one four times as large."""
+    weights, share = np.array([0.9, 0.1]), np.array([1.0, 4.0])
+
+    def width(level):
+        return brentq(lambda x: weights @ (2.0 * norm.cdf(x / share) - 1.0) - level, 0.0, 40.0)
+
+    size = np.sqrt(wide.covariance) * norm.ppf(0.975) / width(0.95)
+    parts = np.square(share)[:, None, None] * size**2
+    few = wide._replace(
+        mixture=ij.models.NormalMixture(weights, np.zeros(parts.shape[:2]), parts, np.zeros(2))
+    )
+    centre = float(wide.model[STIFFNESS])
+    for level in (0.5, 0.8, 0.95, 0.99):
+        found = ij.uncertainty(few, lambda m: m[STIFFNESS] / centre, confidence=level, draws=20_000)
+        expected = 0.1 * norm.ppf(0.975) * width(level) / width(0.95)
+        assert not found.curved.any()
+        np.testing.assert_allclose(found.interval - 1.0, [-expected, expected], rtol=1e-6)
+        outside = np.mean(np.abs(found.draws - 1.0) > expected)
+        assert outside == pytest.approx(1.0 - level, abs=4.0 * np.sqrt(level * (1.0 - level) / 20_000))
+    bent = ij.uncertainty(few, lambda m: jnp.exp(8.0 * m[STIFFNESS] / centre), confidence=0.8, draws=20_000)
+    expected = 8.0 * 0.1 * norm.ppf(0.975) * width(0.8) / width(0.95)
+    np.testing.assert_allclose(bent.interval, np.exp(8.0 + expected * np.array([-1.0, 1.0])), rtol=0.05)
+    with pytest.raises(ValueError, match=r"a mixture that belongs to its covariance, .* linear_stiff"):
+        ij.uncertainty(few._replace(covariance=4.0 * wide.covariance), lambda m: m[STIFFNESS])
 
 
 def test_of_an_orbit_the_error_is_that_of_central_differences(fit):

@@ -7,7 +7,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
-from scipy.special import ndtri
 
 from .._given_numbers import asked_numbers, given_numbers
 from .._parameters import find_parameter, full_names, list_parameters, own_parameters, replace_parameters
@@ -274,14 +273,12 @@ class Quantity:
         if self._errors is None or self.constraint is None or self.constraint.chance is None:
             return Answer(value, value, slope)
         sign = 1.0 if self.constraint.upper else -1.0
-        width = sign * float(ndtri(self.constraint.chance))
-        error = self._error(at)
-        bound = value + width * error
+        room = self._room(at)
+        bound = value + sign * room
         if slope is not None:
             moves = np.where(at > 0.5, -_STEP, _STEP)
-            turned = [self._error(at + step) for step in np.diag(moves)]
-            change = (np.stack(turned, axis=1) - error[:, None]) / moves
-            slope = slope + width * change
+            turned = [self._room(at + step) for step in np.diag(moves)]
+            slope = slope + sign * (np.stack(turned, axis=1) - room[:, None]) / moves
         return Answer(value, bound, slope)
 
     def _flat(self, at: Array) -> Array:
@@ -293,10 +290,12 @@ class Quantity:
         value = self._flat(at)
         return value, value
 
-    def _error(self, at: Float[np.ndarray, " coordinate"]) -> Float[np.ndarray, " number"]:
-        """Give the standard error of each number; the coefficients have the relative errors of the fit."""
+    def _room(self, at: Float[np.ndarray, " coordinate"]) -> Float[np.ndarray, " number"]:
+        """Give the room that the chance takes beside each number; relative errors are those of the fit."""
         errors, function = self._errors, self._function
         assert errors is not None
+        assert self.constraint is not None
+        assert self.constraint.chance is not None
         assert function is not None
         absent = errors.values == 0.0
         relative = errors.root / np.where(absent, 1.0, errors.values)[:, None]
@@ -309,4 +308,5 @@ class Quantity:
 
             return jnp.ravel(asked_numbers(self._argument, function, self.space.moved(at, shake)))
 
-        return np.linalg.norm(np.asarray(jax.jacfwd(shaken)(jnp.zeros(errors.steps))), axis=1)
+        change = np.asarray(jax.jacfwd(shaken)(jnp.zeros(errors.steps)))
+        return errors.multiples(change, 1.0 - self.constraint.chance) * np.linalg.norm(change, axis=1)

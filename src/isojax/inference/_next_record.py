@@ -11,7 +11,7 @@ from .._results import RESULTS, is_successful
 from .._show import Row, shown
 from ..identification.fitting import Fit, Fitted, SavedFit, as_fit
 from ..identification.jacobian import stiffness_place
-from ..models import Isolator
+from ..models import Isolator, NormalMixture
 
 
 @shown
@@ -25,6 +25,7 @@ class NextRecord(NamedTuple):
         result: how the search ended.
         scatter: standard deviation of the linear stiffness of a record [relative]; 0 without a linear spring.
         calibration: of the force of the next test [relative].
+        mixture: law of the coefficients' deviations where its tails are longer than normal ones.
     """
 
     model: Isolator
@@ -33,6 +34,7 @@ class NextRecord(NamedTuple):
     result: RESULTS
     scatter: float
     calibration: float
+    mixture: NormalMixture | None = None
 
     @property
     def words(self) -> str:
@@ -114,6 +116,11 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
     covariance[np.ix_(fitted, fitted)] += held.covariance
     uncertain = np.flatnonzero(np.diag(covariance) != 0.0)
     free = tuple(names[place] for place in uncertain)
-    return NextRecord(
-        model, free, covariance[np.ix_(uncertain, uncertain)], held.result, scatter, calibration
-    )
+    law = held.mixture
+    if law is not None:
+        mean = np.where(np.arange(len(listed)) == spring, values, 0.0)
+        alone = law.scatters[:, None] * mean
+        changes = np.stack([alone, np.broadcast_to(common, alone.shape)], axis=1)
+        law = law.turned(np.eye(len(listed))[uncertain][:, fitted]).widened(changes[..., uncertain])
+    errors = covariance[np.ix_(uncertain, uncertain)]
+    return NextRecord(model, free, errors, held.result, scatter, calibration, law)

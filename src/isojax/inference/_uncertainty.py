@@ -1,6 +1,7 @@
 """Value, standard error and interval of a quantity of a fitted model."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -43,7 +44,7 @@ class UncertainQuantity(NamedTuple):
         curved: where the quantity bends so much within the error of the coefficients that an end of the
             interval by the delta method differs from that by draws by more than a tenth of its width, and by
             more than the count of draws explains; of several fits, where it does so of one of them.
-        draws: the quantity at coefficients drawn from their normal distribution, draw first; NaN where it
+        draws: the quantity at coefficients drawn from their distribution, draw first; NaN where it
             does not exist.
         failed: share of the draws that gave no finite number.
         reason: why most of them failed, or why the quantity failed at the fitted coefficients; "" where none
@@ -129,9 +130,11 @@ def uncertainty(
 ) -> UncertainQuantity:
     """Carry the error of a fit into a quantity of its model.
 
-    The delta method takes exact derivatives and the covariance of the coefficients. Draws from their normal
+    The delta method takes exact derivatives and the covariance of the coefficients. Draws from their
     distribution, those outside the bounds of a coefficient drawn again, show where a first derivative is not
-    enough; there their quantiles are the interval.
+    enough; there their quantiles are the interval. That distribution is normal, but where two records or
+    more tell a scatter of the stiffness it is a mixture over the scatters that they allow: the fewer they
+    are, the longer its tails.
 
     A quantity may not exist, as a fold does not past its cusp: where it is NaN. The share of the draws that
     have it is then the probability that it exists, and the interval is stated beside it.
@@ -184,8 +187,8 @@ def uncertainty(
         for place in np.argsort(-weights, kind="stable")
         if counts[place]
     ]
-    value, error, _, _ = parts[0]
-    drawn = np.concatenate([part[2] for part in parts])
+    value, error = parts[0].value, parts[0].error
+    drawn = np.concatenate([part.draws for part in parts])
     finite = np.all(np.isfinite(drawn), axis=tuple(range(1, drawn.ndim)))
     if not np.isfinite(drawn).any():
         raise ValueError(
@@ -193,8 +196,10 @@ def uncertainty(
         )
     # The delta method knows one law: several are not one normal distribution, whether or not a law bends.
     straight = error if len(fits) == 1 else np.full_like(error, np.nan)
-    known = credible_set(value, straight, drawn, confidence)
-    bent = [credible_set(*part[:3], confidence).curved for part in parts]
+    known = credible_set(value, straight, drawn, confidence, parts[0].multiples)
+    bent = [
+        credible_set(part.value, part.error, part.draws, confidence, part.multiples).curved for part in parts
+    ]
     return UncertainQuantity(
         value,
         known.standard_error,
@@ -203,11 +208,29 @@ def uncertainty(
         np.any(bent, axis=0),
         drawn,
         float(1.0 - finite.mean()),
-        next((part[3] for part in parts if part[3]), "" if finite.all() else NOT_FINITE),
+        next((part.reason for part in parts if part.reason), "" if finite.all() else NOT_FINITE),
         tuple(weights.tolist()),
         known.probability,
         known.probability_error,
     )
+
+
+class _Carried(NamedTuple):
+    """A quantity of one fit.
+
+    Attributes:
+        value: at the fitted coefficients.
+        error: its standard error by the delta method.
+        draws: the quantity at drawn coefficients.
+        reason: why it raised, if it did.
+        multiples: standard errors between the value and an end, by the chance beyond it.
+    """
+
+    value: Float[np.ndarray, "..."]
+    error: Float[np.ndarray, "..."]
+    draws: Float[np.ndarray, "draw ..."]
+    reason: str
+    multiples: Callable[[np.ndarray], np.ndarray]
 
 
 def _carried(
@@ -216,8 +239,8 @@ def _carried(
     draws: int,
     seed: int,
     progress: Callable[[str], None],
-) -> tuple[Float[np.ndarray, "..."], Float[np.ndarray, "..."], Float[np.ndarray, "draw ..."], str]:
-    """Give value, standard error by the delta method, draws of the quantity, and why it raised if it did."""
+) -> _Carried:
+    """Carry the error of one fit."""
 
     def at(steps: Float[Array, " step"]) -> Array:
         return asked_numbers("quantity", quantity, errors.moved(steps))
@@ -234,7 +257,8 @@ def _carried(
         known = np.full(drawn.shape[1:], np.nan), np.full((*drawn.shape[1:], errors.steps), np.nan)
     value, change = (np.asarray(one, dtype=float) for one in known)
     error = np.asarray(np.linalg.norm(change, axis=-1))
-    return value, error, np.asarray(drawn, dtype=float), raised or missing
+    multiples = partial(errors.multiples, change)
+    return _Carried(value, error, np.asarray(drawn, dtype=float), raised or missing, multiples)
 
 
 def _why_missing(quantity: Callable[[Isolator], Any], errors: CoefficientErrors) -> str:

@@ -4,7 +4,8 @@ In: a mass, elements and a drive. Out: an `Isolator`, its simulated motion and r
 Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at one time), then `_rk4.py` and
 `_integrator.py` (the step), `_scan.py` (many records), `_solve.py` (diffrax) and `_simulate.py` (one drive).
 `_laws.py` and `_event_step.py` split a step where a law jumps; `_storage.py` reads and writes the file;
-`_coefficient_errors.py` carries the covariance of a fit into answers, `_credible_set.py` draws from it, and
+`_coefficient_errors.py` carries the covariance of a fit into answers, `_normal_mixture.py` its tails,
+`_credible_set.py` draws from it, and
 `_band.py` both into curves, with `_second_order.py` (draws of a curve) and `_shifted_curve.py`;
 `_conditions.py` and `_fit_at.py` give the isolator and a fit at a chamber pressure or temperature.
 """
@@ -45,6 +46,8 @@ from ._laws import Regime as Regime
 from ._laws import State as State
 from ._laws import find_switches as find_switches
 from ._laws import share_internal as share_internal
+from ._normal_mixture import NormalMixture as NormalMixture
+from ._normal_mixture import half_width as half_width
 from ._rk4 import RK4 as RK4
 from ._scan import advance as advance
 from ._scan import advance_record as advance_record

@@ -7,18 +7,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
+from scipy.special import ndtri
 
 from .._given_numbers import asked_numbers
 from .._parameters import full_names, list_parameters, replace_parameters
 from .._results import RESULTS, is_successful
 from .._show import shown
 from ._isolator import Isolator
+from ._normal_mixture import NormalMixture
 
 _NO_SHARE = 1e-12
 """Share of the largest eigenvalue of a correlation below which a direction is rounding."""
 
 _ROUGHLY = 1e-6
 """By how much correlations may miss symmetry, and their eigenvalues zero, by rounding."""
+
+_STANDARD, _LIKE = 0.95, 0.2
+"""Chance that 1.96 standard errors hold the truth; and share by which those of a mixture may differ from
+those of its covariance: errors that are added do so by squares, which for long tails is not exact."""
 
 _DRAWN_AGAIN = 50
 """Times that draws outside the bounds of a coefficient are drawn again."""
@@ -61,19 +67,22 @@ class EndsEstimated(Protocol):
 
 @shown
 class CoefficientErrors(NamedTuple):
-    """A fitted model, and independent steps of one standard deviation from it.
+    """A fitted model, and independent steps of one standard error from it.
 
     Attributes:
         model: the fitted isolator.
         places: of the fitted coefficients in `list_parameters`.
         values: of these.
         root: of their covariance, which is `root @ root.T`.
+        mixture: law of the steps where its tails are longer than normal ones; None where it is standard
+            normal.
     """
 
     model: Isolator
     places: tuple[int, ...]
     values: Float[np.ndarray, " coefficient"]
     root: Float[np.ndarray, "coefficient step"]
+    mixture: NormalMixture | None = None
 
     @property
     def steps(self) -> int:
@@ -132,8 +141,36 @@ class CoefficientErrors(NamedTuple):
         moved = self.values + steps @ self.root.T
         return np.all((moved >= lower) & (moved <= upper), axis=1)
 
+    def multiples(
+        self, change: Float[np.ndarray, "... step"], tail: float | Float[np.ndarray, "..."]
+    ) -> Float[np.ndarray, "..."]:
+        """Give how many standard errors lie between a quantity and an end beyond which some chance is.
+
+        Args:
+            change: of the quantity by each independent step.
+            tail: the chance beyond, on one side.
+
+        Returns:
+            The multiples, to first order; 1.96 for 0.025.
+        """
+        if self.mixture is None:
+            return np.broadcast_to(-ndtri(tail), change.shape[:-1])
+        return self.mixture.multiples(change, tail)
+
+    def steps_of(self, even: Float[np.ndarray, "draw number"]) -> Float[np.ndarray, "draw step"]:
+        """Give the steps that belong to even numbers.
+
+        Args:
+            even: between 0 and 1, one for each step; then one that chooses among the parts of a mixture.
+
+        Returns:
+            The steps.
+        """
+        normal = ndtri(even[:, : self.steps])
+        return normal if self.mixture is None else self.mixture.draw(even[:, -1], normal)
+
     def draw(self, count: int, seed: int) -> Float[np.ndarray, "draw step"]:
-        """Draw standard normal steps whose coefficients keep to their bounds.
+        """Draw steps whose coefficients keep to their bounds.
 
         Args:
             count: how many.
@@ -146,12 +183,20 @@ class CoefficientErrors(NamedTuple):
             ValueError: if almost no draw keeps to the bounds.
         """
         generator = np.random.default_rng(seed)
-        steps = generator.standard_normal((count, self.steps))
+
+        def drawn(count: int) -> Float[np.ndarray, "draw step"]:
+            normal = generator.standard_normal((count, self.steps))
+            if self.mixture is None:
+                return normal
+            # Each part has its share of the draws, and not about that.
+            return self.mixture.draw((generator.permutation(count) + 0.5) / count, normal)
+
+        steps = drawn(count)
         for _ in range(_DRAWN_AGAIN):
             outside = ~self.inside(steps)
             if not outside.any():
                 return steps
-            steps[outside] = generator.standard_normal((np.count_nonzero(outside), self.steps))
+            steps[outside] = drawn(int(np.count_nonzero(outside)))
         raise ValueError(
             "Argument `fit` must leave its coefficients room between their bounds, but almost no draw falls "
             "there."
@@ -225,6 +270,17 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
         )
     kept = shares > _NO_SHARE * shares.max(initial=0.0)
     root = safe[:, None] * vectors[:, kept] * np.sqrt(shares[kept])
+    law = getattr(held, "mixture", None)
+    if law is not None:
+        own = law.half_width(np.eye(len(free)), _STANDARD) / -ndtri(0.5 - 0.5 * _STANDARD)
+        other = [name for name, one, two in zip(free, own, size, strict=True) if abs(one - two) > _LIKE * two]
+        if other:
+            raise ValueError(
+                "Argument `fit` must have a mixture that belongs to its covariance, or None, but they differ "
+                f"in the error of {', '.join(other)}."
+            )
+    back = (vectors[:, kept] / np.sqrt(shares[kept])).T / safe
     names = [entry.name for entry in listed]
     values = np.array([float(held.model[name]) for name in free])
-    return CoefficientErrors(held.model, tuple(names.index(name) for name in free), values, root)
+    places = tuple(names.index(name) for name in free)
+    return CoefficientErrors(held.model, places, values, root, None if law is None else law.turned(back))

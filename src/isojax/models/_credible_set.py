@@ -1,11 +1,11 @@
 """What draws say of a quantity: how probable it is that it exists, and where it then lies."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import ndtri
-from scipy.stats import norm
 
 from .._show import shown
 
@@ -17,6 +17,9 @@ _BY_CHANCE = 3.0
 
 _SEARCH_ROUNDING = 1e-6
 """Share of the value up to which the two differ by the tolerance of a search."""
+
+_BESIDE = 1e-3
+"""Share of a tail by which its quantile is moved for its slope."""
 
 _DRAWS_BEYOND = 2
 """Draws that an interval must leave out at least, one at either end: else they do not show its ends."""
@@ -51,6 +54,7 @@ def credible_set(
     error: Float[np.ndarray, "..."],
     drawn: Float[np.ndarray, "draw ..."],
     confidence: float,
+    multiples: Callable[[np.ndarray], np.ndarray] = lambda tail: -ndtri(tail),
 ) -> CredibleSet:
     """Give the set of numbers, and perhaps "none", that holds a quantity.
 
@@ -59,6 +63,8 @@ def credible_set(
         error: by the delta method; NaN where that must not be taken.
         drawn: the quantity at coefficients drawn from their distribution; NaN where it does not exist.
         confidence: chance that the set is meant to hold the truth.
+        multiples: standard errors between the value and an end, by the chance beyond it; those of a normal
+            law unless given.
 
     Returns:
         The set. Ends are NaN where too few draws have the quantity to tell them.
@@ -74,10 +80,11 @@ def credible_set(
     wanted = np.asarray(0.5 * (1.0 - content))
     # Further out than the outermost draw nothing can be compared.
     tail = np.asarray(np.maximum(wanted, 0.5 / count))
-    spread = -ndtri(tail) * error
+    spread = multiples(tail) * error
     ends = _quantiles(drawn, tail)
-    # Of a quantity that does not bend the draws are normal, and with them the error of their quantiles.
-    chance = np.sqrt(tail * (1.0 - tail) / np.maximum(held, 1)) / norm.pdf(ndtri(tail)) * error
+    # How far the ends move with their share tells the error of a quantile of so many draws.
+    beside = multiples(tail * (1.0 - _BESIDE)) - multiples(tail * (1.0 + _BESIDE))
+    chance = np.sqrt((1.0 - tail) / tail / np.maximum(held, 1)) * beside / (2.0 * _BESIDE) * error
     with np.errstate(invalid="ignore"):
         allowed = np.maximum(
             np.maximum(_BEND * 2.0 * spread, _BY_CHANCE * chance), _SEARCH_ROUNDING * np.abs(value)
@@ -85,7 +92,7 @@ def credible_set(
         curved = ~(np.max(np.abs(ends - np.stack([value - spread, value + spread])), axis=0) <= allowed)
     ends = np.where(held * (1.0 - confidence) >= _DRAWS_BEYOND, ends, np.nan)
     # Where "none" may be all that is left out, the tail of the numbers is not known more exactly than that.
-    reach = -ndtri(np.where(share < 1.0, tail, wanted)) * error
+    reach = multiples(np.where(share < 1.0, tail, wanted)) * error
     straight = np.stack([value - reach, value + reach])
     return CredibleSet(
         share,

@@ -13,6 +13,7 @@ from .._show import shown
 from .._types import Scalar
 from ._coefficient_errors import EndsEstimated, Estimated
 from ._isolator import Isolator
+from ._normal_mixture import NormalMixture
 
 
 @shown
@@ -24,12 +25,14 @@ class FitAt(NamedTuple):
         free: names of its coefficients that the fit moves.
         covariance: of these [product of their units].
         result: how the search of the fit ended.
+        mixture: law of the coefficients' deviations where its tails are longer than normal ones.
     """
 
     model: Isolator
     free: tuple[str, ...]
     covariance: Float[np.ndarray, "coefficient coefficient"]
     result: RESULTS
+    mixture: NormalMixture | None = None
 
 
 def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitAt:
@@ -79,4 +82,6 @@ def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitA
     slopes = np.asarray(jax.jacfwd(plain)(jnp.stack([numbers[place] for place in places])))
     moves = np.any(slopes != 0.0, axis=1)
     names = tuple(entry.name for entry, moved in zip(list_parameters(model), moves, strict=True) if moved)
-    return FitAt(model, names, slopes[moves] @ np.asarray(held.covariance) @ slopes[moves].T, held.result)
+    slopes, law = slopes[moves], getattr(held, "mixture", None)
+    law = None if law is None else law.turned(slopes)
+    return FitAt(model, names, slopes @ np.asarray(held.covariance) @ slopes.T, held.result, law)

@@ -21,6 +21,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..._show import shown
+from ...models import NormalMixture
 
 SMALLEST_EIGENVALUE = 1e-11
 """Relative eigenvalue of the scaled information below which a combination counts as undetermined.
@@ -43,6 +44,8 @@ class Uncertainty(NamedTuple):
         correlation: covariance scaled to a unit diagonal.
         determined: False where a coefficient belongs to a combination that the data do not determine.
         partners: for each undetermined combination, the places of the coefficients in it.
+        mixture: law of the coefficients' deviations where its tails are longer than normal ones; None where
+            they are normal.
     """
 
     covariance: Float[np.ndarray, "column column"]
@@ -50,6 +53,7 @@ class Uncertainty(NamedTuple):
     correlation: Float[np.ndarray, "column column"]
     determined: Bool[np.ndarray, " column"]
     partners: tuple[tuple[int, ...], ...]
+    mixture: NormalMixture | None = None
 
 
 def invert_information(matrix: Float[np.ndarray, "column column"], inflation: float = 1.0) -> Uncertainty:

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from ..._parameters import Parameter, list_parameters
 from ..._results import RESULTS, is_successful, name_of_result
 from ..._show import LINES, Row, shown
-from ...models import Isolator
+from ...models import Isolator, NormalMixture
 from ...records import Campaign, NoiseEstimate, brief_blows
 from ._coefficients import Coefficient, Coefficients
 from ._errors import Errors, Restarts, Run
@@ -57,6 +57,11 @@ class Fit(NamedTuple):
     result: RESULTS
     estimate: Estimate
     evaluation: Evaluation
+
+    @property
+    def mixture(self) -> NormalMixture | None:
+        """Law of the coefficients' deviations where its tails are longer than normal ones."""
+        return self.estimate.uncertainty.mixture
 
     @property
     def errors(self) -> dict[str, Errors | None]:
@@ -123,6 +128,7 @@ class Fit(NamedTuple):
             self.noise,
             self.errors,
             self.result,
+            self.mixture,
         )
 
     def to_dict(self) -> dict[str, Any]:

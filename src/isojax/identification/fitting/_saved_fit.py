@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from ..._results import RESULTS, name_of_result, result_named
 from ..._show import Row, shown
-from ...models import Isolator, model_from_dict, model_to_dict, read_json, write_whole
+from ...models import Isolator, NormalMixture, model_from_dict, model_to_dict, read_json, write_whole
 from ...records import Colour, NoiseEstimate
 from ._coefficients import Coefficient, Coefficients
 from ._errors import Errors
@@ -70,6 +70,8 @@ class SavedFit(NamedTuple):
         noise: the noise that errors are compared with.
         errors: by role, "fit" and "holdout" (None without such records).
         result: how the search ended.
+        mixture: law of the coefficients' deviations where its tails are longer than normal ones; None also in
+            a file of before it was saved.
     """
 
     title: str
@@ -82,6 +84,7 @@ class SavedFit(NamedTuple):
     noise: NoiseEstimate
     errors: dict[str, Errors | None]
     result: RESULTS
+    mixture: NormalMixture | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Give the fit as plain numbers, words, lists and dictionaries; None where a number is not finite."""
@@ -96,6 +99,7 @@ class SavedFit(NamedTuple):
                 "free": list(self.free),
                 "parameters": self.parameters.to_dict(),
                 "covariance": self.covariance.tolist(),
+                "mixture": None if self.mixture is None else self.mixture.to_dict(),
                 "statistics": self.stats._asdict(),
                 "noise": {name: getattr(self.noise, name) for name in self.noise.__dataclass_fields__},
                 "errors": {
@@ -211,6 +215,7 @@ def load_fit(path: str | Path) -> SavedFit:
                 for role, one in content["errors"].items()
             },
             result_named(content["result"]),
+            _mixture(content.get("mixture")),
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path}: is no fit as isojax saves it ({error!r}).") from None
@@ -233,6 +238,13 @@ def _colour(saved: list[Any] | None) -> Colour | None:
         return None
     colour = Colour(*saved)
     return colour._replace(law=tuple(colour.law), whitening=tuple(colour.whitening))
+
+
+def _mixture(saved: dict[str, Any] | None) -> NormalMixture | None:
+    """Give the law of the coefficients again."""
+    if saved is None:
+        return None
+    return NormalMixture(**{name: np.array(values, dtype=float) for name, values in saved.items()})
 
 
 def _numbers(fields: dict[str, Any]) -> dict[str, Any]:

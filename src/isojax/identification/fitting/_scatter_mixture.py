@@ -7,6 +7,7 @@ from jaxtyping import Float
 from scipy.linalg import block_diag
 from scipy.special import ndtr, ndtri
 
+from ...models import NormalMixture, half_width
 from ..jacobian import STIFFNESS_SCALE_UNIT
 from ._covariance import Determined, Uncertainty, find_determined, invert_information, unknown
 from ._elimination import Nuisances, Reduced
@@ -31,6 +32,10 @@ _ROOT_BISECTIONS = 40
 
 _DEVIATIONS = 9
 """Deviations of the stiffness of a planned record over which is averaged."""
+
+_PART, _LEAST_TAIL = 0.25, 1e-4
+"""Share of what larger scatters weigh that scatters taken together as one part of a law hold; and the weight
+of the largest ones below which they are one part."""
 
 
 class _Records(NamedTuple):
@@ -70,7 +75,8 @@ def integrate_scatter(reduced: Reduced, nuisances: Nuisances, inflation: float) 
     restricted likelihood of t times its half-Cauchy prior, and b and C are the generalised least squares of
     the linearised records. The standard error is the half-width about the fitted value that holds 95 % of it,
     over 1.96, so that value +- 1.96 standard errors is the interval of the mixture. The correlation is that
-    of its second moments about the fitted values.
+    of its second moments about the fitted values. The mixture goes along for other confidences, for which its
+    tails are longer than those of a normal law.
 
     The fitted values stay those at the fit's own scatter. Their mean over all scatters would be at most
     2 % better (rms, two records), and no longer the least squares of anything.
@@ -118,8 +124,7 @@ def scatter_of_next(reduced: Reduced, nuisances: Nuisances, inflation: float) ->
         ).weight
     except np.linalg.LinAlgError:
         return float("nan")
-    deviation = _SCATTERS[:, None]
-    return float(_half_width(weight[:, None], np.zeros_like(deviation), deviation)[0]) / _WIDTH
+    return float(half_width(weight, np.zeros_like(_SCATTERS), _SCATTERS, _LEVEL)) / _WIDTH
 
 
 class ScatteredScores(NamedTuple):
@@ -147,7 +152,7 @@ class ScatteredScores(NamedTuple):
         own = np.diagonal(self.information, axis1=1, axis2=2)
         shows = np.all(own > 0.0, axis=0)
         safe = np.where(shows, own, 1.0)
-        width = _half_width(self.weight, self.score / safe - strength, 1.0 / np.sqrt(safe))
+        width = half_width(self.weight.T, (self.score / safe - strength).T, 1.0 / np.sqrt(safe).T, _LEVEL)
         return np.where(shows, width / _WIDTH, np.inf)
 
 
@@ -276,9 +281,29 @@ def _uncertainty(known: Determined, records: _Records, scatter: float) -> Uncert
     moment = np.einsum("t,tij->ij", mixture.weight, covariance)
     moment += np.einsum("t,ti,tj->ij", mixture.weight, step, step)
     error = np.sqrt(np.einsum("tii->ti", covariance))
-    width = _half_width(mixture.weight[:, None], step, error) / _WIDTH
+    width = half_width(mixture.weight, step.T, error.T, _LEVEL) / _WIDTH
     scale = width / np.sqrt(np.where(np.diag(moment) > 0.0, np.diag(moment), 1.0))
-    return known.uncertainty(moment * np.outer(scale, scale))
+    law = _merged(mixture.weight, step, covariance).turned(np.diag(1.0 / known.size))
+    return known.uncertainty(moment * np.outer(scale, scale))._replace(mixture=law)
+
+
+def _merged(
+    weight: Float[np.ndarray, " scatter"],
+    mean: Float[np.ndarray, "scatter column"],
+    covariance: Float[np.ndarray, "scatter column column"],
+) -> NormalMixture:
+    """Take scatters beside each other together, with the moments that they have together."""
+    above = np.maximum(np.cumsum(weight[::-1])[::-1], _LEAST_TAIL)
+    _, part = np.unique(np.floor(np.log(above) / np.log(1.0 - _PART)), return_inverse=True)
+    share = np.zeros((part.max() + 1, weight.size))
+    share[part, np.arange(weight.size)] = weight
+    weights = share.sum(axis=1)
+    share = share / weights[:, None]
+    means = share @ mean
+    away = mean - means[part]
+    moments = covariance + away[:, :, None] * away[:, None, :]
+    scatters = np.sqrt(share @ _SCATTERS**2)
+    return NormalMixture(weights, means, np.einsum("ps,sij->pij", share, moments), scatters)
 
 
 def _with_scales(
@@ -358,19 +383,3 @@ def log_likelihood(
     logarithm = logarithm - 0.5 * whole[:, -1, -1]
     weight = np.exp(logarithm - logarithm.max())
     return float(logarithm.max() + np.log(weight.sum())), weight / weight.sum() @ whole[:, :-1, -1]
-
-
-def _half_width(
-    weight: Float[np.ndarray, "scatter ..."],
-    centre: Float[np.ndarray, "scatter column"],
-    error: Float[np.ndarray, "scatter column"],
-) -> Float[np.ndarray, " column"]:
-    """Give the half-width about zero that holds 95 % of each mixture of normal laws, by bisection."""
-    low, high = np.zeros(error.shape[1]), (np.abs(centre) + 2.0 * _WIDTH * error).max(axis=0)
-    safe = np.where(error > 0.0, error, 1.0)
-    for _ in range(_ROOT_BISECTIONS):
-        middle = 0.5 * (low + high)
-        held = ndtr((middle - centre) / safe) - ndtr((-middle - centre) / safe)
-        short = np.sum(weight * held, axis=0) < _LEVEL
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return high

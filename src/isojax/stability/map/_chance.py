@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 from scipy.ndimage import binary_dilation
-from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
 from ...models import CoefficientErrors, Isolator
@@ -73,7 +72,7 @@ class Chances(NamedTuple):
 
 
 def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarray, "draw step"]:
-    """Give standard normal steps that fill space evenly, without those that leave a bound of a coefficient.
+    """Give steps that fill their space evenly, without those that leave a bound of a coefficient.
 
     Args:
         errors: of the coefficients.
@@ -88,8 +87,9 @@ def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarr
         return np.zeros((1, 0))
     # Sobol points are even in numbers of a power of two; the first of them do as well.
     powers = 2 ** int(np.ceil(np.log2(count)))
-    cells = Sobol(errors.steps, scramble=False).random(powers)[:count]
-    steps = ndtri(cells + 0.5 / powers)
+    numbers = errors.steps + (errors.mixture is not None)
+    cells = Sobol(numbers, scramble=False).random(powers)[:count]
+    steps = errors.steps_of(cells + 0.5 / powers)
     kept = steps[errors.inside(steps)]
     return kept if len(kept) else np.zeros((1, errors.steps))
 
