@@ -11,6 +11,8 @@ A row keeps, of each declared coefficient, of the force at the fold and of the l
 whether the interval of `isojax.uncertainty`, of the fold that of `isojax.continue_branch`, holds the truth,
 and how far the fit is from the truth in its standard error. The report prints the share that holds it, the
 95 % interval of that share (Wilson), the rms of the error, and in how many fits the interval is one by draws.
+Rows also keep whether intervals of 80 and 99 % hold the truth; the report sets beside them what as many
+standard errors as a normal law asks for would hold.
 
 Of the fold a fit states a set: an interval of its force, and "none" where that is not improbable. It is held
 if the truth lies in the set. All campaigns whose truth has a fold are judged, none is left out: where no
@@ -35,6 +37,7 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.special import ndtri
 
 import isojax as ij
 from _set_up_jax import set_up_jax
@@ -53,6 +56,9 @@ BAND = np.linspace(0.85, 1.05, 41)
 """Frequencies of the transmissibility over the natural frequency of the linear spring."""
 
 FOLD, FOLD_OR_NONE = "fold force", "fold force, or no fold"
+
+OTHERS = (0.8, 0.99)
+"""Other confidences with which intervals of the coefficients are stated."""
 
 CONFIDENCE = 0.95
 """With which sets are stated: "none" belongs to one where a fold is no more probable."""
@@ -128,6 +134,11 @@ def run_one(seed: int, count: int, truth: dict[str, float], peak: bool) -> dict:
         low, high = found.interval[:, place].tolist()
         held[name] = bool(low <= truth[name] <= high)
         off[name] = float((found.value[place] - truth[name]) / found.standard_error[place])
+    names = [name for name in asked if name in fit.free]
+    others = {
+        f"{confidence:g}": _held(fit, names, confidence, np.array([truth[name] for name in names]))
+        for confidence in OTHERS
+    }
     return {
         "seed": seed,
         "records": count,
@@ -135,11 +146,21 @@ def run_one(seed: int, count: int, truth: dict[str, float], peak: bool) -> dict:
         "scatter": fit.stats.stiffness_scatter,
         "off": off,
         "held": held,
+        "others": others,
         "curved": [name for name, bent in zip(asked, found.curved, strict=True) if bent],
         "draws_failed": found.failed,
         "fold": fold_row(first_fold(drawn, fit.model, fit), truth[FOLD]),
         "seconds": round(time.perf_counter() - begin, 2),
     }
+
+
+def _held(fit: ij.Fit, names: list[str], confidence: float, truth: np.ndarray) -> dict[str, bool]:
+    """Say which coefficients have the truth in their interval of some confidence."""
+    found = ij.uncertainty(
+        fit, lambda model: jnp.stack([model[name] for name in names]), confidence=confidence
+    )
+    low, high = found.interval
+    return dict(zip(names, ((low <= truth) & (truth <= high)).tolist(), strict=True))
 
 
 def fold_row(found: tuple[ij.SpecialPoint, bool] | None, truth: float) -> dict:
@@ -234,6 +255,20 @@ def report(rows: list[dict]) -> bool:
                 f"| {low:.2f} to {min(high, 1.0):.2f} | {len(some)} | {mean:.3f} | {real / len(some):.3f} | "
                 f"{ends[0]:.2f}-{ends[1]:.2f} |"
             )
+    rest = [row for row in rows if "others" in row]
+    if not rest:
+        return met
+    print(
+        "\n| confidence | records | coefficients | hold the truth | as many standard errors of a normal law |"
+    )
+    print("|---" * 5 + "|")
+    for confidence in OTHERS:
+        for count in sorted({row["records"] for row in rest}):
+            some = [row for row in rest if row["records"] == count]
+            held = [one for row in some for one in row["others"][f"{confidence:g}"].values()]
+            off = [row["off"][name] for row in some for name in row["others"][f"{confidence:g}"]]
+            normal = np.mean(np.abs(off) <= ndtri(0.5 + 0.5 * confidence))
+            print(f"| {confidence:g} | {count} | {len(held)} | {np.mean(held):.3f} | {normal:.3f} |")
     return met
 
 
