@@ -31,7 +31,7 @@ ACCURACY = {
     "_evaluation": {"SAME_BRANCH"},
     "_initial_states": {"HALVINGS", "MOST_WORSENING", "SETTLED", "SHORTEST", "SMALL_STEP"},
     # Draws and intervals.
-    "_scatter_mixture": {"LEVEL"},
+    "_scatter_mixture": {"LEAST_TAIL"},
     "_score": {"FEWEST_EXCEEDANCES", "NULL_DRAWS"},
     # How records are cut, repeats recognised and spectra read.
     "_build_problem": {"SAME_RATE"},

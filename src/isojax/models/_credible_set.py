@@ -18,7 +18,7 @@ _BY_CHANCE = 3.0
 _SEARCH_ROUNDING = 1e-6
 """Share of the value up to which the two differ by the tolerance of a search."""
 
-_BESIDE = 1e-3
+_TAIL_STEP = 1e-3
 """Share of a tail by which its quantile is moved for its slope."""
 
 _DRAWS_BEYOND = 2
@@ -83,8 +83,8 @@ def credible_set(
     spread = multiples(tail) * error
     ends = _quantiles(drawn, tail)
     # How far the ends move with their share tells the error of a quantile of so many draws.
-    beside = multiples(tail * (1.0 - _BESIDE)) - multiples(tail * (1.0 + _BESIDE))
-    chance = np.sqrt((1.0 - tail) / tail / np.maximum(held, 1)) * beside / (2.0 * _BESIDE) * error
+    beside = multiples(tail * (1.0 - _TAIL_STEP)) - multiples(tail * (1.0 + _TAIL_STEP))
+    chance = np.sqrt((1.0 - tail) / tail / np.maximum(held, 1)) * beside / (2.0 * _TAIL_STEP) * error
     with np.errstate(invalid="ignore"):
         allowed = np.maximum(
             np.maximum(_BEND * 2.0 * spread, _BY_CHANCE * chance), _SEARCH_ROUNDING * np.abs(value)

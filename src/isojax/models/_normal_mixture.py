@@ -8,7 +8,7 @@ from scipy.special import ndtr, ndtri
 
 from .._show import Row, shown
 
-_BISECTIONS = 40
+_WIDTH_BISECTIONS = 40
 
 _STANDARD = 0.95
 """Chance that the interval of 1.96 standard errors holds the truth, which defines them."""
@@ -143,7 +143,7 @@ def half_width(
     high = np.max(np.abs(centres) + (reach[..., None] + 1.0) * deviations, axis=-1)
     low = np.zeros_like(high)
     safe = np.where(deviations > 0.0, deviations, 1e-300)
-    for _ in range(_BISECTIONS):
+    for _ in range(_WIDTH_BISECTIONS):
         middle = 0.5 * (low + high)
         held = ndtr((middle[..., None] - centres) / safe) - ndtr((-middle[..., None] - centres) / safe)
         short = np.sum(weights * held, axis=-1) < confidence
