@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import norm
 
 import isojax as ij
 from isojax.elements import (
@@ -19,7 +21,7 @@ from isojax.elements import (
     PressureStiffness,
     TemperatureDamping,
 )
-from isojax.models import FitAt, coefficient_errors, fit_at
+from isojax.models import FitAt, NormalMixture, coefficient_errors, fit_at
 
 MASS, K, C, DK, DC, REFERENCE = 800.0, 1.08e6, 8e3, 7e5, 3e3, 2e5
 FORCE, FREQUENCY = 10.0, 5.5
@@ -135,6 +137,33 @@ def test_the_covariance_at_a_pressure_is_that_of_the_sum_of_both_coefficients():
     np.testing.assert_allclose(there.covariance, expected, rtol=1e-12)
     errors = coefficient_errors(there, there.model)
     np.testing.assert_allclose(errors.root @ errors.root.T, expected, rtol=1e-9)
+
+
+def test_at_a_pressure_long_tails_add_up_as_they_are_correlated():
+    """A tenth of the weight with errors four times as large, which all but cancel at the pressure."""
+    free, weights = ("linear_stiffness.coefficient", "pressure_stiffness.change"), np.array([0.9, 0.1])
+    whole = np.array([[9e6, 0.0], [0.0, 1e8]])
+    rare = 16.0 * np.array([[9e6, -0.99 * 3e7], [-0.99 * 3e7, 1e8]])
+    parts = np.stack([whole, rare])
+    law = NormalMixture(weights, np.zeros((2, 2)), parts, np.zeros(2))
+
+    def standard_error(slopes):
+        spread = np.sqrt(np.einsum("i,pij,j->p", slopes, parts, slopes))
+        width = brentq(
+            lambda x: weights @ (2.0 * norm.cdf(x / spread) - 1.0) - 0.95, 0.0, 10.0 * spread.max()
+        )
+        return width / norm.ppf(0.975)
+
+    sizes = np.array([standard_error(np.array(slopes)) for slopes in ([1.0, 0.0], [0.0, 1.0])])
+    moment = np.einsum("p,pij->ij", weights, parts)
+    scale = sizes / np.sqrt(np.diag(moment))
+    fitted = FitAt(MODEL, free, moment * np.outer(scale, scale), ij.RESULTS.successful, law)
+    there = fit_at(fitted, pressure=2.6e5)
+    assert np.sqrt(there.covariance[0, 0]) == pytest.approx(standard_error(np.array([1.0, 0.3])), rel=1e-9)
+    assert there.mixture.covariances[:, 0, 0] == pytest.approx(
+        [9e6 + 0.09e8, 16.0 * (9e6 - 0.6 * 0.99 * 3e7 + 0.09e8)]
+    )
+    assert coefficient_errors(there).mixture is not None
 
 
 def test_what_is_no_fit_has_none_at_a_pressure():

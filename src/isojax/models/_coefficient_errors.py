@@ -22,9 +22,9 @@ _NO_SHARE = 1e-12
 _ROUGHLY = 1e-6
 """By how much correlations may miss symmetry, and their eigenvalues zero, by rounding."""
 
-_STANDARD, _LIKE = 0.95, 0.2
-"""Chance that 1.96 standard errors hold the truth; and share by which those of a mixture may differ from
-those of its covariance: errors that are added do so by squares, which for long tails is not exact."""
+_LIKE = 0.2
+"""Share by which standard errors of a mixture may differ from those of its covariance: errors that are added
+do so by squares, which for long tails is not exact."""
 
 _DRAWN_AGAIN = 50
 """Times that draws outside the bounds of a coefficient are drawn again."""
@@ -272,8 +272,8 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
     root = safe[:, None] * vectors[:, kept] * np.sqrt(shares[kept])
     law = getattr(held, "mixture", None)
     if law is not None:
-        own = law.half_width(np.eye(len(free)), _STANDARD) / -ndtri(0.5 - 0.5 * _STANDARD)
-        other = [name for name, one, two in zip(free, own, size, strict=True) if abs(one - two) > _LIKE * two]
+        pairs = zip(free, law.standard_errors, size, strict=True)
+        other = [name for name, own, given in pairs if abs(own - given) > _LIKE * given]
         if other:
             raise ValueError(
                 "Argument `fit` must have a mixture that belongs to its covariance, or None, but they differ "

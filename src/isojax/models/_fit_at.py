@@ -38,8 +38,8 @@ class FitAt(NamedTuple):
 def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitAt:
     """Give a fit at an operating condition, for the bands and chances of curves and maps there.
 
-    The plain coefficients there are linear in the fitted ones, so that their covariance is exact; where a
-    curvature was fitted it is that of the delta method.
+    The plain coefficients there are linear in the fitted ones, so that their errors are exact; where a
+    curvature was fitted they are those of the delta method.
 
     Args:
         fit: a fit, a saved one, or what ends with one, such as a closed loop.
@@ -83,5 +83,11 @@ def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitA
     moves = np.any(slopes != 0.0, axis=1)
     names = tuple(entry.name for entry, moved in zip(list_parameters(model), moves, strict=True) if moved)
     slopes, law = slopes[moves], getattr(held, "mixture", None)
-    law = None if law is None else law.turned(slopes)
-    return FitAt(model, names, slopes @ np.asarray(held.covariance) @ slopes.T, held.result, law)
+    covariance = slopes @ np.asarray(held.covariance) @ slopes.T
+    if law is not None:
+        # What is correlated adds up as the law says, whose tails a covariance does not know.
+        law = law.turned(slopes)
+        size = np.sqrt(np.diag(covariance))
+        scale = law.standard_errors / np.where(size > 0.0, size, 1.0)
+        covariance *= np.outer(scale, scale)
+    return FitAt(model, names, covariance, held.result, law)

@@ -33,6 +33,11 @@ class NormalMixture(NamedTuple):
     covariances: Float[np.ndarray, "part coefficient coefficient"]
     scatters: Float[np.ndarray, " part"]
 
+    @property
+    def standard_errors(self) -> Float[np.ndarray, " coefficient"]:
+        """Half-width about each fitted value that holds 95 %, over 1.96 [unit of each coefficient]."""
+        return self.half_width(np.eye(self.means.shape[1]), _STANDARD) / -ndtri(0.5 - 0.5 * _STANDARD)
+
     def turned(self, slopes: Float[np.ndarray, "quantity coefficient"]) -> "NormalMixture":
         """Give the law of quantities that are linear in the coefficients.
 
