@@ -141,6 +141,8 @@ def without_repeats(
         The orbits, each once.
     """
     candidates, found, split = cells
+    if not candidates.order.any():
+        return cells
     place = candidates.force.astype(int) * len(window.frequencies) + candidates.frequency
     good = np.flatnonzero(found.code == FOUND)
     good = good[np.bincount(place[good], minlength=1)[place[good]] > 1]

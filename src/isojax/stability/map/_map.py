@@ -302,6 +302,8 @@ def _measured(
     found: Found,
 ) -> Found:
     """Measure the motions of which the surface does not tell the size."""
+    if surface.sized.all():
+        return found
     some = np.flatnonzero((found.code == FOUND) & ~surface.sized[candidates.frequency, candidates.part])
     if not some.size:
         return found
@@ -330,9 +332,7 @@ def _gridded(
 ) -> dict[str, np.ndarray]:
     """Put the orbits into their cells; a cell in which none was found says that nothing converged."""
     orbits = int(candidates.order.max()) + 1 if candidates.order.size else 1
-    place = np.ravel_multi_index(
-        (candidates.order, candidates.force, candidates.frequency), (orbits, rows, columns)
-    )
+    place = (candidates.order * np.int64(rows) + candidates.force) * columns + candidates.frequency
     # The common case, one orbit in every cell and in the order of the cells, takes no copying.
     whole = place.size == orbits * rows * columns and bool((np.diff(place) == 1).all())
     arrays: dict[str, np.ndarray] = {}
@@ -353,6 +353,6 @@ def _gridded(
     code = onto_grid(found.code, NO_FURTHER_ORBIT)
     cells = code.reshape(orbits, rows, columns)
     arrays["count"] = (cells == FOUND).sum(axis=0)
-    answered = np.isin(cells, (FOUND, STICKS)).any(axis=0)
+    answered = ((cells == FOUND) | (cells == STICKS)).any(axis=0)
     arrays["code"] = np.where(~answered & (code == NO_FURTHER_ORBIT), NOT_CONVERGED, code)
     return arrays

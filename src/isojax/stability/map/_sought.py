@@ -140,7 +140,6 @@ def seek(
     # there, gives starts that may be no maxima, and neither the numbers nor the order of kinks of the orbit.
     tabled = model.internal_states == 0 and not model.harmonics
     read, error = np.full(expected.shape, tabled), math.nan
-    shared = surface.shared[candidates.frequency, candidates.part] & (not model.harmonics)
     read &= expected <= integrator.map_error
     if read.any():
         places = _sample(surface, candidates, np.flatnonzero(read))
@@ -157,6 +156,7 @@ def seek(
             read = np.zeros_like(read)
     if read.all():
         return Sought(surface, (Group("read", reader, candidates),), error, tabled)
+    shared = surface.shared[candidates.frequency, candidates.part] & (not model.harmonics)
     ways = (("read", reader, read), ("split", split, shared & ~read), ("whole", whole, ~shared & ~read))
     if model.splits:
         # Where sharp laws give each orbit events of its own, no compiled step serves all.
