@@ -87,9 +87,11 @@ jax.monitoring.register_event_duration_secs_listener(_note_compiled)
 
 
 @pytest.fixture
-def unchecked() -> None:
+def unchecked():
     """The package as a user has it, without the runtime shape checks of the tests."""
-    jaxtyping.config.update("jaxtyping_disable", True)  # until the next test begins
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture(autouse=True)
@@ -135,13 +137,12 @@ _WORTH_OPTIMISING = (
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Check shapes in quick tests alone, optimise compiled code where that is worth it; before any fixture.
+    """Optimise compiled code where that is worth its time; before any fixture is made.
 
-    The checks take a sixth of the time of a slow test. Where nothing is optimised small records run no slower
-    than they would compile. Processes that a test starts do alike, so that they find what was compiled here.
+    Elsewhere small records run no slower than they would compile. Processes that the test starts do alike, so
+    that they find what was compiled here.
     """
     optimise = any(part in item.nodeid for part in _WORTH_OPTIMISING)
-    jaxtyping.config.update("jaxtyping_disable", item.get_closest_marker("slow") is not None)
     jax.config.update("jax_disable_most_optimizations", not optimise)
     os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = str(not optimise).lower()
 

@@ -52,6 +52,11 @@ def test_intervals_of_any_confidence_are_those_of_the_scatters_that_the_records_
         np.testing.assert_allclose(answer.interval - value, [-exact, exact], rtol=0.03)
 
 
+def test_where_nothing_follows_a_condition_the_errors_are_as_given(fit):
+    found = ij.next_record(fit)
+    np.testing.assert_array_equal(ij.models.fit_at(found).covariance, found.covariance)
+
+
 def test_a_force_known_to_a_per_cent_is_a_linear_amplitude_known_to_a_per_cent(fit):
     omega = 2.0 * np.pi * FREQUENCY
 

@@ -309,4 +309,4 @@ class Quantity:
             return jnp.ravel(asked_numbers(self._argument, function, self.space.moved(at, shake)))
 
         change = np.asarray(jax.jacfwd(shaken)(jnp.zeros(errors.steps)))
-        return errors.multiples(change, 1.0 - self.constraint.chance) * np.linalg.norm(change, axis=1)
+        return errors.coverage_factor(change, 1.0 - self.constraint.chance) * np.linalg.norm(change, axis=1)

@@ -97,7 +97,7 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
             "of the base acceleration acts like one of the same share in `amplitude`."
         )
     values = np.array([float(entry.value) for entry in listed])
-    own = np.zeros(len(listed))
+    stiffness = np.zeros(len(listed))
     spring, scatter = stiffness_place(model), 0.0
     if spring is not None:
         scatter = held.stats.next_stiffness_scatter
@@ -106,11 +106,11 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
                 "Argument `fit` must rest on two records or more: one shows no scatter of the stiffness "
                 "between records. A file of an older version does not hold the scatter: fit again."
             )
-        own[spring] = scatter * values[spring]
+        stiffness[spring] = values[spring]
     # A force in a unit that is off by a share: what is measured in newtons or kilograms follows it.
     scaled = np.array([entry.spec.unit.startswith(("N", "kg")) for entry in listed])
     common = np.where(scaled, calibration * values, 0.0)
-    covariance = np.diag(own**2) + np.outer(common, common)
+    covariance = np.diag((scatter * stiffness) ** 2) + np.outer(common, common)
     names = [entry.name for entry in listed]
     fitted = np.array([names.index(name) for name in held.free])
     covariance[np.ix_(fitted, fitted)] += held.covariance
@@ -118,9 +118,8 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
     free = tuple(names[place] for place in uncertain)
     law = held.mixture
     if law is not None:
-        mean = np.where(np.arange(len(listed)) == spring, values, 0.0)
-        alone = law.scatters[:, None] * mean
+        alone = law.scatters[:, None] * stiffness
         changes = np.stack([alone, np.broadcast_to(common, alone.shape)], axis=1)
-        law = law.turned(np.eye(len(listed))[uncertain][:, fitted]).widened(changes[..., uncertain])
+        law = law.propagated(np.eye(len(listed))[uncertain][:, fitted]).widened(changes[..., uncertain])
     errors = covariance[np.ix_(uncertain, uncertain)]
     return NextRecord(model, free, errors, held.result, scatter, calibration, law)

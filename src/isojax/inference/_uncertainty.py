@@ -14,6 +14,7 @@ from .._show import Row, shown
 from .._types import check_float64
 from ..models import (
     CoefficientErrors,
+    CredibleSet,
     EndsEstimated,
     Estimated,
     Isolator,
@@ -196,10 +197,8 @@ def uncertainty(
         )
     # The delta method knows one law: several are not one normal distribution, whether or not a law bends.
     straight = error if len(fits) == 1 else np.full_like(error, np.nan)
-    known = credible_set(value, straight, drawn, confidence, parts[0].multiples)
-    bent = [
-        credible_set(part.value, part.error, part.draws, confidence, part.multiples).curved for part in parts
-    ]
+    known = credible_set(value, straight, drawn, confidence, parts[0].coverage_factor)
+    bent = [part.known(confidence).curved for part in parts]
     return UncertainQuantity(
         value,
         known.standard_error,
@@ -223,14 +222,18 @@ class _Carried(NamedTuple):
         error: its standard error by the delta method.
         draws: the quantity at drawn coefficients.
         reason: why it raised, if it did.
-        multiples: standard errors between the value and an end, by the chance beyond it.
+        coverage_factor: standard errors between the value and an end, by the chance beyond it.
     """
 
     value: Float[np.ndarray, "..."]
     error: Float[np.ndarray, "..."]
     draws: Float[np.ndarray, "draw ..."]
     reason: str
-    multiples: Callable[[np.ndarray], np.ndarray]
+    coverage_factor: Callable[[np.ndarray], np.ndarray]
+
+    def known(self, confidence: float) -> CredibleSet:
+        """Give the set that holds the quantity, and perhaps "none"."""
+        return credible_set(self.value, self.error, self.draws, confidence, self.coverage_factor)
 
 
 def _carried(
@@ -257,8 +260,8 @@ def _carried(
         known = np.full(drawn.shape[1:], np.nan), np.full((*drawn.shape[1:], errors.steps), np.nan)
     value, change = (np.asarray(one, dtype=float) for one in known)
     error = np.asarray(np.linalg.norm(change, axis=-1))
-    multiples = partial(errors.multiples, change)
-    return _Carried(value, error, np.asarray(drawn, dtype=float), raised or missing, multiples)
+    coverage_factor = partial(errors.coverage_factor, change)
+    return _Carried(value, error, np.asarray(drawn, dtype=float), raised or missing, coverage_factor)
 
 
 def _why_missing(quantity: Callable[[Isolator], Any], errors: CoefficientErrors) -> str:

@@ -12,7 +12,6 @@ Read `_isolator.py` (the equation of motion) and `_instant.py` (the signals at o
 
 from ._as_isolator import Modelled as Modelled
 from ._as_isolator import as_isolator as as_isolator
-from ._band import HALF_WIDTH as HALF_WIDTH
 from ._band import Band as Band
 from ._band import CurveBeside as CurveBeside
 from ._band import band_across as band_across
@@ -46,6 +45,8 @@ from ._laws import Regime as Regime
 from ._laws import State as State
 from ._laws import find_switches as find_switches
 from ._laws import share_internal as share_internal
+from ._normal_mixture import CONFIDENCE as CONFIDENCE
+from ._normal_mixture import HALF_WIDTH as HALF_WIDTH
 from ._normal_mixture import NormalMixture as NormalMixture
 from ._normal_mixture import half_width as half_width
 from ._rk4 import RK4 as RK4

@@ -8,21 +8,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
-from scipy.special import ndtri
 
 from .._show import Row, brief, shown
 from ._coefficient_errors import CoefficientErrors
 from ._credible_set import credible_set
 from ._isolator import Isolator
+from ._normal_mixture import CONFIDENCE, HALF_WIDTH
 from ._second_order import expanded, expansion_nodes
 from ._shifted_curve import shifts_across
-
-CONFIDENCE = 0.95
-"""Chance that each point of a band is meant to hold the truth."""
-
-HALF_WIDTH = -float(ndtri(0.5 * (1.0 - CONFIDENCE)))
-"""Of such an interval, in standard errors."""
-
 
 _DRAWS, _SEED = 1000, 0
 """Draws of the coefficients: those of `uncertainty`, where nothing else is asked for."""

@@ -141,7 +141,7 @@ class CoefficientErrors(NamedTuple):
         moved = self.values + steps @ self.root.T
         return np.all((moved >= lower) & (moved <= upper), axis=1)
 
-    def multiples(
+    def coverage_factor(
         self, change: Float[np.ndarray, "... step"], tail: float | Float[np.ndarray, "..."]
     ) -> Float[np.ndarray, "..."]:
         """Give how many standard errors lie between a quantity and an end beyond which some chance is.
@@ -151,11 +151,16 @@ class CoefficientErrors(NamedTuple):
             tail: the chance beyond, on one side.
 
         Returns:
-            The multiples, to first order; 1.96 for 0.025.
+            The coverage factor, to first order; 1.96 for 0.025.
         """
         if self.mixture is None:
             return np.broadcast_to(-ndtri(tail), change.shape[:-1])
-        return self.mixture.multiples(change, tail)
+        return self.mixture.coverage_factor(change, tail)
+
+    @property
+    def even_numbers(self) -> int:
+        """How many even numbers a draw takes: see `steps_of`."""
+        return self.steps + (self.mixture is not None)
 
     def steps_of(self, even: Float[np.ndarray, "draw number"]) -> Float[np.ndarray, "draw step"]:
         """Give the steps that belong to even numbers.
@@ -283,4 +288,4 @@ def coefficient_errors(fit: Estimated | EndsEstimated, model: Isolator | None = 
     names = [entry.name for entry in listed]
     values = np.array([float(held.model[name]) for name in free])
     places = tuple(names.index(name) for name in free)
-    return CoefficientErrors(held.model, places, values, root, None if law is None else law.turned(back))
+    return CoefficientErrors(held.model, places, values, root, None if law is None else law.propagated(back))

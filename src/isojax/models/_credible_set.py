@@ -54,7 +54,7 @@ def credible_set(
     error: Float[np.ndarray, "..."],
     drawn: Float[np.ndarray, "draw ..."],
     confidence: float,
-    multiples: Callable[[np.ndarray], np.ndarray] = lambda tail: -ndtri(tail),
+    coverage_factor: Callable[[np.ndarray], np.ndarray] = lambda tail: -ndtri(tail),
 ) -> CredibleSet:
     """Give the set of numbers, and perhaps "none", that holds a quantity.
 
@@ -63,8 +63,8 @@ def credible_set(
         error: by the delta method; NaN where that must not be taken.
         drawn: the quantity at coefficients drawn from their distribution; NaN where it does not exist.
         confidence: chance that the set is meant to hold the truth.
-        multiples: standard errors between the value and an end, by the chance beyond it; those of a normal
-            law unless given.
+        coverage_factor: standard errors between the value and an end, by the chance beyond it; those of a
+            normal law unless given.
 
     Returns:
         The set. Ends are NaN where too few draws have the quantity to tell them.
@@ -80,10 +80,10 @@ def credible_set(
     wanted = np.asarray(0.5 * (1.0 - content))
     # Further out than the outermost draw nothing can be compared.
     tail = np.asarray(np.maximum(wanted, 0.5 / count))
-    spread = multiples(tail) * error
+    spread = coverage_factor(tail) * error
     ends = _quantiles(drawn, tail)
     # How far the ends move with their share tells the error of a quantile of so many draws.
-    beside = multiples(tail * (1.0 - _TAIL_STEP)) - multiples(tail * (1.0 + _TAIL_STEP))
+    beside = coverage_factor(tail * (1.0 - _TAIL_STEP)) - coverage_factor(tail * (1.0 + _TAIL_STEP))
     chance = np.sqrt((1.0 - tail) / tail / np.maximum(held, 1)) * beside / (2.0 * _TAIL_STEP) * error
     with np.errstate(invalid="ignore"):
         allowed = np.maximum(
@@ -92,7 +92,7 @@ def credible_set(
         curved = ~(np.max(np.abs(ends - np.stack([value - spread, value + spread])), axis=0) <= allowed)
     ends = np.where(held * (1.0 - confidence) >= _DRAWS_BEYOND, ends, np.nan)
     # Where "none" may be all that is left out, the tail of the numbers is not known more exactly than that.
-    reach = multiples(np.where(share < 1.0, tail, wanted)) * error
+    reach = coverage_factor(np.where(share < 1.0, tail, wanted)) * error
     straight = np.stack([value - reach, value + reach])
     return CredibleSet(
         share,

@@ -86,8 +86,9 @@ def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitA
     covariance = slopes @ np.asarray(held.covariance) @ slopes.T
     if law is not None:
         # What is correlated adds up as the law says, whose tails a covariance does not know.
-        law = law.turned(slopes)
+        law = law.propagated(slopes)
         size = np.sqrt(np.diag(covariance))
-        scale = law.standard_errors / np.where(size > 0.0, size, 1.0)
+        adds = (np.count_nonzero(slopes, axis=1) > 1) & (size > 0.0)
+        scale = np.where(adds, law.standard_errors / np.where(adds, size, 1.0), 1.0)
         covariance *= np.outer(scale, scale)
     return FitAt(model, names, covariance, held.result, law)

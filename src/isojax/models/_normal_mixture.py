@@ -10,8 +10,11 @@ from .._show import Row, shown
 
 _WIDTH_BISECTIONS = 40
 
-_STANDARD = 0.95
-"""Chance that the interval of 1.96 standard errors holds the truth, which defines them."""
+CONFIDENCE = 0.95
+"""Chance that an interval of 1.96 standard errors is meant to hold the truth, which defines them."""
+
+HALF_WIDTH = -float(ndtri(0.5 * (1.0 - CONFIDENCE)))
+"""Of such an interval, in standard errors."""
 
 
 @shown
@@ -36,9 +39,9 @@ class NormalMixture(NamedTuple):
     @property
     def standard_errors(self) -> Float[np.ndarray, " coefficient"]:
         """Half-width about each fitted value that holds 95 %, over 1.96 [unit of each coefficient]."""
-        return self.half_width(np.eye(self.means.shape[1]), _STANDARD) / -ndtri(0.5 - 0.5 * _STANDARD)
+        return self.half_width(np.eye(self.means.shape[1]), CONFIDENCE) / HALF_WIDTH
 
-    def turned(self, slopes: Float[np.ndarray, "quantity coefficient"]) -> "NormalMixture":
+    def propagated(self, slopes: Float[np.ndarray, "quantity coefficient"]) -> "NormalMixture":
         """Give the law of quantities that are linear in the coefficients.
 
         Args:
@@ -77,7 +80,7 @@ class NormalMixture(NamedTuple):
         spread = np.einsum("...k,pkl,...l->...p", slopes, self.covariances, slopes)
         return half_width(self.weights, means, np.sqrt(np.maximum(spread, 0.0)), confidence)
 
-    def multiples(
+    def coverage_factor(
         self, slopes: Float[np.ndarray, "... coefficient"], tail: float | Float[np.ndarray, "..."]
     ) -> Float[np.ndarray, "..."]:
         """Give how many standard errors lie between a linear quantity and an end beyond which some chance is.
@@ -87,13 +90,15 @@ class NormalMixture(NamedTuple):
             tail: the chance beyond, on one side.
 
         Returns:
-            The multiples: 1.96 for 0.025, whatever the law; negative for more than a half.
+            The coverage factor: 1.96 for 0.025, whatever the law; negative for more than a half.
+
+        Source: JCGM 100:2008, sec. 6.2 (coverage factor).
         """
-        standard = self.half_width(slopes, _STANDARD)
+        standard = self.half_width(slopes, CONFIDENCE)
         tail = np.broadcast_to(np.asarray(tail, dtype=float), standard.shape)
         width = self.half_width(slopes, np.abs(1.0 - 2.0 * tail))
         moves = standard > 0.0
-        share = np.where(moves, width / np.where(moves, standard, 1.0) * -ndtri(0.5 - 0.5 * _STANDARD), 0.0)
+        share = np.where(moves, width / np.where(moves, standard, 1.0) * HALF_WIDTH, 0.0)
         return np.where(moves, np.sign(0.5 - tail) * share, -ndtri(tail))
 
     def draw(

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import block_diag
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
-from ...models import NormalMixture, half_width
+from ...models import CONFIDENCE, HALF_WIDTH, NormalMixture, half_width
 from ..jacobian import STIFFNESS_SCALE_UNIT
 from ._covariance import Determined, Uncertainty, find_determined, invert_information, unknown
 from ._elimination import Nuisances, Reduced
@@ -21,12 +21,6 @@ Half of its weight lies below; its tail falls so slowly that records which show 
 _SCATTERS = np.geomspace(1e-6, 0.3, 64)
 """Scatters over which is summed [relative]; each is a fifth larger than the last, far less than n records
 can tell apart."""
-
-_LEVEL = 0.95
-"""Chance that an interval holds the truth."""
-
-_WIDTH = float(ndtri(0.5 + 0.5 * _LEVEL))
-"""Half-width of that interval of a normal law, in standard deviations."""
 
 _ROOT_BISECTIONS = 40
 
@@ -124,7 +118,7 @@ def scatter_of_next(reduced: Reduced, nuisances: Nuisances, inflation: float) ->
         ).weight
     except np.linalg.LinAlgError:
         return float("nan")
-    return float(half_width(weight, np.zeros_like(_SCATTERS), _SCATTERS, _LEVEL)) / _WIDTH
+    return float(half_width(weight, np.zeros_like(_SCATTERS), _SCATTERS, CONFIDENCE)) / HALF_WIDTH
 
 
 class ScatteredScores(NamedTuple):
@@ -152,8 +146,8 @@ class ScatteredScores(NamedTuple):
         own = np.diagonal(self.information, axis1=1, axis2=2)
         shows = np.all(own > 0.0, axis=0)
         safe = np.where(shows, own, 1.0)
-        width = half_width(self.weight.T, (self.score / safe - strength).T, 1.0 / np.sqrt(safe).T, _LEVEL)
-        return np.where(shows, width / _WIDTH, np.inf)
+        width = half_width(self.weight.T, (self.score / safe - strength).T, 1.0 / np.sqrt(safe).T, CONFIDENCE)
+        return np.where(shows, width / HALF_WIDTH, np.inf)
 
 
 def scores_over_scatters(
@@ -281,9 +275,9 @@ def _uncertainty(known: Determined, records: _Records, scatter: float) -> Uncert
     moment = np.einsum("t,tij->ij", mixture.weight, covariance)
     moment += np.einsum("t,ti,tj->ij", mixture.weight, step, step)
     error = np.sqrt(np.einsum("tii->ti", covariance))
-    width = half_width(mixture.weight, step.T, error.T, _LEVEL) / _WIDTH
+    width = half_width(mixture.weight, step.T, error.T, CONFIDENCE) / HALF_WIDTH
     scale = width / np.sqrt(np.where(np.diag(moment) > 0.0, np.diag(moment), 1.0))
-    law = _merged(mixture.weight, step, covariance).turned(np.diag(1.0 / known.size))
+    law = _merged(mixture.weight, step, covariance).propagated(np.diag(1.0 / known.size))
     return known.uncertainty(moment * np.outer(scale, scale))._replace(mixture=law)
 
 

@@ -87,8 +87,7 @@ def quasi_draws(errors: CoefficientErrors, count: int = DRAWS) -> Float[np.ndarr
         return np.zeros((1, 0))
     # Sobol points are even in numbers of a power of two; the first of them do as well.
     powers = 2 ** int(np.ceil(np.log2(count)))
-    numbers = errors.steps + (errors.mixture is not None)
-    cells = Sobol(numbers, scramble=False).random(powers)[:count]
+    cells = Sobol(errors.even_numbers, scramble=False).random(powers)[:count]
     steps = errors.steps_of(cells + 0.5 / powers)
     kept = steps[errors.inside(steps)]
     return kept if len(kept) else np.zeros((1, errors.steps))
