@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import scipy.stats
 
+from .._cores import blas_in_one_thread
 from .._kept import digest, kept_answers, package_digest
 from .._progress import LOOP_SHARES, REPLACE_SHARE, KeyFigure, Stage, silent
 from .._results import RESULTS, is_successful
@@ -153,6 +154,7 @@ def extend(before: Fit | Fitted, verdict: Verdict) -> Extension:
     return Extension(as_fit(before, "before"), verdict.after, verdict)
 
 
+@blas_in_one_thread
 def close_loop(
     campaign: Campaign | str | Path,
     *,

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from ..._cores import blas_in_one_thread
 from ..._progress import silent
 from ..._results import RESULTS
 from ...elements import CATALOGUE, AbstractElement
@@ -51,6 +52,7 @@ def is_locked(fit: Fit, rules: Rules) -> bool:
     return lack_of_fit(fit).p_value < rules.significance
 
 
+@blas_in_one_thread
 def diagnose(
     fit: Fit | Fitted,
     *,

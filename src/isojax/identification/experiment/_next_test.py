@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..._cores import blas_in_one_thread
 from ..._parameters import element_names, list_parameters
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
@@ -69,6 +70,7 @@ class _Asked(NamedTuple):
     inflation: float
 
 
+@blas_in_one_thread
 def next_test(
     fit: Fit | Fitted,
     quantity: Callable[[Isolator], Any] | None = None,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._cores import blas_in_one_thread
 from ..._parameters import element_names, list_parameters, replace_parameters
 from ..._progress import silent
 from ..._results import RESULTS, is_successful
@@ -26,6 +27,7 @@ from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
 from ._simulator import Simulator
 
 
+@blas_in_one_thread
 def fit(
     model: Isolator | Modelled | Campaign | str | Path,
     campaign: Campaign | str | Path | None = None,

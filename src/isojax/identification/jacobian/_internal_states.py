@@ -70,20 +70,23 @@ def internal_starts(
     families = find_families(dynamic)
     ends = np.cumsum([0, *(element.internal_states for element in dynamic)])
 
+    owned = [slice(part * (lanes // parts), (part + 1) * (lanes // parts)) for part in range(parts)]
+
+    def tabulated(task: tuple[np.ndarray, slice]) -> tuple[Float[Array, "node 3 lanes"], ...]:
+        motion, own = task
+        return tuple(_stages(row, steps) for row in motion[: 4 if based else 3, :, own])
+
     def along(task: tuple[ElementFamily, int]) -> None:
         family, part = task
-        own = slice(part * (lanes // parts), (part + 1) * (lanes // parts))
-        rows = 4 if based else 3
-        tables = (tuple(_stages(row, steps) for row in motion[:rows, :, own]) for motion in (before, over))
-        step = prepared.sampling.time / steps
+        own, step = owned[part], prepared.sampling.time / steps
         rest = (jnp.zeros((len(family.places), lanes // parts)),) * family.elements.internal_states
-        first, _ = internal_state_path(family.elements, next(tables), rest, step)
+        first, _ = internal_state_path(family.elements, leading[part], rest, step)
         places = [[int(ends[place]) + state for place in family.places] for state in range(len(rest))]
         for state, values in zip(places, first, strict=True):
             starts[state, own] = np.asarray(values)
         if min(family.places) >= acting:
             return
-        _, path = internal_state_path(family.elements, next(tables), first, step)
+        _, path = internal_state_path(family.elements, within[part], first, step)
         for state, values in zip(places, path, strict=True):
             # Not the square: an internal state that diverged may be too large for it.
             size = np.where(inside[:, None, own], np.abs(np.asarray(values)[::steps]), 0.0)
@@ -94,5 +97,8 @@ def internal_starts(
     orders = [in_turn(families, part) for part in range(parts)]
     tasks = [(order[turn], part) for turn in range(len(families)) for part, order in enumerate(orders)]
     with ThreadPoolExecutor(workers()) as pool:
+        # Once for all kinds: to lay out a motion takes longer than to follow it.
+        leading = list(pool.map(tabulated, [(before, own) for own in owned]))
+        within = list(pool.map(tabulated, [(over, own) for own in owned])) if acting else []
         list(pool.map(along, tasks))
     return starts, spread

@@ -1,0 +1,43 @@
+"""isojax shares its work among threads itself; BLAS adds none to them, and has its own again afterwards."""
+
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from isojax import rig
+from isojax._cores import blas_in_one_thread
+from isojax.identification import classical_guess, diagnose, fit
+
+
+def _threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_blas_has_one_thread_inside_and_as_many_as_before_afterwards():
+    @blas_in_one_thread
+    def work(number, *, fails=False):
+        if fails:
+            raise ArithmeticError(number)
+        return number, _threads()
+
+    with threadpool_limits(3, user_api="blas"):
+        assert work(2) == (2, {1})
+        assert _threads() == {3}
+        with pytest.raises(ArithmeticError, match="2"):
+            work(2, fails=True)
+        assert _threads() == {3}
+
+
+def test_a_fit_and_its_diagnosis_hold_blas_to_one_thread(simulated):
+    campaign = simulated(rig.y_plant(), rig.SteppedSine((60.0, 120.0), (4.6, 5.4), 12, ("forward",)), 5)
+    seen: list[set[int]] = []
+
+    def progress(line: str) -> None:
+        seen.append(_threads())
+
+    with threadpool_limits(2, user_api="blas"):
+        fitted = fit(classical_guess(campaign), campaign, progress=progress)
+        steps = len(seen)
+        diagnose(fitted, progress=progress)
+        assert _threads() == {2}
+    assert 0 < steps < len(seen)
+    assert all(one == {1} for one in seen)
