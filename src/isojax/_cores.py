@@ -1,5 +1,6 @@
-"""How many cores there are to share the work, and who shares it."""
+"""How many cores there are to share the work, who shares it, and the memory that it leaves."""
 
+import ctypes
 import functools
 import os
 from collections.abc import Callable
@@ -37,3 +38,15 @@ def blas_in_one_thread(work: Callable[_Given, _Answer]) -> Callable[_Given, _Ans
             return work(*args, **kwargs)
 
     return alone
+
+
+def give_memory_back() -> None:
+    """Give freed memory back to the system; glibc keeps it for each thread, where no other finds it.
+
+    Where there is another C library nothing is done.
+    """
+    try:
+        library = ctypes.CDLL("libc.so.6")
+    except OSError:
+        return
+    library.malloc_trim(0)

@@ -35,6 +35,8 @@ from isojax.elements import (
 from isojax.excitations import Sampled
 from isojax.identification.fitting._problem import one_hot
 from isojax.identification.jacobian import _batch
+from isojax.identification.jacobian import _batch as batches
+from isojax.identification.jacobian import _score_columns as score_columns
 from isojax.identification.jacobian._batch import Prepared, prepare
 from isojax.identification.jacobian._information import information, readings
 from isojax.identification.jacobian._score_columns import score_information
@@ -68,6 +70,7 @@ class Case(NamedTuple):
     quantity: str = "acceleration"
     hold: str = "band_limited"
     amplitude: float = 120.0
+    segments: tuple[Segment, ...] = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0))
 
 
 CASES = {
@@ -92,10 +95,9 @@ CASES = {
 def _setting(case: Case, substeps: int | None = None) -> tuple[Prepared, Unknowns, tuple[int, ...]]:
     records = _records((300, 220), case.amplitude)
     model = case.model
-    segments = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0))
     prepared = prepare(
         records,
-        segments,
+        case.segments,
         quantity=case.quantity,
         hold=case.hold,
         substeps=Integrator().record_steps(model) if substeps is None else substeps,
@@ -349,12 +351,24 @@ def test_columns_at_every_third_sample_are_almost_those_of_the_exact_derivatives
         assert np.median(share) > 0.95
 
 
-def _both_ways(model, node=1):
+def test_columns_of_a_few_lanes_at_a_time_are_those_of_the_exact_derivatives(monkeypatch):
+    for module in (batches, score_columns):
+        monkeypatch.setattr(module, "workers", lambda: 1)
+    # Room for two lanes: of three, the last block holds one again.
+    monkeypatch.setattr(score_columns, "_ENTRIES", 1e5)
+    segments = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0), Segment(0, 90, 300, 110))
+    exact, found = _both_ways(Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))), segments=segments)
+    assert len(found) == 3
+    for lane in range(3):
+        assert _deviation(found[lane], exact[lane]) < 3e-4
+
+
+def _both_ways(model, node=1, segments=CASES["maxwell"].segments):
     """Information with probes among the columns: by exact derivatives, and by one linear solve."""
     probes = tuple(probe for probe in PROBES if model.element(probe.name) is None)
     full = model.with_elements(*probes)
     amplitude = 120.0 if model.excitation == "force" else 0.15
-    prepared, unknowns, _ = _setting(Case(model, amplitude=amplitude))
+    prepared, unknowns, _ = _setting(Case(model, amplitude=amplitude, segments=segments))
     names = [entry.name for entry in list_parameters(full)]
     wanted = [name for name in names if name.split(".")[-1] in ("coefficient", "stiffness", "force_level")]
     wanted += [name for name in names if name.split(".")[-1] in ("delay", "rate", "deviation", "offset")]

@@ -11,6 +11,7 @@ along with which model.
 import itertools
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -18,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._cores import give_memory_back
 from ..._parameters import list_parameters, own_parameters
 from ...models import Isolator, State
 from ._batch import Batch, Prepared, average_around, workers
@@ -30,7 +32,7 @@ from ._transitions import Transitions, transitions_along
 from ._unknowns import STIFFNESS_SCALE_UNIT, Lanes, Unknowns, has_stiffness_scale
 from ._whitening import whitened_products
 
-_ENTRIES = 2e7
+_ENTRIES = 5e6
 """Numbers that one table of columns along the motion may hold."""
 
 _LEAST_COLUMNS = 160
@@ -115,16 +117,23 @@ def score_information(
         width = -(-lanes // blocks)
         done = []
         for first in range(0, lanes, width):
-            # All of them are not picked one by one, which would copy them and take a tenth of it all.
-            chosen = slice(None) if blocks == 1 else np.minimum(np.arange(first, first + width), lanes - 1)
-            some = jax.tree_util.tree_map(
-                lambda values, chosen=chosen: values[..., chosen], (batch, scale, states, scales)
-            )
-            done.append(_block(layout, prepared, columns, part, *some)[: lanes - first])
+            # The last block reaches back, so that all have one shape.
+            begin = min(first, lanes - width)
+            some: Any = (batch, scale, states, scales)
+            if blocks > 1:
+                some = jax.tree_util.tree_map(partial(_some_lanes, begin=begin, width=width), some)
+            done.append(_block(layout, prepared, columns, part, *some)[first - begin :])
         return np.concatenate(done)
 
     with ThreadPoolExecutor(workers()) as pool:
-        return np.concatenate(list(pool.map(one, range(parts))))
+        products = np.concatenate(list(pool.map(one, range(parts))))
+    give_memory_back()
+    return products
+
+
+def _some_lanes(values: Array, begin: int, width: int) -> Array:
+    """Give a few lanes of a table, by a function that is compiled once for all places of a shape."""
+    return jax.lax.dynamic_slice_in_dim(values, begin, width, axis=-1)
 
 
 def _block(
