@@ -1,8 +1,10 @@
 """How many cores there are to share the work, who shares it, and the memory that it leaves."""
 
+import contextlib
 import ctypes
 import functools
 import os
+import threading
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -29,15 +31,39 @@ def blas_in_one_thread(work: Callable[_Given, _Answer]) -> Callable[_Given, _Ans
         work: the function.
 
     Returns:
-        The function; when it returns BLAS has as many threads as before.
+        The function; when the last thread in it is done BLAS has as many threads as before.
     """
 
     @functools.wraps(work)
     def alone(*args: _Given.args, **kwargs: _Given.kwargs) -> _Answer:
-        with ThreadpoolController().limit(limits=1, user_api="blas"):
+        with _one_thread:
             return work(*args, **kwargs)
 
     return alone
+
+
+class _OneThread:
+    """Holds BLAS to one thread from the first of all threads that enter to the last that leaves."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._held = contextlib.ExitStack()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._held.enter_context(ThreadpoolController().limit(limits=1, user_api="blas"))
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                self._held.close()
+
+
+_one_thread = _OneThread()
 
 
 def give_memory_back() -> None:

@@ -1,9 +1,13 @@
 """isojax shares its work among threads itself; BLAS adds none to them, and has its own again afterwards."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from isojax import rig
+from isojax import _cores, rig
 from isojax._cores import blas_in_one_thread
 from isojax.identification import classical_guess, diagnose, fit
 
@@ -25,6 +29,42 @@ def test_blas_has_one_thread_inside_and_as_many_as_before_afterwards():
         with pytest.raises(ArithmeticError, match="2"):
             work(2, fails=True)
         assert _threads() == {3}
+
+
+def test_the_last_of_several_threads_gives_blas_its_threads_back(monkeypatch):
+    # Some builds of BLAS hide from one thread what another has set, so that the calls themselves are counted.
+    calls: list[str] = []
+
+    class Controller:
+        @contextmanager
+        def limit(self, **limits):
+            calls.append(f"held to {limits}")
+            yield
+            calls.append("given back")
+
+    monkeypatch.setattr(_cores, "ThreadpoolController", Controller)
+    first_is_inside, second_is_inside, first_is_done = (threading.Event() for _ in range(3))
+
+    @blas_in_one_thread
+    def first():
+        first_is_inside.set()
+        assert second_is_inside.wait(60.0)
+
+    @blas_in_one_thread
+    def second():
+        second_is_inside.set()
+        assert first_is_done.wait(60.0)
+        return list(calls)
+
+    held = "held to {'limits': 1, 'user_api': 'blas'}"
+    with ThreadPoolExecutor(2) as pool:
+        begun = pool.submit(first)
+        assert first_is_inside.wait(60.0)
+        later = pool.submit(second)
+        begun.result(60.0)
+        first_is_done.set()
+        assert later.result(60.0) == [held]
+    assert calls == [held, "given back"]
 
 
 def test_a_fit_and_its_diagnosis_hold_blas_to_one_thread(simulated):
