@@ -1,6 +1,5 @@
 """Shared fixtures: float64 before any array is made, shape checks, and the folder of third-party data."""
 
-import ctypes
 import gc
 import os
 import shutil
@@ -110,9 +109,11 @@ def _let_compiled_code_go() -> Iterator[None]:
     pages = int((process / "statm").read_text().split()[1])
     crowded = len((process / "maps").read_bytes().splitlines()) > _MOST_MAPPINGS
     if crowded or pages * os.sysconf("SC_PAGE_SIZE") > _MOST_MEMORY:
+        from isojax._cores import give_memory_back  # here, because the hook above must see the import
+
         jax.clear_caches()
         gc.collect()
-        ctypes.CDLL(None).malloc_trim(0)  # glibc keeps what was freed otherwise
+        give_memory_back()
 
 
 def pytest_configure(config: pytest.Config) -> None:

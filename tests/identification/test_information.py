@@ -34,9 +34,7 @@ from isojax.elements import (
 )
 from isojax.excitations import Sampled
 from isojax.identification.fitting._problem import one_hot
-from isojax.identification.jacobian import _batch
-from isojax.identification.jacobian import _batch as batches
-from isojax.identification.jacobian import _score_columns as score_columns
+from isojax.identification.jacobian import _batch, _score_columns
 from isojax.identification.jacobian._batch import Prepared, prepare
 from isojax.identification.jacobian._information import information, readings
 from isojax.identification.jacobian._score_columns import score_information
@@ -352,10 +350,10 @@ def test_columns_at_every_third_sample_are_almost_those_of_the_exact_derivatives
 
 
 def test_columns_of_a_few_lanes_at_a_time_are_those_of_the_exact_derivatives(monkeypatch):
-    for module in (batches, score_columns):
+    for module in (_batch, _score_columns):
         monkeypatch.setattr(module, "workers", lambda: 1)
     # Room for two lanes: of three, the last block holds one again.
-    monkeypatch.setattr(score_columns, "_ENTRIES", 1e5)
+    monkeypatch.setattr(_score_columns, "_ENTRIES", 1e5)
     segments = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0), Segment(0, 90, 300, 110))
     exact, found = _both_ways(Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))), segments=segments)
     assert len(found) == 3
