@@ -110,6 +110,15 @@ def test_a_law_without_memory_is_not_asked():
     assert find_activity(CubicStiffness(-1e12), 1e-3, 0.03) is None
 
 
+@pytest.mark.parametrize("cubic", [-1e12, 1e12])
+def test_a_spring_whose_stiffness_is_lost_is_physical(cubic, simulated):
+    # A softening spring loses its stiffness within the motion, a snap-through spring has none at rest.
+    linear = 1e6 if cubic < 0.0 else -1e5
+    campaign = simulated(rig.Plant(BASE), rig.SteppedSine((100.0,), (3.0, 4.0, 5.0)))
+    model = ij.Isolator(800.0, (ij.LinearStiffness(linear), ij.CubicStiffness(cubic), ij.LinearDamping(1e4)))
+    assert find_violation(model, campaign.fit_records, "acceleration") is None
+
+
 @pytest.mark.parametrize(("coefficient", "physical"), [(4e9, True), (-4e9, False), (-1e8, True)])
 def test_damping_must_take_energy_away_from_the_middle_too(coefficient, physical, simulated):
     # c1 + c x^2 is negative beyond x = sqrt(-c1 / c): 1.6 mm and 10 mm, were 3 mm visited.

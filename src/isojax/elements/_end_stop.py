@@ -56,11 +56,11 @@ class EndStop(AbstractElement):
     def grid(cls, scales: Scales) -> "tuple[EndStop, ...]":
         """See `AbstractElement.grid`: met by all but small motion, by strong motion, by its peaks alone.
 
+        So dense that a gap between two of them looks much like one.
+
         A start on one side leaves a little of the other, for at the very bound nothing would move.
         """
-        return tuple(
-            cls._placed(scales, share, side) for side in (0.0, 0.8, -0.8) for share in (0.35, 0.7, 1.2)
-        )
+        return tuple(cls._placed(scales, share, side) for side in (0.0, 0.8, -0.8) for share in GAPS)
 
     @classmethod
     def _placed(cls, scales: Scales, share: float, side: float) -> "EndStop":
@@ -87,3 +87,7 @@ class EndStop(AbstractElement):
         above = jnp.where(sides[0] > 0.0, x - self.gap, 0.0)
         below = jnp.where(sides[1] > 0.0, -x - self.gap, 0.0)
         return self.stiffness * ((1.0 + self.side) * above - (1.0 - self.side) * below)
+
+
+GAPS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.85, 1.0, 1.2)
+"""Gaps of the grid over the amplitude of the motion."""

@@ -62,8 +62,8 @@ class Freeplay(AbstractElement):
 
     @classmethod
     def grid(cls, scales: Scales) -> "tuple[Freeplay, ...]":
-        """See `AbstractElement.grid`: the gaps of its look-alike, the end stop, and a smaller one."""
-        return tuple(cls._placed(scales, share) for share in (0.1, 0.35, 0.7, 1.2))
+        """See `AbstractElement.grid`: so dense that a gap between two of them looks much like one."""
+        return tuple(cls._placed(scales, share) for share in GAPS)
 
     @classmethod
     def _placed(cls, scales: Scales, share: float) -> "Freeplay":
@@ -92,3 +92,7 @@ class Freeplay(AbstractElement):
     ) -> Lanes:
         clipped = jnp.where(sides[0] > 0.0, self.gap, jnp.where(sides[1] > 0.0, x, -self.gap))
         return -self.lost_stiffness * clipped
+
+
+GAPS = (0.06, 0.1, 0.15, 0.22, 0.3, 0.4, 0.5, 0.6, 0.7, 0.85, 1.0, 1.2)
+"""Gaps of the grid over the amplitude of the motion."""

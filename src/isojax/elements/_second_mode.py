@@ -53,7 +53,7 @@ class SecondMode(AbstractElement):
         """
         fastest = 0.5 / scales.sample_time
         shares = {min(share, fastest / scales.angular_frequency): None for share in NATURAL}
-        return tuple(cls(0.0, share * scales.angular_frequency, 0.05) for share in shares)
+        return tuple(cls(0.0, share * scales.angular_frequency, 0.06) for share in shares)
 
     @classmethod
     def typical_strength(cls, scales: Scales) -> float:
@@ -77,5 +77,5 @@ class SecondMode(AbstractElement):
         return w2 * w2 * (x - s[0]) + 2.0 * self.damping_ratio * w2 * (v - s[1])
 
 
-NATURAL = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.5)
+NATURAL = (0.5, 0.7, 0.78, 0.84, 0.9, 0.96, 1.03, 1.1, 1.18, 1.27, 1.4, 1.7, 2.5)
 """Natural frequencies of the grid over the centre of the excited band."""

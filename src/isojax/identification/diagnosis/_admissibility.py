@@ -38,9 +38,10 @@ def _static_force(model: Isolator, x: Float[jax.Array, ""], v: Float[jax.Array, 
 def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
     """Find what is unphysical in a model over the visited motion, if anything.
 
-    The static tangent stiffness must be positive wherever the model has a linear spring. The static damping
-    force, but for laws that are declared active, must not drive the motion at any state that was visited. A
-    force with internal states must take energy over the loops that it was driven around.
+    The static damping force, but for laws that are declared active, must not drive the motion at any state
+    that was visited. A force with internal states must take energy over the loops that it was driven around.
+    A spring gives back what it took, whatever its law: a stiffness may be lost or negative, as that of a
+    buckled beam or a snap-through spring is.
 
     Args:
         model: the isolator.
@@ -55,13 +56,7 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
         Isolator(model.mass, tuple(one for one in model.elements if not one.active)),
         jnp.zeros(()),
     )
-    xs = jnp.linspace(-largest_x, largest_x, 101)
     vs = jnp.linspace(-largest_v, largest_v, 101)
-    tangent = jax.vmap(jax.jacfwd(lambda x: _static_force(model, x, still)))(xs)
-    sprung = any(element.proportional_to == "displacement" for element in model.elements)
-    if sprung and float(tangent.min()) <= 0.0:
-        where = 1e3 * float(xs[int(jnp.argmin(tangent))])
-        return f"its stiffness is lost at {where:.3g} mm, within the visited motion"
     # Over the ellipse that a sine of that size runs along, and its inside: all states that were visited.
     turns, sizes = jnp.linspace(0.0, 2.0 * jnp.pi, 80, endpoint=False), jnp.linspace(0.0, 1.0, 26)[1:]
     angle, size = (each.ravel() for each in jnp.meshgrid(turns, sizes))

@@ -106,7 +106,8 @@ def _violation(case: Case, found: Estimate, score: Score) -> str | None:
 def _refit_from_balance(case: Case) -> list[Refit]:
     """Refit the effect that the balance of measured forces asks for, if there is one.
 
-    A score is a derivative at the fit, the balance is not.
+    A score is a derivative at the fit, the balance is not. Where the fit is near the records and the balance
+    is not, its search is given up as one that stays behind.
     """
     fit, test, search = case.fit, case.test, case.search
     absent = tuple(score.element for score in test.scores)
@@ -114,7 +115,8 @@ def _refit_from_balance(case: Case) -> list[Refit]:
     if start is None:
         return []
     search.progress(f"refit with {start.element.name}, from the balance of measured forces")
-    found = refit_from(fit.estimate, start.model, search, far=True)
+    rival = Rival(fit.estimate.chi2, least_difference(fit.estimate, case.rules))
+    found = refit_from(fit.estimate, start.model, search._replace(rival=rival), far=True)
     score = next(one for one in test.scores if one.element.name == start.element.name)
     # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
     drop = max(0.0, fit.estimate.chi2 - found.chi2) / found.inflation

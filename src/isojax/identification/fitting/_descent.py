@@ -222,11 +222,18 @@ def descend(
             result = RESULTS.successful
             break
         owner = simulator.prepared(best.model, len(best.model.elements)).record
-        if refused == DOUBTFUL and evaluations < search.max_steps - 1:
+        if refused == DOUBTFUL and evaluations < search.max_steps - 2:
             settled = _with_implied_nuisances(simulator, best, places, physical(best_free)[1], owner)
-            evaluations += 1
-            if settled.is_finite and settled.chi2 - best.chi2 > tolerance * max(1.0, chi2):
-                search.progress("restarting the search: the predicted decrease was not reached")
+            evaluations, origin = evaluations + 1, "the states that its steps led to"
+            if not settled.is_finite:
+                origin = "the measured states"
+                settled = _from_measured_states(simulator, best, places, physical(best_free)[1])
+                evaluations += 1
+            # Less than what the point promised is a better point, more a promise that was not kept.
+            if settled.is_finite and abs(settled.chi2 - best.chi2) > tolerance * max(1.0, chi2):
+                search.progress(
+                    f"restarting the search from {origin}: the predicted decrease was not reached"
+                )
                 trial, trial_nuisances, best, state, refused = best_free, settled.nuisances, None, None, 0
                 # What was promised is no measure of what is gained from here on.
                 levels = []
@@ -252,6 +259,16 @@ def _with_implied_nuisances(
     still = np.zeros(len(places))
     moved = step_nuisances(best.reduced, owner, best.nuisances, still)
     return simulator.evaluate(best.model, one_hot(best.model, places, slopes), moved)
+
+
+def _from_measured_states(
+    simulator: Simulator, best: Point, places: tuple[int, ...], slopes: list[float]
+) -> Point:
+    """Give a point again from the measured states, where those that it implies run away."""
+    fresh = simulator.settle(
+        best.nuisances.afresh(), best.model, len(best.model.elements), best.nuisances.spread
+    )
+    return simulator.evaluate(best.model, one_hot(best.model, places, slopes), fresh)
 
 
 def _gain(levels: list[float], steps: int) -> float:
