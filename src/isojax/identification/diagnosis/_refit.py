@@ -158,7 +158,12 @@ def _extended(fitted: Estimate, element: AbstractElement, strength: float, step:
     model = fitted.model.with_elements(element)
     listed = list_parameters(model)
     numbers = [entry.value for entry in listed]
-    for place, change in zip(fitted.places, step, strict=True):
+    # By name: an element that the new one takes the place of is gone, and those after it have moved up.
+    place_of = {entry.name: place for place, entry in enumerate(listed)}
+    for name, change in zip(fitted.names, step, strict=True):
+        if name not in place_of:
+            continue
+        place = place_of[name]
         moved = float(numbers[place]) + float(change)
         spec = listed[place].spec
         if spec.lower < moved < spec.upper:
