@@ -58,8 +58,10 @@ def refit_candidates(case: Case) -> list[Refit]:
         The refits, in the order in which they were made, with what speaks against each.
     """
     refits = [] if case.is_good else _refit_from_balance(case)
+    # What the balance asks for is one more: it takes no place of an effect that the scores ask for.
+    most = len(refits) + case.rules.survivors
     for index, score in enumerate(case.test.scores):
-        if len(refits) == case.rules.survivors:
+        if len(refits) == most:
             break
         known = {one.score.column for one in refits}
         if score.admissible and score.p_value <= case.significance and score.column not in known:
