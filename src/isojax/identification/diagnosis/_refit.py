@@ -91,8 +91,9 @@ def refit_from(fitted: Estimate, model: Isolator, search: Search, far: bool = Fa
     """
     places, search = _free_places(fitted, model), rough(search, fitted)
     if far and fitted.problem.heads:
-        # Windows have a chi2 of their own, which is not to be compared with that of another model.
-        model = fit_by_multiple_shooting(fitted, model, places, search._replace(rival=None))
+        # Windows have a chi2 of their own, and linear steps over whole records promise nothing.
+        search = search._replace(rival=None)
+        model = fit_by_multiple_shooting(fitted, model, places, search)
     # The scatter of a stiffness that the fitted model lacks is still to be found.
     nuisances = None
     if has_stiffness_scale(fitted.model) == has_stiffness_scale(model):

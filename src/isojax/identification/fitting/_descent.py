@@ -224,13 +224,14 @@ def descend(
         owner = simulator.prepared(best.model, len(best.model.elements)).record
         if refused == DOUBTFUL and evaluations < search.max_steps - 2:
             settled = _with_implied_nuisances(simulator, best, places, physical(best_free)[1], owner)
-            evaluations, origin = evaluations + 1, "the states that its steps led to"
+            evaluations += 1
+            origin = "the states that its steps led to" if settled.is_finite else "the measured states"
+            broken = settled.chi2 - best.chi2 > tolerance * max(1.0, chi2)
             if not settled.is_finite:
-                origin = "the measured states"
+                # What the point promises ran away, whatever its size.
                 settled = _from_measured_states(simulator, best, places, physical(best_free)[1])
-                evaluations += 1
-            # Less than what the point promised is a better point, more a promise that was not kept.
-            if settled.is_finite and abs(settled.chi2 - best.chi2) > tolerance * max(1.0, chi2):
+                evaluations, broken = evaluations + 1, True
+            if settled.is_finite and broken:
                 search.progress(
                     f"restarting the search from {origin}: the predicted decrease was not reached"
                 )
