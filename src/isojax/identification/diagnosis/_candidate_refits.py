@@ -58,8 +58,8 @@ def refit_candidates(case: Case) -> list[Refit]:
         The refits, in the order in which they were made, with what speaks against each.
     """
     refits = [] if case.is_good else _refit_from_balance(case)
-    # What the balance asks for is one more: it takes no place of an effect that the scores ask for.
-    most = len(refits) + case.rules.survivors
+    # A start from the balance that came to nothing takes no place of an effect that the scores ask for.
+    most = case.rules.survivors + sum(one.violation is not None for one in refits)
     for index, score in enumerate(case.test.scores):
         if len(refits) == most:
             break
