@@ -1,4 +1,4 @@
-"""Where searches start, and which strengths count: a lost search, a candidate, a law and its shape."""
+"""Where searches start: a lost one from the measured states, a candidate from the step of its score."""
 
 import sys
 from pathlib import Path
@@ -10,12 +10,10 @@ import pytest
 import isojax as ij
 from isojax._parameters import list_parameters
 from isojax._results import is_successful
-from isojax.elements import CoulombFriction, DriveHarmonics, FractionalDamping, StribeckFriction
-from isojax.identification import Rules, classical_guess, read_campaign
-from isojax.identification.diagnosis._refit import _extended, is_determined
-from isojax.identification.diagnosis._score import Score
+from isojax.elements import CoulombFriction, DriveHarmonics, StribeckFriction
+from isojax.identification import classical_guess, read_campaign
+from isojax.identification.diagnosis._refit import _extended
 from isojax.identification.fitting import Estimate
-from isojax.identification.fitting._covariance import Uncertainty
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from _trial_campaign import sketch
@@ -49,18 +47,3 @@ def test_a_step_moves_the_coefficients_that_it_is_of_where_an_element_makes_room
     expected["stribeck_friction.force_level"] = 6.0
     for name, number in expected.items():
         assert float(moved[name]) == pytest.approx(number, rel=1e-12), name
-
-
-@pytest.mark.parametrize(("correlation", "determined"), [(-0.99, True), (0.0, False)])
-def test_a_strength_that_is_known_as_well_as_its_shape_differs_from_zero(correlation, determined):
-    """2 standard errors; with the shape as it is 2 / sqrt(1 - 0.99^2) = 14 of them."""
-    law = FractionalDamping(2e4, 0.4, 1.0, 400.0)
-    model = ij.Isolator(800.0, (ij.LinearStiffness(1e6), law))
-    names = [entry.name for entry in list_parameters(model)]
-    places = tuple(names.index(f"fractional_damping.{name}") for name in ("coefficient", "order"))
-    errors, related = np.array([1e4, 0.1]), np.array([[1.0, correlation], [correlation, 1.0]])
-    known = Uncertainty(related * np.outer(errors, errors), errors, related, np.array([True, True]), ())
-    nothing: Any = None
-    found = Estimate(model, places, nothing, nothing, known, nothing, 0)
-    score = Score(law, 20.0, 2e4, 1e3, 1.0, 0.0, True, 0)
-    assert is_determined(found, score, Rules()) == determined

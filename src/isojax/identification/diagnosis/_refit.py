@@ -219,20 +219,9 @@ def with_own_shape(found: Estimate, name: str, search: Search) -> Estimate:
 
 
 def is_determined(found: Estimate, score: Score, rules: Rules) -> bool:
-    """Say whether a refitted strength differs significantly from zero, its own shape as it is.
-
-    At zero strength a shape means nothing. Left free it says how well the strength is known, which is another
-    question: the coefficient of a fractional law is known only as well as its order, whose unit it has.
-    """
-    place, known = strength_place(found, score), found.uncertainty
-    own = [
-        other
-        for other, name in enumerate(found.names)
-        if name.startswith(f"{score.element.name}.") and other != place and known.standard_error[other] > 0.0
-    ]
-    shared = known.correlation[place, own]
-    told = shared @ np.linalg.lstsq(known.correlation[np.ix_(own, own)], shared, rcond=None)[0]
-    error = float(known.standard_error[place] * np.sqrt(max(0.0, 1.0 - told)))
+    """Say whether a refitted strength differs significantly from zero."""
+    place = strength_place(found, score)
+    error = float(found.uncertainty.standard_error[place])
     strength = float(list_parameters(found.model)[found.places[place]].value)
     return abs(strength) > float(stats.norm.isf(0.5 * rules.significance)) * error
 
