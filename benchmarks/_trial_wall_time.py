@@ -35,12 +35,7 @@ def run_wall_time(seed: int, rate: float) -> dict[str, Any]:
     Returns:
         Seconds of `PARTS_TIMED` in a fresh process and again in the same, and what was found.
     """
-    plant = rig.Plant(rig.base_laws(*PAPER)).plus(rig.CoulombFriction(FRICTION))
-    plan = rig.SteppedSine(LEVELS, FREQUENCIES, CYCLES, ("forward", "backward"))
-    bench = rig.Bench(rate=rate, noise=0.01, drift=0.001)
-    with tempfile.TemporaryDirectory() as folder:
-        path = rig.write_campaign(Path(folder), plant, (plan,), seed, "wall time", bench)
-        campaign = read_campaign(path)
+    campaign = simulate_campaign(seed, rate, LEVELS, CYCLES, rig.CoulombFriction(FRICTION))
     (_, first), (loop, second) = _timed(campaign), _timed(campaign)
     return {
         "rate": rate,
@@ -50,6 +45,28 @@ def run_wall_time(seed: int, rate: float) -> dict[str, Any]:
         "findings": [{"effect": one.effect, "set": [one.effect]} for one in loop.findings],
         "verdict": loop.verdict,
     }
+
+
+def simulate_campaign(
+    seed: int, rate: float, levels: tuple[float, ...], cycles: int, *hidden: rig.Law
+) -> Campaign:
+    """Simulate stepped sines up and down on the paper's y direction.
+
+    Args:
+        seed: of the noise.
+        rate: samples a second [Hz].
+        levels: amplitudes of the force [N].
+        cycles: of each dwell.
+        hidden: laws that the campaign does not declare.
+
+    Returns:
+        The campaign, read from its files.
+    """
+    plant = rig.Plant(rig.base_laws(*PAPER)).plus(*hidden)
+    plan = rig.SteppedSine(levels, FREQUENCIES, cycles, ("forward", "backward"))
+    bench = rig.Bench(rate=rate, noise=0.01, drift=0.001)
+    with tempfile.TemporaryDirectory() as folder:
+        return read_campaign(rig.write_campaign(Path(folder), plant, (plan,), seed, "wall time", bench))
 
 
 def _timed(campaign: Campaign) -> tuple[Loop, tuple[float, ...]]:

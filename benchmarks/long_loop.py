@@ -11,14 +11,15 @@ import os
 import resource
 import subprocess
 import sys
-import tempfile
 import time
-from pathlib import Path
 
+import jax
 import numpy as np
 
 from _marks import Marks
-from _trial_wall_time import FREQUENCIES, FRICTION, PAPER
+from _trial_wall_time import FRICTION, simulate_campaign
+from isojax import rig
+from isojax.identification import close_loop
 
 LEVELS = tuple(np.linspace(40.0, 160.0, 7).round(1).tolist())
 CYCLES = 27
@@ -33,19 +34,9 @@ MOST_MEMORY = 2.0
 
 def run_case(hidden: str) -> None:
     """Run the loop of a case twice in this process; print a line each."""
-    import jax
-
     jax.config.update("jax_enable_x64", True)
-    from isojax import read_campaign, rig
-    from isojax.identification import close_loop
-
-    plant = rig.Plant(rig.base_laws(*PAPER))
-    if hidden == "friction":
-        plant = plant.plus(rig.CoulombFriction(FRICTION))
-    plan = rig.SteppedSine(LEVELS, FREQUENCIES, CYCLES, ("forward", "backward"))
-    bench = rig.Bench(rate=RATE, noise=0.01, drift=0.001)
-    with tempfile.TemporaryDirectory() as folder:
-        campaign = read_campaign(rig.write_campaign(Path(folder), plant, (plan,), 1, "long loop", bench))
+    laws = {"friction": (rig.CoulombFriction(FRICTION),), "nothing": ()}[hidden]
+    campaign = simulate_campaign(1, RATE, LEVELS, CYCLES, *laws)
     for _ in range(2):
         begun, worked = time.perf_counter(), time.process_time()
         loop = close_loop(campaign)

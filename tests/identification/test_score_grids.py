@@ -11,7 +11,7 @@ from isojax.identification import scales
 from isojax.identification.diagnosis._projection import project
 
 SHAPES = 12
-"""Shapes drawn of each kind; most of a loop's time with them is compiling."""
+"""Shapes drawn of each kind."""
 
 
 @pytest.fixture(scope="module")

@@ -54,11 +54,10 @@ class EndStop(AbstractElement):
 
     @classmethod
     def grid(cls, scales: Scales) -> "tuple[EndStop, ...]":
-        """See `AbstractElement.grid`: met by all but small motion, by strong motion, by its peaks alone.
+        """See `AbstractElement.grid`: from met by all but small motion to met by its peaks alone.
 
-        So dense that a gap between two of them looks much like one.
-
-        A start on one side leaves a little of the other, for at the very bound nothing would move.
+        So dense that a gap between two of them looks much like one. A start on one side leaves a little of
+        the other, for at the very bound nothing would move.
         """
         return tuple(cls._placed(scales, share, side) for side in (0.0, 0.8, -0.8) for share in GAPS)
 

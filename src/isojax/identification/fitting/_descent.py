@@ -223,18 +223,18 @@ def descend(
             break
         owner = simulator.prepared(best.model, len(best.model.elements)).record
         if refused == DOUBTFUL and evaluations < search.max_steps - 2:
-            settled = _with_implied_nuisances(simulator, best, places, physical(best_free)[1], owner)
+            slopes = physical(best_free)[1]
+            settled = _with_implied_nuisances(simulator, best, places, slopes, owner)
             evaluations += 1
-            origin = "the states that its steps led to" if settled.is_finite else "the measured states"
-            broken = settled.chi2 - best.chi2 > tolerance * max(1.0, chi2)
+            is_kept = settled.is_finite and settled.chi2 - best.chi2 <= tolerance * max(1.0, chi2)
             if not settled.is_finite:
-                # What the point promises ran away, whatever its size.
-                settled = _from_measured_states(simulator, best, places, physical(best_free)[1])
-                evaluations, broken = evaluations + 1, True
-            if settled.is_finite and broken:
                 search.progress(
-                    f"restarting the search from {origin}: the predicted decrease was not reached"
+                    "the simulation from the found states diverges: again from the measured states"
                 )
+                settled = _from_measured_states(simulator, best, places, slopes)
+                evaluations += 1
+            if settled.is_finite and not is_kept:
+                search.progress("restarting the search: the predicted decrease was not reached")
                 trial, trial_nuisances, best, state, refused = best_free, settled.nuisances, None, None, 0
                 # What was promised is no measure of what is gained from here on.
                 levels = []
