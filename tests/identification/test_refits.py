@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,12 @@ import pytest
 import isojax as ij
 from isojax._parameters import list_parameters
 from isojax._results import is_successful
-from isojax.elements import CoulombFriction, DriveHarmonics, StribeckFriction
-from isojax.identification import classical_guess, read_campaign
-from isojax.identification.diagnosis._refit import _extended
+from isojax.elements import CoulombFriction, DriveHarmonics, FractionalDamping, StribeckFriction
+from isojax.identification import Rules, classical_guess, read_campaign
+from isojax.identification.diagnosis._refit import _extended, is_determined, trace_error
+from isojax.identification.diagnosis._score import Score
 from isojax.identification.fitting import Estimate
+from isojax.identification.fitting._covariance import invert_information
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from _trial_campaign import sketch
@@ -47,3 +50,48 @@ def test_a_step_moves_the_coefficients_that_it_is_of_where_an_element_makes_room
     expected["stribeck_friction.force_level"] = 6.0
     for name, number in expected.items():
         assert float(moved[name]) == pytest.approx(number, rel=1e-12), name
+
+
+def test_the_trace_of_an_effect_is_as_sure_however_the_effect_is_written():
+    draw = np.random.default_rng(5)
+    columns = draw.normal(size=(40, 3))  # of the strength and two shapes
+    strength, shapes = 3.0, np.array([0.5, 2.0])
+    information = columns.T @ columns
+    error = trace_error(information[0], np.linalg.inv(information), 0)
+    # Another strength = s exp(-w shapes), with w of any numbers: the derivatives follow from the chain rule.
+    rates = np.array([3.7, -1.2])
+    factor = float(np.exp(rates @ shapes))
+    other = columns.copy()
+    other[:, 0] *= factor
+    other[:, 1:] += strength * columns[:, :1] * rates
+    changed = other.T @ other
+    other_error = trace_error(changed[0], np.linalg.inv(changed), 0)
+    assert (strength / factor) / other_error == pytest.approx(strength / error, rel=1e-12)
+    # The closed form: |T| of T = s J_s, differentiated numerically.
+    trace = strength * columns[:, 0]
+    towards = trace @ columns / np.linalg.norm(trace)
+    variance = towards @ np.linalg.inv(information) @ towards
+    assert np.linalg.norm(trace) / np.sqrt(variance) == pytest.approx(strength / error, rel=1e-12)
+
+
+@pytest.mark.parametrize(("strength", "said"), [(2e4, True), (2e3, False)])
+def test_a_fractional_law_is_as_sure_as_its_force_whatever_the_unit_of_its_coefficient(strength, said):
+    """C of `C (i w)^alpha` is uncertain by half, because alpha is, where the force of 2e4 is not."""
+    order, frequencies = 0.3, np.linspace(25.0, 40.0, 60)
+    law = FractionalDamping(strength, order, 1.0, 400.0)
+    model = ij.Isolator(800.0, (ij.LinearStiffness(1e6), ij.LinearDamping(1e4), law))
+    listed = list_parameters(model)
+    places = tuple(place for place, one in enumerate(listed) if one.spec.fitted and one.name != "mass")
+    power = (1j * frequencies) ** order
+    derivatives = (1.0 + 0.0 * power, 1j * frequencies, power, strength * np.log(1j * frequencies) * power)
+    stiffness = np.stack(derivatives, axis=1) / 1e3  # of 1000 N/m of noise at each frequency
+    columns = np.vstack([stiffness.real, stiffness.imag])
+    matrix = np.zeros((5, 5))  # the last of the residual, which nobody asks
+    matrix[:4, :4] = columns.T @ columns
+    nothing: Any = None
+    point: Any = SimpleNamespace(reduced=SimpleNamespace(matrix=matrix))
+    found = Estimate(model, places, nothing, point, invert_information(matrix[:4, :4]), nothing, 0)
+    assert found.names[2:] == ("fractional_damping.coefficient", "fractional_damping.order")
+    assert found.uncertainty.standard_error[2] > 0.5 * strength
+    score = Score(law, *([nothing] * (len(Score._fields) - 1)))
+    assert is_determined(found, score, Rules()) == said

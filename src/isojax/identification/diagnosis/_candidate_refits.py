@@ -96,7 +96,7 @@ def _violation(case: Case, found: Estimate, score: Score) -> str | None:
     if found.result != RESULTS.successful or found.excess >= fitted.excess:
         return "its refit did not converge"
     if not is_determined(found, score, case.rules):
-        return "its strength is not determined"
+        return "what it leaves in the records is not determined"
     element = found.model.element(score.element.name)
     if element is not None and not element.signed and float(getattr(element, element.strength)) < 0.0:
         return "its refit ends at a strength below zero"

@@ -11,8 +11,9 @@ from ._score import Score, ScoreTest
 def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
     """List the refits that nothing speaks against, best first.
 
-    Of those that these data do not distinguish the simplest goes first: fewest coefficients, then internal
-    states.
+    Of those that these data do not distinguish, the one with the fewest coefficients goes first. Internal
+    states do not count: their initial values count in the criterion, and of a fractional derivative they are
+    nodes of an integral.
     """
     usable = [refit for refit in refits if refit.violation is None]
     if not usable:
@@ -20,11 +21,8 @@ def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
     inflation = smallest_inflation(usable)
     usable = sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
     most = bic(usable[0].estimate, inflation) + least_difference(usable[0].estimate, rules)
-
-    def simplicity(refit: Refit) -> tuple[int, int]:
-        return len(refit.estimate.places), refit.estimate.model.internal_states
-
-    first = min((one for one in usable if bic(one.estimate, inflation) <= most), key=simplicity)
+    tied = (one for one in usable if bic(one.estimate, inflation) <= most)
+    first = min(tied, key=lambda refit: len(refit.estimate.places))
     return [first, *(one for one in usable if one is not first)]
 
 

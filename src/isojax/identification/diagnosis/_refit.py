@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Float
 from scipy import stats
 
 from ..._parameters import list_parameters, own_parameters, replace_parameters
@@ -219,11 +220,41 @@ def with_own_shape(found: Estimate, name: str, search: Search) -> Estimate:
 
 
 def is_determined(found: Estimate, score: Score, rules: Rules) -> bool:
-    """Say whether a refitted strength differs significantly from zero."""
-    place = strength_place(found, score)
-    error = float(found.uncertainty.standard_error[place])
+    """Say whether the trace that a refitted effect leaves in the records differs significantly from none."""
+    place, name = strength_place(found, score), score.element.name
+    if not found.uncertainty.determined[place]:
+        return False
+    own = [
+        one
+        for one, known in enumerate(found.uncertainty.determined)
+        if known and found.names[one].startswith(f"{name}.")
+    ]
     strength = float(list_parameters(found.model)[found.places[place]].value)
+    information = found.point.reduced.matrix[place, own]
+    error = trace_error(information, found.uncertainty.covariance[np.ix_(own, own)], own.index(place))
     return abs(strength) > float(stats.norm.isf(0.5 * rules.significance)) * error
+
+
+def trace_error(
+    information: Float[np.ndarray, " own"], covariance: Float[np.ndarray, "own own"], place: int
+) -> float:
+    """Give the standard error of the size of an effect's trace, in units of its strength.
+
+    The trace is T = s J_s, with s the strength and J the whitened derivatives; its size |T| changes by
+    T'J/|T| with the effect's own coefficients. |T| over its error is the same however the effect is written.
+    A strength over its own error is not: that of a fractional derivative is in N s^alpha/m, and changes with
+    alpha although the force does not.
+
+    Args:
+        information: J_s'J of the effect's own coefficients, J_s being that of the strength.
+        covariance: of these coefficients.
+        place: the strength among them.
+
+    Returns:
+        Standard error [unit of the strength].
+    """
+    weights = information / information[place]
+    return float(np.sqrt(weights @ covariance @ weights))
 
 
 def strength_place(found: Estimate, score: Score) -> int:
