@@ -39,7 +39,9 @@ from .fitting import (
     as_fit,
     complete,
     fit_by_output,
+    on_all_samples,
     search_of,
+    thinned,
     weighted_by_residual,
 )
 from .guess import ClassicalGuess, as_campaign, classical_guess
@@ -239,7 +241,7 @@ def _loop(
     alternatives: tuple[Alternatives, ...] = ()
     if names and is_successful(after.result):
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
-        alternatives = find_alternatives(after.estimate, names, search)
+        alternatives = find_alternatives(thinned(after.estimate, search)[0], names, search)
     judged = overall_verdict(before, after, len(names), verdict, rules, alternatives)
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.
@@ -280,26 +282,27 @@ def search_effects(
     extensions, verdict = _grow(before, search, max_iterations, excluded)
     if len(extensions) < 2:
         return extensions, verdict
-    final = extensions[-1].after.estimate
+    whole = extensions[-1].after.estimate
+    final, coarser = thinned(whole, search)
     search.progress(
         Stage("test whether the later findings replace an earlier one", REPLACE_SHARE, tuple(_LAST))
     )
     earlier = tuple(
         step.verdict.finding.effect for step in extensions[:-1] if step.verdict.finding is not None
     )
-    doubtful = find_superfluous(final, earlier, search)
+    doubtful = find_superfluous(final, earlier, coarser)
     if doubtful is None:
         return extensions, verdict
     name = doubtful.effect
     search.progress(KeyFigure(f"{name} is not needed beside the later findings: search again without it"))
     again, last = _grow(before, search, max_iterations, (*excluded, name))
-    best = doubtful.without if doubtful.is_better else final
+    best = on_all_samples(doubtful.without, whole, coarser, search) if doubtful.is_better else whole
     if again:
         new = again[-1].after.estimate
         inflation = min(new.inflation, best.inflation)
         if bic(new, inflation) <= bic(best, inflation):
             return again, last
-    if best is final:
+    if best is whole:
         return extensions, verdict
     dropped = complete(best, before.model, before.campaign, before.noise)
     more, last = _grow(dropped, search, max_iterations - len(extensions) + 1, (*excluded, name))

@@ -20,16 +20,20 @@ class Case(NamedTuple):
 
     Attributes:
         fit: the fit.
+        fitted: its estimate, on as many samples as the candidates are tried on.
         test: scores of the absent effects.
         significance: family-wise level of the score test.
-        search: how to search.
+        search: how to search among the candidates.
+        finer: how to search on all samples.
         is_good: whether the fit leaves nothing worth explaining.
     """
 
     fit: Fit
+    fitted: Estimate
     test: ScoreTest
     significance: float
     search: Search
+    finer: Search
     is_good: bool
 
     @property
@@ -38,14 +42,9 @@ class Case(NamedTuple):
         return self.search.rules
 
     @property
-    def fitted(self) -> Estimate:
-        """The estimate of the fit."""
-        return self.fit.estimate
-
-    @property
-    def chi2_per_dof(self) -> float:
-        """chi2/dof of the fit."""
-        return self.fitted.chi2 / self.fitted.dof
+    def dof(self) -> float:
+        """Degrees of freedom of the fit, of which the rules speak."""
+        return self.fit.estimate.dof
 
 
 def refit_candidates(case: Case) -> list[Refit]:
@@ -111,18 +110,18 @@ def _refit_from_balance(case: Case) -> list[Refit]:
     A score is a derivative at the fit, the balance is not. Where the fit is near the records and the balance
     is not, its search is given up as one that stays behind.
     """
-    fit, test, search = case.fit, case.test, case.search
+    fit, fitted, test, search = case.fit, case.fitted, case.test, case.search
     absent = tuple(score.element for score in test.scores)
     start = find_balance_start(fit.campaign, fit.model, search.scales, absent)
     if start is None:
         return []
     search.progress(f"refit with {start.element.name}, from the balance of measured forces")
-    rival = Rival(fit.estimate.chi2, least_difference(fit.estimate, case.rules))
-    found = refit_from(fit.estimate, start.model, search._replace(rival=rival), far=True)
+    rival = Rival(fitted.chi2, least_difference(fitted, case.rules))
+    found = refit_from(fitted, start.model, search._replace(rival=rival), far=True)
     score = next(one for one in test.scores if one.element.name == start.element.name)
     # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
-    drop = max(0.0, fit.estimate.chi2 - found.chi2) / found.inflation
-    extra = max(1, len(found.places) - len(fit.estimate.places))
+    drop = max(0.0, fitted.chi2 - found.chi2) / found.inflation
+    extra = max(1, len(found.places) - len(fitted.places))
     p_value = float(min(1.0, len(absent) * stats.chi2.sf(drop, extra)))
     score = score._replace(element=start.element, p_value=p_value, admissible=True)
     return [Refit(score, found, _violation(case, found, score))]

@@ -18,8 +18,10 @@ from ..fitting import (
     complete,
     drive_noise,
     lack_of_fit,
+    on_all_samples,
     plain_unit,
     search_of,
+    thinned,
     weighted_by_output,
     weighted_by_residual,
 )
@@ -108,18 +110,23 @@ def diagnose_with(
     Returns:
         The verdict.
     """
-    fitted = fit.estimate
-    if not fitted.point.is_finite:
+    if not fit.estimate.point.is_finite:
         reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[fit.result]}"
         return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
-    probes = absent_effects(fitted.model, search.scales, excluded)
-    search.progress(f"score test of {len({probe.name for probe in probes})} absent effects")
     # Noise that only the residual shows imitates effects: slow noise an offset, that of a shaken base a mode.
-    seen = weighted_by_residual(fit, search).estimate
+    by_residual = weighted_by_residual(fit, search).estimate
+    fitted, coarser = thinned(fit.estimate, search)
+    seen = fitted if by_residual is fit.estimate else thinned(by_residual, search)[0]
+    if seen.problem.thinned != fitted.problem.thinned:  # coloured noise keeps every sample
+        seen, fitted, coarser = by_residual, fit.estimate, search
+    probes = absent_effects(fitted.model, coarser.scales, excluded)
+    search.progress(f"score test of {len({probe.name for probe in probes})} absent effects")
     case = Case(
         fit,
-        score_test(seen, search, probes)._replace(fitted=fitted),
+        fitted,
+        score_test(seen, coarser, probes)._replace(fitted=fitted),
         search.rules.significance if significance is None else significance,
+        coarser,
         search,
         is_good(fit, search.rules),
     )
@@ -136,24 +143,26 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     while usable := by_evidence(refits, rules):
         best = usable[0]
         gain = fitted.misfit - best.estimate.misfit
-        needed = max(rules.smallest_gain, _needed_share(case) * fitted.excess / fitted.dof)
+        needed = max(rules.smallest_gain, _needed_share(case) * fitted.excess / case.dof)
         clear = bic(fitted, inflation) - bic(best.estimate, inflation) > rules.close_bic
         too_little = _too_little(best, gain, case)
-        if gain / fitted.dof < needed or not clear:
+        if gain / case.dof < needed or not clear:
             reason = too_little
             break
         share = transferred_share(fitted, best.estimate, case.search)
         if share > 0.0:
-            ranking = rank_candidates(test, refits, usable, inflation)
+            ranking = rank_candidates(case.fit.estimate, test, refits, usable, inflation)
             name = best.score.element.name
             converged = refit_to_convergence(best.estimate, case.search)
-            usable[0] = best._replace(estimate=with_own_shape(converged, name, case.search))
+            shaped = with_own_shape(converged, name, case.search)
+            whole = on_all_samples(shaped, case.fit.estimate, case.search, case.finer)
+            usable[0] = best._replace(estimate=whole)
             return _verdict_of_finding(case, usable, ranking, share)
         # What imitates the missing effect on the records of its refit alone must not hide that effect.
         reason = f"{too_little}, but it does not carry over to data left out of its refit"
         place = next(index for index, one in enumerate(refits) if one is best)
         refits[place] = best._replace(violation="it does not carry over to data left out of its refit")
-    ranking = rank_candidates(test, refits, by_evidence(refits, rules), inflation)
+    ranking = rank_candidates(case.fit.estimate, test, refits, by_evidence(refits, rules), inflation)
     bounds = upper_bounds(test, None) if good else {}
     verdict = "none" if good else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
@@ -182,7 +191,7 @@ def _too_little(best: Refit, gain: float, case: Case) -> str:
     """Word what the best effect would gain: of chi2/dof where little but noise is left, else a share."""
     fitted = case.fitted
     gained = (
-        f"takes {gain / fitted.dof:.2g} off chi2/dof"
+        f"takes {gain / case.dof:.2g} off chi2/dof"
         if case.is_good
         else f"explains {100.0 * gain / max(fitted.excess, 1.0):.2g} % of the residual beyond the noise"
     )
@@ -232,7 +241,7 @@ def _verdict_of_finding(
     case: Case, usable: list[Refit], ranking: tuple[Candidate, ...], share: float
 ) -> Verdict:
     """Word a finding."""
-    fitted, best, rules, test = case.fitted, usable[0], case.rules, case.test
+    fitted, best, rules, test = case.fit.estimate, usable[0], case.rules, case.test
     name = best.score.element.name
     explained = (fitted.misfit - best.estimate.misfit) / max(fitted.excess, 1.0)
     together = _look_alikes(name, best, ranking, rules)

@@ -2,6 +2,7 @@
 
 from ..._parameters import list_parameters
 from .._rules import Rules
+from ..fitting import Estimate, chi2_per_dof_of_all
 from ._bounds import strength_unit
 from ._findings import Candidate
 from ._refit import Refit, bic, least_difference, strength_place
@@ -39,11 +40,12 @@ def smallest_inflation(usable: list[Refit]) -> float:
 
 
 def rank_candidates(
-    test: ScoreTest, refits: list[Refit], usable: list[Refit], inflation: float
+    whole: Estimate, test: ScoreTest, refits: list[Refit], usable: list[Refit], inflation: float
 ) -> tuple[Candidate, ...]:
     """List every candidate: refitted ones by evidence, then the others by score.
 
     Args:
+        whole: the fit under diagnosis, on all samples.
         test: the score test.
         refits: the refits.
         usable: those that nothing speaks against, best first.
@@ -67,7 +69,7 @@ def rank_candidates(
             place = strength_place(found, score)
             strength = float(list_parameters(found.model)[found.places[place]].value)
             error = float(found.uncertainty.standard_error[place])
-            chi2 = found.chi2 / found.dof
+            chi2 = chi2_per_dof_of_all(found.chi2 / found.dof, test.fitted, whole)
             delta = bic(found, inflation) - lowest
             admissible = admissible and refit.violation is None
         likeness = (

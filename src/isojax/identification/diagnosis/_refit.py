@@ -130,7 +130,7 @@ def bic(found: Estimate, inflation: float) -> float:
 
 def least_difference(found: Estimate, rules: Rules) -> float:
     """Give the difference of Schwarz's criterion up to which two effects are indistinguishable."""
-    return max(rules.close_bic, rules.smallest_gain * found.dof)
+    return max(rules.close_bic, rules.smallest_gain * found.dof * found.problem.thinned)
 
 
 def _free_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:

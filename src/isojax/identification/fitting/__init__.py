@@ -4,7 +4,8 @@ In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget` and
 `drive_noise` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
-What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture` and `_fit_result`.
+What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture` and `_fit_result`;
+searches among effects run on `_thinned` records.
 """
 
 from ._as_fit import Fitted as Fitted
@@ -62,3 +63,6 @@ from ._search import Rival as Rival
 from ._search import Search as Search
 from ._search import search_of as search_of
 from ._simulator import Simulator as Simulator
+from ._thinned import chi2_per_dof_of_all as chi2_per_dof_of_all
+from ._thinned import on_all_samples as on_all_samples
+from ._thinned import thinned as thinned

@@ -32,6 +32,7 @@ class Problem(NamedTuple):
         step_error: rms error of the integration over the noise of a sample.
         share: share of the samples of which the noise is independent; below 1 where a filter has limited it.
         whitening: coefficients of the filter that whitens coloured noise; none where it is white.
+        thinned: measured samples that one sample of the records stands for.
     """
 
     records: tuple[Record, ...]
@@ -44,6 +45,7 @@ class Problem(NamedTuple):
     step_error: float = float("nan")
     share: float = 1.0
     whitening: tuple[float, ...] = ()
+    thinned: int = 1
 
 
 @shown

@@ -102,6 +102,7 @@ class Simulator:
                     lambda: internal_starts(model, self.problem.records, prepared, carried),
                     model,
                     carried,
+                    self.problem.thinned,
                 )
             )
             ends = np.cumsum([element.internal_states for element in model.elements])
@@ -199,5 +200,5 @@ def _matrices(
             return (information(unknowns, prepared),)
         return (score_information(unknowns, carried, prepared),)
 
-    (matrices,) = recall("information", compute, unknowns, carried)
+    (matrices,) = recall("information", compute, unknowns, carried, prepared.sampling.time)
     return np.where(np.abs(matrices) < HUGE, matrices, np.nan)

@@ -14,7 +14,6 @@ from ..._cores import usable_cores
 from ...excitations import Hold
 from ...models import Instant, Integrator, Isolator, Quantity
 from ...records import Record, measured_state
-from ...records.spectrum import driven_range
 from ._channels import channel_table, drive_table
 from ._segments import Segment
 from ._whitening import Whitening, find_whitening
@@ -42,35 +41,6 @@ class Batch(eqx.Module):
         """What acts, over time, stages and lanes."""
         return Instant(self.drive, self.drive_rate, self.channels)
 
-    def thinned(self, node: int) -> "Batch":
-        """Give the batch with several samples as one, their stages as the stages of its integration steps.
-
-        Args:
-            node: samples that become one, an odd number; averages over as many count around it.
-
-        Returns:
-            The batch; readings that do not lie amid samples which all count, count no more.
-        """
-        if node == 1:
-            return self
-        time = self.measured.shape[0]
-        nodes = -(-time // node)
-
-        def joined(table: Array) -> Array:
-            whole = jnp.pad(table, ((0, nodes * node - time), (0, 0), (0, 0)), mode="edge")
-            parts = whole.reshape(nodes, node, *table.shape[1:])
-            inner = parts[:, :, :-1].reshape(nodes, -1, table.shape[-1])
-            return jnp.concatenate([inner, parts[:, -1, -1:]], axis=1)
-
-        counted = average_around(self.weight, node) > 1.0 - 1e-9
-        return Batch(
-            joined(self.drive),
-            joined(self.drive_rate),
-            average_around(self.measured, node),
-            jnp.sqrt(float(node)) * counted,
-            channels={name: joined(table) for name, table in self.channels.items()},
-        )
-
     def following(self, model: Isolator) -> "Batch":
         """Give the batch with the channels that a model follows and no others: each is carried in the scan.
 
@@ -84,22 +54,6 @@ class Batch(eqx.Module):
         return Batch(self.drive, self.drive_rate, self.measured, self.weight, channels=own)
 
 
-def average_around(values: Float[Array, "time lanes"], node: int) -> Float[Array, "node lanes"]:
-    """Give the mean of the samples around each node, the first of which is the first sample.
-
-    Args:
-        values: samples, nothing before the first and after the last.
-        node: samples from node to node, an odd number.
-
-    Returns:
-        The means.
-    """
-    half, time = node // 2, values.shape[0]
-    nodes = -(-time // node)
-    padded = jnp.pad(values, ((half, nodes * node - time), (0, 0)))
-    return padded[: nodes * node].reshape(nodes, node, -1).mean(axis=1)
-
-
 class Sampling(NamedTuple):
     """How segments are simulated from sample to sample, and what is read at each.
 
@@ -109,7 +63,6 @@ class Sampling(NamedTuple):
         integrator: what simulates the segments.
         jumps: whether the drive jumps at the samples.
         whitening: what makes the noise in the rows of a lane white, or None where it is.
-        node: samples that become one where the columns of absent effects are followed.
     """
 
     quantity: Quantity
@@ -117,7 +70,6 @@ class Sampling(NamedTuple):
     integrator: Integrator
     jumps: bool
     whitening: Whitening | None = None
-    node: int = 1
 
 
 class Prepared(NamedTuple):
@@ -164,17 +116,6 @@ def coordinate_motion(
 def workers() -> int:
     """Give the number of threads that share a batch: the cores on a CPU, one elsewhere."""
     return usable_cores() if jax.default_backend() == "cpu" else 1
-
-
-_NODES_A_CYCLE = 32
-"""Nodes at which columns of absent effects are followed in a cycle of the drive: ten harmonics."""
-
-
-def _samples_a_node(records: tuple[Record, ...]) -> int:
-    """Give how many samples of white noise may be averaged: an odd number, so that a node lies amid them."""
-    fastest = max(driven_range(record)[1] for record in records)
-    most = records[0].rate / (_NODES_A_CYCLE * fastest) if fastest > 0.0 else 1.0
-    return max(1, 2 * int((most - 1.0) // 2.0) + 1)
 
 
 _Table = tuple[Float[np.ndarray, "time stage"], Float[np.ndarray, "time stage"]]
@@ -270,6 +211,5 @@ def prepare(
     count = np.bincount(owner, weights=weight.sum(axis=1), minlength=len(records))
     how = Integrator() if integrator is None else integrator
     jumps = hold == "zero_order"
-    node = 1 if jumps or whitening else _samples_a_node(records)
-    sampling = Sampling(quantity, 1.0 / records[0].rate, how, jumps, find_whitening(whitening), node)
+    sampling = Sampling(quantity, 1.0 / records[0].rate, how, jumps, find_whitening(whitening))
     return Prepared(batches, segments, owner, starts, spread, count, sampling)

@@ -90,7 +90,7 @@ class PathMotion(NamedTuple):
         acted_rate: its rate.
         sensed: reading after the sensor chain, before what signals of the record add to it.
         stages: displacement, velocity, reading and, where it moves, acceleration of the base at start, middle
-            and end of each step, which internal states follow; one step a sample, or several.
+            and end of each sample, which internal states follow.
         channels: signals of the record.
     """
 
@@ -100,7 +100,7 @@ class PathMotion(NamedTuple):
     acted: Float[Array, "time lanes"]
     acted_rate: Float[Array, "time lanes"]
     sensed: Float[Array, "time lanes"]
-    stages: tuple[Float[Array, "step 3 lanes"], ...]
+    stages: tuple[Float[Array, "time 3 lanes"], ...]
     channels: dict[str, Float[Array, "time lanes"]]
 
 
@@ -122,7 +122,7 @@ def inputs_of(kind: type[AbstractElement]) -> tuple[str, ...]:
 
 def input_columns(
     family: ElementFamily, motion: PathMotion, start: State, step: float
-) -> dict[str, Float[Array, "member node lanes"]]:
+) -> dict[str, Float[Array, "member time lanes"]]:
     """Give what a unit of strength adds at each effect input, along a motion.
 
     Args:
@@ -136,9 +136,7 @@ def input_columns(
     """
     internal: State = ()
     if start:
-        steps = motion.stages[0].shape[0] // motion.x.shape[0]
-        path = internal_state_path(family.elements, motion.stages, start, step / steps)[1]
-        internal = tuple(values[::steps] for values in path)
+        internal = internal_state_path(family.elements, motion.stages, start, step)[1]
     return _input_columns(family.elements, motion._replace(stages=()), internal)
 
 
@@ -155,7 +153,7 @@ def internal_state_path(
         step: duration of a step [s].
 
     Returns:
-        The states after the last step; and at the start of each step, node first.
+        The states after the last step; and at the start of each step, time first.
     """
     solver = RK4()
 
@@ -183,7 +181,7 @@ def _or_nothing(value: Lanes | None) -> Lanes | float:
 @eqx.filter_jit
 def _input_columns(
     members: AbstractElement, motion: PathMotion, internal: State
-) -> dict[str, Float[Array, "member node lanes"]]:
+) -> dict[str, Float[Array, "member time lanes"]]:
     """Differentiate what each member does at each effect input with respect to its strength."""
     strengths = getattr(members, members.strength)
     still = jnp.zeros_like(motion.x)

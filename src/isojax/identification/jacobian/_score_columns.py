@@ -3,7 +3,7 @@
 The derivatives of `information` cost a full step of the model a column. For dozens of absent effects the
 motion is simulated once; what each effect would add is worked out along it, all samples at once; and one
 linear, time-varying solve, which knows nothing of the effects, carries all columns. The motion is that of
-the fit's own solver; the solve along it takes one step for each sample, or for several that are averaged.
+the fit's own solver; the solve along it takes one step for each sample.
 Compiled code depends on the model, on the kind of an effect, or on neither, and never on which effects ride
 along with which model.
 """
@@ -22,7 +22,7 @@ from jaxtyping import Array, Float
 from ..._cores import give_memory_back
 from ..._parameters import list_parameters, own_parameters
 from ...models import Isolator, State
-from ._batch import Batch, Prepared, average_around, workers
+from ._batch import Batch, Prepared, workers
 from ._effect_inputs import input_columns
 from ._families import ElementFamily, find_families, in_turn, stack_states
 from ._information import find_stepping, share_lanes
@@ -107,7 +107,7 @@ def score_information(
 
     def one(part: int) -> np.ndarray:
         batch = prepared.batches[part].following(unknowns.model)
-        time = -(-batch.drive.shape[0] // prepared.sampling.node)
+        time = batch.drive.shape[0]
         scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
         states = share_lanes(unknowns.states, part, parts)
         scales = share_lanes(unknowns.state_scales[:size], part, parts)
@@ -147,19 +147,16 @@ def _block(
     scales: State,
 ) -> Float[np.ndarray, "lanes column column"]:
     """Work out the columns of a few lanes, and multiply them out."""
-    model, size, node = layout.model, 2 + layout.model.internal_states, prepared.sampling.node
+    model, size, sampling = layout.model, 2 + layout.model.internal_states, prepared.sampling
     stepping, own = find_stepping(prepared), batch.following(model)
     begin = Lanes(model, scale, states[:size])
-    error = (batch.measured - stepping.readings(begin, own, prepared.sampling)) * batch.weight
-    batch = batch.thinned(node)
-    own = batch.following(model)
-    sampling = prepared.sampling._replace(time=node * prepared.sampling.time)
+    error = (batch.measured - stepping.readings(begin, own, sampling)) * batch.weight
     quantity, step = sampling.quantity, sampling.time
     path, ringing = stepping.path(begin, own, sampling)
-    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, quantity, node)
+    slopes = slopes_along(model, layout.moving, scale, path, ringing, own, quantity)
     lanes, time = scale.shape[0], batch.measured.shape[0]
     table = np.empty((lanes, columns, time))
-    table[:, -1] = np.asarray(average_around(error, node) * batch.weight).T
+    table[:, -1] = np.asarray(error).T
 
     exact = None
     if ringing is not None:
@@ -179,10 +176,7 @@ def _block(
         return np.moveaxis(np.asarray(_weigh(rows, batch.weight, sampling.whitening)), -1, 0)
     # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
-        products = table @ np.swapaxes(table, 1, 2)
-    # Of the residual that is what the averages leave out, too.
-    products[:, -1, -1] = np.asarray(jnp.sum(error**2, axis=0))
-    return products
+        return table @ np.swapaxes(table, 1, 2)
 
 
 def _sources(

@@ -33,17 +33,12 @@ def sample_stages(table: Float[Array, "time stage lanes"]) -> Float[Array, "time
     return table[:, :: (table.shape[1] - 1) // 2]
 
 
-def split_stages_of(table: Float[Array, "time stage lanes"], parts: int) -> Float[Array, "part some lanes"]:
-    """Split the interval of each row into equal parts, each with its own stages, the ends included."""
-    time, stages, lanes = table.shape
-    size = (stages - 1) // parts
-    split = jnp.stack([table[:, size * part : size * (part + 1) + 1] for part in range(parts)], axis=1)
-    return split.reshape(time * parts, size + 1, lanes)
-
-
 def steps_of(table: Float[Array, "time stage lanes"]) -> Float[Array, "node 3 lanes"]:
     """Split each sample into its integration steps, three stages each."""
-    return split_stages_of(table, (table.shape[1] - 1) // 2)
+    time, stages, lanes = table.shape
+    parts = (stages - 1) // 2
+    split = jnp.stack([table[:, 2 * part : 2 * part + 3] for part in range(parts)], axis=1)
+    return split.reshape(time * parts, 3, lanes)
 
 
 def cubic_middle(before: Array, left: Array, right: Array, after: Array) -> Array:
@@ -126,12 +121,8 @@ def slopes_along(
     ringing: Ringing | None,
     batch: Batch,
     quantity: Quantity,
-    node: int,
 ) -> Slopes:
     """Differentiate rates and reading along the path.
-
-    Of several samples as one (`Batch.thinned`) the slopes are those at the first of each; internal states of
-    absent effects follow every sample.
 
     A law that jumps has no slope. Where the path was split at its jumps, the rates are those of the rounded
     law, used by effect inputs alone; what the jumps do to changes of states and parameters is in
@@ -183,24 +174,21 @@ def slopes_along(
     def sampled(change: Change) -> Change:
         return Change(tuple(_to_samples(rate, steps) for rate in change.rates), change.reading[::steps])
 
-    thin = steps // node
-    present = scaled_model(model, values, scale[::thin])
-    own = tuple(state[::thin] for state in path)
+    present, own = scaled_model(model, values, scale[::steps]), tuple(state[::steps] for state in path)
     ends = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in own)
     befores = tuple(jnp.concatenate([state[:1], state[:-1]]) for state in own)
     afters = tuple(jnp.concatenate([state[1:], state[-1:]]) for state in ends)
     middles = tuple(map(cubic_middle, befores, own, ends, afters))
-    acting = jax.tree_util.tree_map(lambda table: sample_stages(split_stages_of(table, node)), batch.acting)
+    acting = jax.tree_util.tree_map(sample_stages, batch.acting)
     seen = []
     for stage, state in enumerate((own, middles, ends)):
         now = acting.pick(np.s_[:, stage])
         base = present.base(now)
         y = present.reading(state, now, quantity, find_regime(present, state, now) if split else ROUNDED)
         if stage == 0:
-            y = y.at[::node].set(add_ringing(y[::node], ringing))
+            y = add_ringing(y, ringing)
         seen.append((state[0], state[1], y) if base is None else (state[0], state[1], y, base))
-    present, own = scaled_model(model, values, scale[::steps]), tuple(state[::steps] for state in path)
-    now = acting.pick(np.s_[::node, 0])
+    now = acting.pick(np.s_[:, 0])
     sharp = find_regime(present, own, now) if split else ROUNDED
     acted, acted_rate = present.drive(now)
     sensed = present.sensed(own, now, quantity, sharp)

@@ -109,7 +109,7 @@ def _select(
         place = int(order[0])
         gain = float(gains[place])
         chance = tests * 2.0 * stats.norm.sf(np.sqrt(gain / inflation))
-        smallest = max(rules.smallest_law * excess, rules.smallest_gain * dof)
+        smallest = max(rules.smallest_law * excess, rules.smallest_gain * dof * fitted.problem.thinned)
         if chance > rules.significance or gain < smallest:
             break
         size = np.sqrt(np.where(free, own, np.inf))

@@ -10,7 +10,7 @@ from ..._progress import silent
 from ..._results import is_successful
 from ..._show import Row, shown
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, search_of
+from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, chi2_per_dof_of_all, search_of, thinned
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 from ._matching_pursuit import MatchingPursuit, matching_pursuit
@@ -94,7 +94,14 @@ def explain_remainder(
     if not (is_successful(fit.result) and fit.estimate.point.is_finite):
         raise ValueError(f"Argument `fit` must have succeeded, but its result is {fit.result}.")
     search = search_of(fit.campaign, rules, solver, progress)
-    pursuit = matching_pursuit(fit.estimate, search, refit=refit)
+    whole = fit.estimate
+    thin, coarser = thinned(whole, search)
+    found = matching_pursuit(thin, coarser, refit=refit)
+    pursuit = found._replace(
+        chi2_per_dof=chi2_per_dof_of_all(found.chi2_per_dof, thin, whole),
+        linear=chi2_per_dof_of_all(found.linear, thin, whole),
+        refitted=chi2_per_dof_of_all(found.refitted, thin, whole),
+    )
     progress("force residual")
     residuals = force_residuals(fit)
     return Remainder(pursuit, dwell_remainders(fit, residuals), _force_map(residuals))
