@@ -21,7 +21,7 @@ from ._problem import Problem
 from ._search import Search
 from ._simulator import Simulator
 
-SAMPLES_A_CYCLE = 32
+FEWEST_A_CYCLE = 32
 """Samples in a cycle of the fastest drive that a search among effects needs: they show ten harmonics."""
 
 
@@ -40,7 +40,7 @@ def thinning(problem: Problem) -> int:
     if problem.hold == "zero_order" or problem.whitening or not problem.integrator.is_locked:
         return 1
     fastest = max(driven_range(record)[1] for record in problem.records)
-    factor = int(problem.records[0].rate / (SAMPLES_A_CYCLE * fastest)) if fastest > 0.0 else 1
+    factor = int(problem.records[0].rate / (FEWEST_A_CYCLE * fastest)) if fastest > 0.0 else 1
     return max(1, factor)
 
 
