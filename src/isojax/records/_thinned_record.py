@@ -8,10 +8,7 @@ from jaxtyping import Float
 
 from ._record import Dwell, Record
 
-_WINDOW = ("kaiser", 8.6)
-"""Side lobes of -90 dB; flat to 0.7 of half the new rate."""
-
-_HALF_WIDTH = 10
+_HALF_WIDTH = 1
 """New samples on either side that a filtered sample depends on: those at the ends are left out."""
 
 
@@ -58,7 +55,16 @@ def thinned_place(place: int, factor: int) -> int:
 
 
 def _taps(factor: int) -> Float[np.ndarray, " tap"]:
-    return scipy.signal.firwin(2 * _HALF_WIDTH * factor + 1, 1.0 / factor, window=_WINDOW)
+    """Give the filter: of a jump it leaves what simulated readings have of one, and nothing further away.
+
+    `models.find_ringing` puts a jump into the samples next to it by a parabola. Its slope is `1.3 - 1.6 |u|`
+    within a new sample u on either side. A sharper filter would ring where models do not, and dry friction
+    would pass for another law. A sine of 36 samples a cycle loses 0.1 %, its third harmonic 0.9 %.
+    """
+    place = np.abs(np.arange(-factor, factor + 1)) / factor
+    taps = 1.3 - 1.6 * place
+    taps[[0, -1]] *= 0.5
+    return taps / taps.sum()
 
 
 def _thinned(record: Record, factor: int) -> Record:

@@ -27,7 +27,7 @@ from ..fitting import (
 )
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
-from ._evidence import by_evidence, rank_candidates, smallest_inflation
+from ._evidence import by_evidence, rank_candidates, ranked_first, smallest_inflation
 from ._findings import Candidate, Finding, Verdict
 from ._refit import Refit, bic, least_difference, refit_to_convergence, rivals, with_own_shape
 from ._score import absent_effects, score_test
@@ -157,6 +157,7 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
             shaped = with_own_shape(converged, name, case.search)
             whole = on_all_samples(shaped, case.fit.estimate, case.search, case.finer)
             usable[0] = best._replace(estimate=whole)
+            ranking = ranked_first(ranking, usable[0])
             return _verdict_of_finding(case, usable, ranking, share)
         # What imitates the missing effect on the records of its refit alone must not hide that effect.
         reason = f"{too_little}, but it does not carry over to data left out of its refit"

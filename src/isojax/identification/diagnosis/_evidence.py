@@ -66,9 +66,7 @@ def rank_candidates(
         chi2, delta, admissible = float("nan"), float("nan"), score.admissible
         if refit is not None and len(refit.estimate.places) > len(test.fitted.places):
             found = refit.estimate
-            place = strength_place(found, score)
-            strength = float(list_parameters(found.model)[found.places[place]].value)
-            error = float(found.uncertainty.standard_error[place])
+            strength, error = _strength(refit)
             chi2 = chi2_per_dof_of_all(found.chi2 / found.dof, test.fitted, whole)
             delta = bic(found, inflation) - lowest
             admissible = admissible and refit.violation is None
@@ -96,3 +94,27 @@ def rank_candidates(
     first = [test.scores[order[name]] for name in names]
     rest = [score for score in test.scores if score.element.name not in names]
     return tuple(candidate(score) for score in (*first, *rest))
+
+
+def ranked_first(ranking: tuple[Candidate, ...], final: Refit) -> tuple[Candidate, ...]:
+    """Give a ranking whose first candidate has the figures of its last fit.
+
+    Args:
+        ranking: the candidates.
+        final: the first of them, fitted to the end.
+
+    Returns:
+        The ranking.
+    """
+    strength, error = _strength(final)
+    chi2 = final.estimate.chi2 / final.estimate.dof
+    first = ranking[0]._replace(strength=strength, strength_error=error, chi2_per_dof=chi2)
+    return (first, *ranking[1:])
+
+
+def _strength(refit: Refit) -> tuple[float, float]:
+    """Give a refitted strength and its standard error [its unit]."""
+    found = refit.estimate
+    place = strength_place(found, refit.score)
+    value = list_parameters(found.model)[found.places[place]].value
+    return float(value), float(found.uncertainty.standard_error[place])

@@ -103,9 +103,9 @@ def on_all_samples(found: Estimate, whole: Estimate, coarser: Search, search: Se
     if found.problem.thinned == whole.problem.thinned:
         return found
     search.progress("the same on all samples")
-    old, model = whole.point.nuisances, _with_finer_corners(found.model, coarser, search)
-    settled = best_nuisances(whole.simulator, model, old.spread, old.afresh(), found.places)
-    nuisances = settled.nuisances if settled.is_finite else old.afresh()
+    model, known = _with_finer_corners(found.model, coarser, search), found.point.nuisances.afresh()
+    settled = best_nuisances(whole.simulator, model, known.spread, known, found.places)
+    nuisances = settled.nuisances if settled.is_finite else known
     return estimate(whole.simulator, model, found.places, search, nuisances, anew=True)
 
 
