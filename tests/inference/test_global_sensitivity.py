@@ -119,11 +119,18 @@ def test_what_makes_no_sense_is_refused(unchecked):
         ({}, "at least one input"),
         ({"a": (1.0, 1.0)}, "least and greatest value"),
         ({"a": 3.0}, "gives a 3"),
+        ({"a": ("1", "2")}, "gives a "),
+        ({"a": (False, True)}, "gives a "),
+        ({"a": stats.norm}, "gives a the law norm without any"),
     ):
         with pytest.raises(ValueError, match=words):
             ij.global_sensitivity(lambda x: x["a"], ranges)
     with pytest.raises(ValueError, match="`ranges` must be a dictionary"):
         ij.global_sensitivity(lambda m: m.mass, model)
+    with pytest.raises(ValueError, match="`quantity` must be a function"):
+        ij.global_sensitivity("mass", {"mass": (700.0, 900.0)}, model)
+    with pytest.raises(ValueError, match="`model` must be an Isolator, but is of type str"):
+        ij.global_sensitivity(lambda m: m.mass, {"mass": (700.0, 900.0)}, "model.json")
     with pytest.raises(ValueError, match="`ranges` must be one of mass"):
         ij.global_sensitivity(lambda m: m.mass, {"mess": (1.0, 2.0)}, model)
     with pytest.raises(ValueError, match=r"keep mass between 0 .* kg, but \d+ of 192 samples"):

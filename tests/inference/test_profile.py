@@ -6,6 +6,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2 as chi2_law
 
 import isojax as ij
+from isojax.demo import campaign_folder
 from isojax.inference import _profile
 from isojax.inference._profile import _Held, _walk
 
@@ -50,6 +51,20 @@ def test_a_straight_profile_is_the_interval_of_the_delta_method(sharp_decay, nam
     np.testing.assert_allclose(found.interval, found.symmetric, atol=5e-3 * np.diff(found.symmetric)[0])
     straight = (found.values - found.value) / found.standard_error
     np.testing.assert_allclose(found.root, straight, atol=0.02)
+
+
+@pytest.mark.slow
+def test_the_ends_are_those_of_uncertainty_at_any_confidence():
+    """Of few records: the tails of the law that they allow count in both."""
+    campaign = ij.read_campaign(campaign_folder())
+    fit = ij.fit(ij.classical_guess(campaign).model, campaign)
+    for level in (0.8, 0.99):
+        found = ij.profile(fit, "k1", confidence=level)
+        band = ij.uncertainty(fit, lambda m: m["k1"], confidence=level).interval
+        np.testing.assert_allclose(found.symmetric, band, rtol=1e-9)
+        factor = (band[1] - found.value) / found.standard_error
+        assert found.coverage_factor == pytest.approx(factor, rel=1e-9)
+        assert np.all(np.abs(np.interp(found.interval, found.values, found.root)) > 0.9 * factor)
 
 
 def walk(root, room=np.inf, fails_beyond=np.inf):

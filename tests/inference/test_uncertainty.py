@@ -44,6 +44,21 @@ def test_of_a_linear_quantity_the_error_is_that_of_the_covariance(fit):
     assert found.failed == 0.0
 
 
+def test_no_interval_leaves_out_the_value_that_it_belongs_to(fit):
+    """Of a model that misses friction the scatters which the records allow lead to other coefficients."""
+    cubic = "cubic_stiffness.coefficient"
+    law, place = fit.mixture, fit.free.index(cubic)
+    assert abs(float(law.weights @ law.means[:, place])) > 0.5 * fit.standard_errors[cubic]
+    for level in (0.8, 0.95):
+        found = ij.uncertainty(fit, lambda m: jnp.stack([m[cubic], jnp.log(m[cubic])]), confidence=level)
+        assert np.all((found.interval[0] < found.value) & (found.value < found.interval[1]))
+        assert not found.curved[0]
+        width = law.half_width(np.eye(len(fit.free))[place], level)
+        np.testing.assert_allclose(found.interval[:, 0] - found.value[0], [-width, width], rtol=1e-4)
+        inside = np.mean(np.abs(found.draws[:, 0] - found.value[0]) < width)
+        assert inside == pytest.approx(level, abs=4.0 * np.sqrt(level * (1.0 - level) / len(found.draws)))
+
+
 def test_of_a_curved_quantity_the_interval_is_that_of_its_distribution(wide):
     centre = float(wide.model[STIFFNESS])
     found = ij.uncertainty(

@@ -153,6 +153,13 @@ def global_sensitivity(
     samples = given_count("samples", samples)
     if samples < 64 or samples & (samples - 1):
         raise ValueError(f"Argument `samples` must be a power of 2, at least 64, but is {samples}.")
+    if not callable(quantity):
+        raise ValueError(
+            "Argument `quantity` must be a function, such as lambda model: model.mass, but is "
+            f"{brief(quantity)}."
+        )
+    if not (model is None or isinstance(model, Isolator)):
+        raise ValueError(f"Argument `model` must be an Isolator, but is of type {type(model).__name__}.")
     if not isinstance(ranges, Mapping):
         raise ValueError(
             "Argument `ranges` must be a dictionary of the ends of each input by its name, but is of type "
@@ -221,10 +228,16 @@ def global_sensitivity(
 
 def _law(name: str, given: Any) -> _Law:
     """Give the law of an input: between two numbers all are equally likely."""
+    if isinstance(given, stats.rv_continuous | stats.rv_discrete):
+        raise ValueError(
+            f"Argument `ranges` must give a law of scipy.stats with its numbers, such as "
+            f"stats.norm(value, standard_error), but gives {name} the law {given.name} without any."
+        )
     if isinstance(given, _Law):
         return given
-    ends = np.asarray(given, dtype=float)
-    if ends.shape != (2,) or not np.all(np.isfinite(ends)) or not ends[0] < ends[1]:
+    ends = np.asarray(given)
+    numbers = ends.dtype.kind in "iuf" and ends.shape == (2,)
+    if not (numbers and np.all(np.isfinite(ends)) and ends[0] < ends[1]):
         raise ValueError(
             f"Argument `ranges` must give each input its least and greatest value or a law of scipy.stats, "
             f"but gives {name} {brief(given)}."

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
-from scipy.special import ndtri
 
 from .._given_numbers import given_chance
 from .._parameters import find_parameter, list_parameters
@@ -18,6 +17,7 @@ from .._show import Row, amount, number, shown
 from .._types import check_float64
 from ..identification import Coefficient, Fit, Rules
 from ..identification.fitting import DEFAULT_SOLVER, Point, as_fit, fit_held, invert_information, search_of
+from ..models import coefficient_errors
 
 _STILL_GAINED = 1e-4
 """Decrease of chi2, per max(chi2/dof, 1), below which a search is over: an end of the interval is then off
@@ -44,6 +44,7 @@ class Profile(NamedTuple):
         standard_error: of the fit.
         interval: lower and upper end; NaN where an end was not found, and `reasons` says why.
         confidence: chance that the interval is meant to hold the truth.
+        coverage_factor: standard errors at which the root ends the interval: 1.96 for a confidence of 0.95.
         values: row at which the coefficient was held, ascending.
         root: signed root of the rise of chi2 there, in standard errors: a straight line of slope one over the
             standard error where the model is linear; NaN where the search of the others failed.
@@ -58,6 +59,7 @@ class Profile(NamedTuple):
     standard_error: float
     interval: Float[np.ndarray, "2"]
     confidence: float
+    coverage_factor: float
     values: Float[np.ndarray, " row"]
     root: Float[np.ndarray, " row"]
     others: tuple[str, ...]
@@ -67,7 +69,7 @@ class Profile(NamedTuple):
     @property
     def symmetric(self) -> Float[np.ndarray, "2"]:
         """The interval of the fit: value and standard error alone."""
-        spread = _quantile(self.confidence) * self.standard_error
+        spread = self.coverage_factor * self.standard_error
         return np.array([self.value - spread, self.value + spread])
 
     def _headline(self) -> str:
@@ -75,7 +77,7 @@ class Profile(NamedTuple):
         return f"{self.name}, {self.confidence:.0%} interval {low} to {high} {typeset_unit(self.unit)}"
 
     def _rows(self) -> list[Row]:
-        spread = _quantile(self.confidence) * self.standard_error
+        spread = self.coverage_factor * self.standard_error
         rows = [Row("value", amount(self.value, self.unit, self.standard_error), "of the fit")]
         for word, end, other in zip(("lower end", "upper end"), self.interval, self.symmetric, strict=True):
             away = (float(end) - float(other)) / spread
@@ -123,9 +125,10 @@ def profile(
     """Give the interval of one coefficient from the rise of chi2, all others fitted anew at each value.
 
     `t(p) = sign(p - p0) sqrt((chi2(p) - chi2(p0)) C / s^2)`, with C the variance of the coefficient at unit
-    noise, and s its standard error in the fit. The interval ends where |t| is the quantile of the normal
-    law: where the model is linear in its coefficients, at the value -+ 1.96 s. So the noise that chi2/dof
-    shows, and that records tell the scatter of the stiffness only so well, count as in the fit.
+    noise, and s its standard error in the fit. The interval ends where |t| is the coverage factor of the
+    fit, 1.96 for 95 %: where the model is linear in its coefficients, at the ends that `uncertainty` gives.
+    So the noise that chi2/dof shows, and that records tell the scatter of the stiffness only so well, count
+    as in the fit. Beside dry friction chi2 is not smooth enough to be followed, and ends are not found.
 
     Each point starts from the optimum of its neighbour, by the search of the fit.
 
@@ -167,7 +170,8 @@ def profile(
     scale = unit_variance / one.standard_error**2
     centre = float(lowest.model[one.name])
     spec = list_parameters(meant.model)[find_parameter(meant.model, one.name)].spec
-    quantile = _quantile(confidence)
+    errors = coefficient_errors(meant)
+    quantile = float(errors.coverage_factor(errors.root[place], 0.5 * (1.0 - confidence)))
     sides: list[_Side] = []
     for direction, bound in ((-1.0, spec.lower), (1.0, spec.upper)):
 
@@ -181,7 +185,7 @@ def profile(
 
         room = direction * (bound - centre)
         sides.append(_walk(_Held(0.0, 0.0, lowest), hold, one.standard_error, quantile, room))
-    return _profile(meant, one, confidence, centre, sides)
+    return _profile(meant, one, confidence, quantile, centre, sides)
 
 
 def _coefficient(fit: Fit, name: str) -> Coefficient:
@@ -234,7 +238,12 @@ def _walk(
         points = sorted([*points, held], key=lambda one: one.away)
         roots = [one.root for one in points]
         if np.any(np.diff(roots) <= 0.0):
-            return _Side(points, (), lost, "chi2 falls again on the way: it has another minimum there.")
+            return _Side(
+                points,
+                (),
+                lost,
+                "chi2 falls again on the way: another minimum, or the roughness of dry friction.",
+            )
         if away == room and held.root < quantile:
             return _Side(points, (), room, at_bound)
         if abs(held.root - quantile) < _CLOSE * quantile:
@@ -260,7 +269,9 @@ def _distance_at(points: list[_Held], quantile: float) -> float:
     return float(PchipInterpolator(roots, away, extrapolate=True)(quantile))
 
 
-def _profile(fit: Fit, one: Coefficient, confidence: float, centre: float, sides: list[_Side]) -> Profile:
+def _profile(
+    fit: Fit, one: Coefficient, confidence: float, quantile: float, centre: float, sides: list[_Side]
+) -> Profile:
     """Put both sides into one row."""
     others = tuple(name for name in fit.free if name != one.name)
     rows: list[tuple[float, float, list[float]]] = []
@@ -282,13 +293,10 @@ def _profile(fit: Fit, one: Coefficient, confidence: float, centre: float, sides
         one.standard_error,
         np.array([centre - sides[0].end, centre + sides[1].end]),
         confidence,
+        quantile,
         np.array([row[0] for row in rows]),
         np.array([row[1] for row in rows]),
         others,
         np.array([row[2] for row in rows]).reshape(len(rows), len(others)),
         tuple(reasons),
     )
-
-
-def _quantile(confidence: float) -> float:
-    return -float(ndtri(0.5 * (1.0 - confidence)))

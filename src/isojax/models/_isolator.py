@@ -162,8 +162,11 @@ class Isolator(eqx.Module):
 
         Returns:
             The new isolator.
+
+        Raises:
+            ValueError: if something given is no element, such as the name of one.
         """
-        gone = {name for element in added for name in element.absorbs}
+        gone = {name for element in added for name in getattr(element, "absorbs", ())}
         kept = tuple(element for element in self.elements if element.name not in gone)
         return Isolator(self.mass, (*kept, *added), self.excitation)
 

@@ -104,19 +104,24 @@ class NormalMixture(NamedTuple):
     def draw(
         self, uniform: Float[np.ndarray, " draw"], normal: Float[np.ndarray, "draw coefficient"]
     ) -> Float[np.ndarray, "draw coefficient"]:
-        """Give draws.
+        """Give draws, alike on both sides of the fitted values.
+
+        Each part counts with its mean on either side. Intervals about the fitted values hold as much either
+        way, and no interval by draws leaves out the value that it belongs to.
 
         Args:
-            uniform: even numbers between 0 and 1, which choose the parts.
+            uniform: even numbers between 0 and 1, which choose the parts and the side.
             normal: independent standard normal ones.
 
         Returns:
             The draws.
         """
-        chosen = np.searchsorted(np.cumsum(self.weights)[:-1], uniform)
+        first = np.concatenate([[0.0], np.cumsum(self.weights)[:-1]])
+        chosen = np.searchsorted(first[1:], uniform)
+        side = np.where(uniform - first[chosen] < 0.5 * self.weights[chosen], 1.0, -1.0)
         values, vectors = np.linalg.eigh(self.covariances)
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-        return self.means[chosen] + np.einsum("dij,dj->di", roots[chosen], normal)
+        return side[:, None] * self.means[chosen] + np.einsum("dij,dj->di", roots[chosen], normal)
 
     def to_dict(self) -> dict[str, Any]:
         """Give it as lists of numbers."""
