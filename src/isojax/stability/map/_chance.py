@@ -60,9 +60,9 @@ class Chances(NamedTuple):
         stable: chance that a cell holds no unstable orbit.
         coexisting: chance that it holds several orbits.
         standard_errors: of `response` and `spectral_radius` of each orbit; NaN where not every map has it.
-        error: of a chance near a half, at most, on average over the map: what one map more shows, of a draw
-            that moves all coefficients at once, and no less than one cell would make; NaN where no chance is
-            in doubt.
+        error: mean over the map of the error of a chance of one half, where chances are least exact: what one
+            map more shows, of a draw that moves all coefficients at once, and no less than one cell would
+            make; NaN where no chance is in doubt.
     """
 
     stable: Float[np.ndarray, "amplitude frequency"]

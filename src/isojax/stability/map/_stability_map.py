@@ -57,8 +57,9 @@ class StabilityMap(eqx.Module):
         probability_coexisting: chance that the cell holds several orbits, where a fit was given.
         standard_errors: of `response` and `spectral_radius` of each orbit, where a fit was given; NaN where
             orbits may appear or vanish.
-        chance_error: of a chance near a half, at most, on average over the map, where a fit was given: what a
-            map of one draw of all coefficients shows. Where it is large, map drawn models and count.
+        chance_error: mean error over the map of a chance of one half, where chances are least exact; by a map
+            of one draw of all coefficients, where a fit was given. Where it is large, map drawn models and
+            count.
         other_rests: where else the mass rests without a drive, within a hundred times the largest motion [m].
             The orbits are those about the rest next to zero, others only where no such orbit was found.
     """
