@@ -6,8 +6,10 @@ import pytest
 
 import isojax as ij
 from isojax import rig
+from isojax._results import RESULTS
 from isojax.elements import CoulombFriction, QuadraticStiffness
 from isojax.identification import Rules, diagnose, fit
+from isojax.identification.diagnosis import _diagnose
 from isojax.identification.fitting import (
     DEFAULT_SOLVER,
     chi2_per_dof_of_all,
@@ -86,6 +88,19 @@ def test_a_finding_on_thinned_records_is_fitted_to_all_samples(simulated):
     # Errors of the ranking are per degree of freedom of all samples; the jumps have a little above the band.
     ratios = [one.stats.chi2 / one.stats.dof for one in (before, after)]
     assert verdict.ranking[0].chi2_per_dof == pytest.approx(ratios[1], abs=0.1 * (ratios[0] - ratios[1]))
+
+
+@pytest.mark.slow
+def test_what_fits_no_more_on_all_samples_is_not_named(simulated, monkeypatch):
+    def fails(found, whole, coarser, search):
+        return whole._replace(result=RESULTS.not_finite)
+
+    campaign = simulated(PLANT.plus(rig.QuadraticStiffness(2.5e7)), PLAN, bench=_bench())
+    monkeypatch.setattr(_diagnose, "on_all_samples", fails)
+    verdict = diagnose(fit(ij.Isolator(800.0, DECLARED), campaign))
+    assert verdict.finding is None
+    assert verdict.after is None
+    assert "its refit to all samples did not converge" in verdict.reason
 
 
 def test_what_would_lose_by_it_keeps_every_sample(simulated):

@@ -241,7 +241,8 @@ def _loop(
     alternatives: tuple[Alternatives, ...] = ()
     if names and is_successful(after.result):
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
-        alternatives = find_alternatives(thinned(after.estimate, search)[0], names, search)
+        thin, coarser = thinned(after.estimate, search)
+        alternatives = find_alternatives(thin, names, coarser)
     judged = overall_verdict(before, after, len(names), verdict, rules, alternatives)
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.
@@ -296,7 +297,8 @@ def search_effects(
     name = doubtful.effect
     search.progress(KeyFigure(f"{name} is not needed beside the later findings: search again without it"))
     again, last = _grow(before, search, max_iterations, (*excluded, name))
-    best = on_all_samples(doubtful.without, whole, coarser, search) if doubtful.is_better else whole
+    without = on_all_samples(doubtful.without, whole, coarser, search) if doubtful.is_better else whole
+    best = without if is_successful(without.result) else whole
     if again:
         new = again[-1].after.estimate
         inflation = min(new.inflation, best.inflation)

@@ -1,4 +1,4 @@
-"""A record with fewer samples: low-passed without phase, then every n-th sample."""
+"""A record with fewer samples: filtered without phase, then every n-th sample."""
 
 import dataclasses
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from ..._cores import blas_in_one_thread
 from ..._progress import silent
-from ..._results import RESULTS
+from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE, AbstractElement
 from .._rules import Rules
 from ..fitting import (
@@ -150,19 +150,21 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
             reason = too_little
             break
         share = transferred_share(fitted, best.estimate, case.search)
+        against = "it does not carry over to data left out of its refit"
         if share > 0.0:
             ranking = rank_candidates(case.fit.estimate, test, refits, usable, inflation)
             name = best.score.element.name
             converged = refit_to_convergence(best.estimate, case.search)
             shaped = with_own_shape(converged, name, case.search)
             whole = on_all_samples(shaped, case.fit.estimate, case.search, case.finer)
-            usable[0] = best._replace(estimate=whole)
-            ranking = ranked_first(ranking, usable[0])
-            return _verdict_of_finding(case, usable, ranking, share)
+            if is_successful(whole.result) and whole.misfit < case.fit.estimate.misfit:
+                usable[0] = best._replace(estimate=whole)
+                return _verdict_of_finding(case, usable, ranked_first(ranking, usable[0]), share)
+            against = "its refit to all samples did not converge"
         # What imitates the missing effect on the records of its refit alone must not hide that effect.
-        reason = f"{too_little}, but it does not carry over to data left out of its refit"
+        reason = f"{too_little}, but {against}"
         place = next(index for index, one in enumerate(refits) if one is best)
-        refits[place] = best._replace(violation="it does not carry over to data left out of its refit")
+        refits[place] = best._replace(violation=against)
     ranking = rank_candidates(case.fit.estimate, test, refits, by_evidence(refits, rules), inflation)
     bounds = upper_bounds(test, None) if good else {}
     verdict = "none" if good else "unexplained"

@@ -52,7 +52,7 @@ def thinned(found: Estimate, search: Search) -> tuple[Estimate, Search]:
         search: how to search.
 
     Returns:
-        Both; as they are where nothing may be left out, or the thinned records lead elsewhere.
+        Both; as they are where nothing may be left out, or the fit to thinned records failed.
     """
     factor = thinning(found.problem)
     if factor == 1:
@@ -98,7 +98,7 @@ def on_all_samples(found: Estimate, whole: Estimate, coarser: Search, search: Se
         search: the search on all samples.
 
     Returns:
-        The estimate; `found` itself where nothing was left out.
+        The estimate, whose `result` says whether it succeeded; `found` itself where nothing was left out.
     """
     if found.problem.thinned == whole.problem.thinned:
         return found
