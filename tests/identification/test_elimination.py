@@ -91,6 +91,25 @@ def test_reduced_equations_are_the_schur_complement_of_the_dense_ones(setting):
         np.testing.assert_allclose(reduced.by_record[record], left.T @ left, rtol=1e-9, atol=1e-9)
 
 
+def test_a_lane_that_moves_by_its_start_alone_adds_nothing_to_the_size_of_a_column():
+    # What a dwell next to a fold does to every coefficient: a hundredfold of what its initial state does.
+    rng = np.random.default_rng(8)
+    nuisances = _nuisances(rng)
+    blocks = _blocks(True)
+    matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)[:USED]
+    plain = eliminate(matrices, NOISE, OWNER[:USED], COLUMNS, nuisances)
+    blocks[2, :, COLUMNS + 1] *= 100.0
+    blocks[2, :, :COLUMNS] = blocks[2, :, [COLUMNS + 1]].T * (50.0, -80.0, 120.0)
+    matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)[:USED]
+    amplified = eliminate(matrices, NOISE, OWNER[:USED], COLUMNS, nuisances)
+    rows = _dense(blocks, True, nuisances)[0]
+    # Nothing but states and their priors; the stiffness scales are no part of it.
+    states = rows[:, COLUMNS + RECORDS :]
+    left = rows[:, :COLUMNS] - states @ np.linalg.lstsq(states, rows[:, :COLUMNS], rcond=None)[0]
+    np.testing.assert_allclose(amplified.raw, np.sum(left**2, axis=0), rtol=1e-6)
+    assert np.all(amplified.raw < plain.raw + 120.0**2)  # the state moves by so much, against its prior
+
+
 def test_a_step_of_coefficients_and_nuisances_is_that_of_dense_least_squares(setting):
     reduced, nuisances, has_scale, rows, right, _ = setting
     solution = np.linalg.lstsq(rows, right, rcond=None)[0]

@@ -14,6 +14,9 @@ from jaxtyping import Float, Int
 from ..._show import shown
 from ..jacobian import STIFFNESS_SCALE_UNIT
 
+# Share of a column's squared size below which a remainder may be nothing but rounding of the elimination.
+_ROUNDING = 1e-11
+
 
 @shown
 class Spread(NamedTuple):
@@ -68,7 +71,9 @@ class Reduced(NamedTuple):
     Attributes:
         by_record: [[J'J, J'r], [r'J, r'r]] after the nuisances; coefficients first, residual last; whitened.
         eliminated: degrees of freedom that the nuisances of each record took from the data.
-        raw: squared size of each coefficient column before anything was eliminated; whitened.
+        raw: squared size of each coefficient column after the initial states alone; whitened. What they take
+            is nothing that a column shows: next to a fold a dwell moves a hundred times as much by its start
+            as by any coefficient.
         stiffness_map: step of the stiffness scales = map[:, -1] - map[:, :-1] @ step of the coefficients.
         stiffness_variance: of each record's stiffness scale, given the coefficients [relative stiffness
             squared].
@@ -188,6 +193,8 @@ def eliminate(
     left, states_map, taken = _without_states(matrices, heads, columns + int(has_scale), offset)
     eliminated = np.zeros(nuisances.stiffness.size)
     np.add.at(eliminated, owner, taken)
+    sizes, before = (np.diagonal(one, axis1=1, axis2=2).sum(axis=0)[:columns] for one in (left, matrices))
+    raw = np.maximum(sizes, _ROUNDING * before)
     by_segment = left[:, columns, [columns, -1]] if has_scale else np.zeros((owner.size, 2))
     segments_map, segments_variance = np.zeros((0, left.shape[1])), np.zeros(0)
     if has_scale and spread.segments > 0.0:
@@ -204,7 +211,6 @@ def eliminate(
         by_record = np.delete(np.delete(by_record, columns, axis=1), columns, axis=2)
         stiffness_map = np.delete(whole, columns, axis=1)
         eliminated += taken
-    raw = np.diagonal(matrices, axis1=1, axis2=2).sum(axis=0)[:columns]
     return Reduced(
         by_record,
         eliminated,
