@@ -20,7 +20,7 @@ import numpy as np
 import isojax as ij
 from _marks import Marks
 from _trial_campaign import sketch
-from coverage import records_of
+from covered import records_of
 from isojax import compile_quickly, rig
 from isojax.models import coefficient_errors
 from isojax.stability.map._chance import find_chances, quasi_draws

@@ -2,7 +2,7 @@
 
 Run `python benchmarks/next_test.py`, then `python benchmarks/next_test.py --report`. A run can be stopped and
 goes on where it stopped: a line of the file is a refit, about two seconds. The plant is the paper's y
-direction with every coefficient moved by up to 10 %, on the rig simulator, as in `coverage.py`; its stiffness
+direction with every coefficient moved by up to 10 %, on the rig simulator, as in `covered.py`; its stiffness
 scatters from record to record by 0.05 %. Three stepped sines are fitted. `next_test` then suggests a fourth
 record, once for all coefficients (D-optimal), once for the largest transmissibility and once for the force at
 the fold (c-optimal).
@@ -35,7 +35,7 @@ import isojax as ij
 from _marks import Marks
 from _set_up_jax import set_up_jax
 from _trial_campaign import Sketch, sketch
-from coverage import BAND, DRIVE, FOLD_FREQUENCY, records_of
+from covered import BAND, DRIVE, FOLD_FREQUENCY, records_of
 from isojax import rig
 from isojax.identification import Fit, Proposal
 from isojax.identification.fitting import _covariance, _scatter_mixture

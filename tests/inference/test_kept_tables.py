@@ -28,7 +28,7 @@ def report_of(name: str, capsys: pytest.CaptureFixture) -> list[str]:
 
 
 def test_intervals_from_few_records_are_those_of_the_rows(page, capsys):
-    printed = report_of("coverage", capsys)
+    printed = report_of("covered", capsys)
     judged = [line.replace("| all ", "", 1) for line in printed if line.startswith("| all ")]
     chances = [line for line in printed if re.match(r"\| \d\.\d\d to ", line)]
     assert (len(judged), len(chances)) == (9, 7)
