@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._implicit import frozen, with_derivatives
+from .._quick_jit import quick_jit
 from .._results import RESULTS
 from .._show import amount, brief, number, shown
 from .._types import Lanes, as_float64, check_float64
@@ -57,7 +58,7 @@ class Simulation(eqx.Module):
         )
 
 
-@eqx.filter_jit
+@quick_jit
 def _solve_ode(
     model: Isolator,
     excitation: AbstractExcitation,

@@ -1,12 +1,12 @@
 """Whether a force with internal states takes energy: its work over the loop of a sinusoidal motion."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._kept import recall
+from ..._quick_jit import quick_jit
 from ...elements import AbstractElement
 
 CYCLES = 6
@@ -25,7 +25,7 @@ WORK_OF_STEPS = 1e-3
 """Share of the elastic energy of a loop up to which its work is the error of the steps."""
 
 
-@eqx.filter_jit
+@quick_jit
 def _loops(
     element: AbstractElement, amplitude: Float[Array, " lane"], angular: Float[Array, " lane"]
 ) -> Float[Array, "time lane"]:

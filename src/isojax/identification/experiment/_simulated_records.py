@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..._kept import recall
+from ..._quick_jit import quick_jit
 from ...models import RK4, Instant, Isolator, Quantity, State, add_ringing, read_record, scan_records
 from ...records import Dwell, ExcitationKind, Record
 from ..diagnosis import Experiment, Waveform
@@ -40,7 +40,7 @@ class TrialRun(NamedTuple):
         return np.all(np.isfinite(self.path), axis=(0, 2))
 
 
-@eqx.filter_jit
+@quick_jit
 def _run(
     model: Isolator, record: Instant, start: State, quantity: Quantity, sample_time: float
 ) -> tuple[State, Array]:

@@ -2,13 +2,13 @@
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._parameters import ParameterSpec, list_parameters, replace_parameters, to_free, to_physical
+from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ...models import Isolator
 from ._elimination import Nuisances, step_nuisances
@@ -96,7 +96,7 @@ def _compress(matrix: Float[np.ndarray, "column column"]) -> tuple[np.ndarray, n
     return factor[-1].copy(), -np.vstack([factor[:count, :count].T, np.zeros((1, count))])
 
 
-@eqx.filter_jit
+@quick_jit
 def _to_physical(
     free: Float[Array, " column"], scales: Float[Array, " column"], specs: tuple[ParameterSpec, ...]
 ) -> tuple[Float[Array, " column"], Float[Array, " column"]]:
@@ -109,13 +109,13 @@ def _to_physical(
     return jax.jvp(each, (free,), (jnp.ones_like(free),))
 
 
-@eqx.filter_jit
+@quick_jit
 def _init(solver: Any, free: Array, local: _Local) -> Any:
     struct = jax.eval_shape(lambda: local.residual)
     return solver.init(_residual, free, local, {}, struct, None, frozenset())
 
 
-@eqx.filter_jit
+@quick_jit
 def _step(solver: Any, free: Array, local: _Local, state: Any) -> tuple[Array, Any]:
     free, state, _ = solver.step(_residual, free, local, {}, state, frozenset())
     return free, state

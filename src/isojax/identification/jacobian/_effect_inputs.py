@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ..._types import Internal, Lanes, Scalar
 from ...elements import AbstractElement, Channels, Scales
 from ...models import RK4, State
@@ -140,7 +141,7 @@ def input_columns(
     return _input_columns(family.elements, motion._replace(stages=()), internal)
 
 
-@eqx.filter_jit
+@quick_jit
 def internal_state_path(
     members: AbstractElement, stages: tuple[Float[Array, "time 3 lanes"], ...], start: State, step: float
 ) -> tuple[State, State]:
@@ -178,7 +179,7 @@ def _or_nothing(value: Lanes | None) -> Lanes | float:
     return 0.0 if value is None else value
 
 
-@eqx.filter_jit
+@quick_jit
 def _input_columns(
     members: AbstractElement, motion: PathMotion, internal: State
 ) -> dict[str, Float[Array, "member time lanes"]]:

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
+from ..._quick_jit import quick_jit
 from ...models import (
     RK4,
     Instant,
@@ -47,7 +47,7 @@ def _sampler(model: Isolator, sampling: Sampling) -> Callable[..., tuple[Array, 
     return sample
 
 
-@eqx.filter_jit
+@quick_jit
 def fixed_information(
     start: Lanes,
     moving: tuple[int, ...],
@@ -99,7 +99,7 @@ def fixed_information(
     return whitened_products(rows, batch.weight, sampling.whitening)
 
 
-@eqx.filter_jit
+@quick_jit
 def fixed_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Array, "time lanes"]:
     """Simulate; give what the sensor chain records."""
     model, scale, states = start
@@ -115,7 +115,7 @@ def fixed_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Arra
     return jax.lax.scan(body, begun, batch.acting)[1]
 
 
-@eqx.filter_jit
+@quick_jit
 def fixed_path(start: Lanes, batch: Batch, sampling: Sampling) -> tuple[State, Ringing | None]:
     """Simulate; give the states at the start of each integration step, and the ringing of jumps."""
     model, scale, states = start

@@ -2,11 +2,11 @@
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ._slopes import Change, cubic_middle
 
 Matrix = list[list[Array]]
@@ -56,7 +56,7 @@ def around(values: Array) -> tuple[Array, Array, Array, Array]:
     return before, now, ahead, after
 
 
-@eqx.filter_jit
+@quick_jit
 def propagate(by_state: tuple[Change, ...], step: float) -> Propagation:
     """Give what a Runge-Kutta step of the linear equation `d' = A(t) d + b(t)` does; it is linear itself.
 
@@ -98,7 +98,7 @@ def propagate(by_state: tuple[Change, ...], step: float) -> Propagation:
     )
 
 
-@eqx.filter_jit
+@quick_jit
 def respond(
     propagation: Propagation,
     readings: tuple[Float[Array, "time lanes"], ...],

@@ -4,12 +4,12 @@ import itertools
 from collections.abc import Iterable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
 from ..._show import shown
 from ...models import Instant, Isolator
 from ...records import Record
@@ -57,7 +57,7 @@ def slowest_decay(model: Isolator) -> float:
     return float(max(0.0, -rates.max()))
 
 
-@eqx.filter_jit
+@quick_jit
 def _rates_about_rest(model: Isolator) -> Float[Array, "state state"]:
     """Give the derivative of the states' rates by the states, at rest."""
     rest = jnp.zeros(2 + model.internal_states)

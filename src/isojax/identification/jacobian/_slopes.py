@@ -6,13 +6,13 @@ what is absent is followed at one step a sample, whatever the model asks for.
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
+from ..._quick_jit import quick_jit
 from ...models import (
     ROUNDED,
     Instant,
@@ -112,7 +112,7 @@ class Slopes(NamedTuple):
     motion: PathMotion
 
 
-@eqx.filter_jit
+@quick_jit
 def slopes_along(
     model: Isolator,
     moving: tuple[int, ...],

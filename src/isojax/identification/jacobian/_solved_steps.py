@@ -1,12 +1,12 @@
 """Segments simulated by a diffrax solver with its own steps and tolerances, and differentiated through it."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
+from ..._quick_jit import quick_jit
 from ...models import Instant, State, solve_record
 from ._batch import Batch, Sampling
 from ._unknowns import Lanes, movable, scaled_model, unit_changes
@@ -28,7 +28,7 @@ def _solve_lanes(
     return jax.vmap(lane, in_axes=-1, out_axes=-1)(start.stiffness_scale, start.states, batch.acting)
 
 
-@eqx.filter_jit
+@quick_jit
 def solved_information(
     start: Lanes,
     moving: tuple[int, ...],
@@ -55,14 +55,14 @@ def solved_information(
     return jnp.einsum("itl,jtl->ijl", rows, rows)
 
 
-@eqx.filter_jit
+@quick_jit
 def solved_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Array, "time lanes"]:
     """Simulate; give what the sensor chain records."""
     values = tuple(entry.value for entry in list_parameters(start.model))
     return _solve_lanes(start, values, batch, sampling)[1]
 
 
-@eqx.filter_jit
+@quick_jit
 def solved_path(start: Lanes, batch: Batch, sampling: Sampling) -> tuple[State, None]:
     """Simulate; give the states at the start of each step of the tables. No law is split, nothing rings."""
     values = tuple(entry.value for entry in list_parameters(start.model))

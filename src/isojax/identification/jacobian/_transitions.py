@@ -6,13 +6,13 @@ after it. The derivative of the split step itself knows by how much.
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
+from ..._quick_jit import quick_jit
 from ...models import Instant, Isolator, Quantity, State, Step, find_ringing, split_step
 from ._propagation import Matrix, Propagation, product
 from ._slopes import steps_of
@@ -36,7 +36,7 @@ class Transitions(NamedTuple):
     scale: Float[Array, "row time lanes"]
 
 
-@eqx.filter_jit
+@quick_jit
 def transitions_along(
     model: Isolator,
     moving: tuple[int, ...],

@@ -4,7 +4,6 @@ import dataclasses
 from typing import NamedTuple
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Array, Float
 from scipy.signal import butter, lfilter, sosfiltfilt
 
 from ..._parameters import list_parameters
+from ..._quick_jit import quick_jit
 from ...elements import Channels
 from ...excitations import Hold
 from ...models import RK4, Instant, Isolator, State, share_internal
@@ -62,7 +62,7 @@ class ForceResidual(NamedTuple):
     trusted: slice
 
 
-@eqx.filter_jit
+@quick_jit
 def follow_internal_states(
     model: Isolator, x: Array, v: Array, y: Array, u: Array, sample_time: float
 ) -> tuple[Array, ...]:
@@ -106,7 +106,7 @@ def follow_internal_states(
     return jax.lax.scan(body, rest, (signals, ahead))[1]
 
 
-@eqx.filter_jit
+@quick_jit
 def _missing_force(
     model: Isolator, motion: State, a: Array, u: Array, du: Array, channels: Channels
 ) -> Array:
