@@ -8,6 +8,8 @@ from typing import Any, NamedTuple, TypeVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ._show import brief, shown
@@ -94,6 +96,31 @@ def own_parameters(module: eqx.Module | type[eqx.Module]) -> tuple[tuple[str, Pa
         for field in dataclasses.fields(module)
         if "parameter" in field.metadata
     )
+
+
+def refuse_outside(name: str, value: Any, spec: ParameterSpec) -> None:
+    """Refuse a number, or any of several, that its declaration does not admit; a traced one passes unseen.
+
+    NaN passes too: it is what a search that failed leaves.
+
+    Args:
+        name: of the number.
+        value: what was given.
+        spec: its declaration.
+
+    Raises:
+        ValueError: if it lies outside.
+    """
+    bounded = math.isfinite(spec.lower) or math.isfinite(spec.upper)
+    if not bounded or not eqx.is_array_like(value) or isinstance(value, Tracer):
+        return
+    known = np.asarray(value)
+    if np.any((known < spec.lower) | (known > spec.upper)):
+        unit = "" if spec.unit == "1" else f" {spec.unit}"
+        wanted = f"lie from {spec.lower:g} to {spec.upper:g}"
+        if math.isinf(spec.upper):
+            wanted = f"be at least {spec.lower:g}"
+        raise ValueError(f"Argument `{name}` must {wanted}{unit}, but is {value}.")
 
 
 def required_parameters(module: type[eqx.Module]) -> tuple[str, ...]:

@@ -14,8 +14,11 @@ from isojax.elements import (
     CoulombFriction,
     CubicStiffness,
     EndStop,
+    FractionalDamping,
     LinearDamping,
     LinearStiffness,
+    MaxwellBranch,
+    PressureStiffness,
     SensorGain,
     StribeckFriction,
 )
@@ -91,6 +94,18 @@ def test_elements_are_appended_and_the_rest_kept():
         ((1.0, (EndStop(1e6, 1e-3, 0.0, 0.0),)), r"`end_stop.width` must be positive, but is 0.0"),
         ((-800.0, ()), r"`mass` must be positive, but is -800.0"),
         ((float("nan"), ()), r"`mass` must be positive, but is nan"),
+        (
+            (800.0, (MaxwellBranch(1e5, -0.1),)),
+            r"`maxwell_branch.time_constant` must be at least 0 s, but is -0.1",
+        ),
+        (
+            (800.0, (FractionalDamping(2e4, 1.7, 1.0, 1e3),)),
+            r"`fractional_damping.order` must lie from 0.02 to 0.98, but is 1.7",
+        ),
+        (
+            (800.0, (PressureStiffness(1e5, 0.0),)),
+            r"`pressure_stiffness.reference` must be positive, but is 0.0",
+        ),
         ((800.0, (LinearStiffness, 3.0)), r"`elements` must hold elements, but elements\[0\]"),
         ((800.0, (), "base"), r"`excitation` must be .*, but is 'base'"),
     ],
@@ -98,6 +113,14 @@ def test_elements_are_appended_and_the_rest_kept():
 def test_what_is_no_isolator_is_refused(unchecked, arguments, message):
     with pytest.raises(ValueError, match=message):
         Isolator(*arguments)
+
+
+def test_numbers_that_no_model_admits_do_not_replace_others():
+    model = Isolator(800.0, (LinearStiffness(1e6), MaxwellBranch(1e5, 0.1)))
+    with pytest.raises(ValueError, match=r"`maxwell_branch.time_constant` must be at least 0 s, but is -1.0"):
+        model.replace(maxwell_branch__time_constant=-1.0)
+    with pytest.raises(ValueError, match=r"`mass` must be positive, but is 0.0"):
+        model.replace(mass=0.0)
 
 
 def test_a_model_is_built_inside_a_traced_function():

@@ -14,7 +14,9 @@ from .._parameters import (
     find_parameter,
     full_names,
     list_parameters,
+    own_parameters,
     parameter,
+    refuse_outside,
     replace_parameters,
 )
 from .._show import Row, amount, listed, shown
@@ -76,8 +78,11 @@ class Isolator(eqx.Module):
                 raise ValueError(
                     f"Argument `elements` must hold elements, but elements[{place}] = {entry!r}."
                 )
-            # The rounding of a kink, by which laws divide.
-            refuse_not_positive(f"{entry.name}.width", getattr(entry, "width", 1.0))
+            for field, spec in own_parameters(entry):
+                refuse_outside(f"{entry.name}.{field}", getattr(entry, field), spec)
+            # The rounding of a kink, and the pressure or temperature that others are compared with.
+            for divisor in ("width", "reference"):
+                refuse_not_positive(f"{entry.name}.{divisor}", getattr(entry, divisor, 1.0))
         refuse_not_positive("mass", self.mass)
 
     @property
@@ -135,13 +140,14 @@ class Isolator(eqx.Module):
             The new isolator.
 
         Raises:
-            ValueError: if there is no such parameter, or it is given twice.
+            ValueError: if there is no such parameter, it is given twice, or its number is not admissible.
         """
         numbers = [entry.value for entry in list_parameters(self)]
         names = full_names(self, [name.replace("__", ".") for name in values])
         for name, value in zip(names, values.values(), strict=True):
             numbers[find_parameter(self, name)] = jnp.asarray(value, dtype=float)
-        return replace_parameters(self, numbers)
+        changed = replace_parameters(self, numbers)
+        return Isolator(changed.mass, changed.elements, changed.excitation)  # refuses what is none
 
     def element(self, name: str) -> AbstractElement | None:
         """Give the first element of a catalogue name, or None.
