@@ -22,7 +22,17 @@ from isojax.elements import (
     SensorGain,
     StribeckFriction,
 )
-from isojax.models import ContinuedLaw, Instant, Isolator, Regime, freeing_accelerations, law_beside
+from isojax.excitations import Harmonic
+from isojax.models import (
+    ContinuedLaw,
+    Instant,
+    Isolator,
+    Regime,
+    freeing_accelerations,
+    law_beside,
+    simulate,
+)
+from isojax.stability import find_periodic_orbit
 
 
 def test_numbers_become_float64_arrays():
@@ -95,14 +105,6 @@ def test_elements_are_appended_and_the_rest_kept():
         ((-800.0, ()), r"`mass` must be positive, but is -800.0"),
         ((float("nan"), ()), r"`mass` must be positive, but is nan"),
         (
-            (800.0, (MaxwellBranch(1e5, -0.1),)),
-            r"`maxwell_branch.time_constant` must be at least 0 s, but is -0.1",
-        ),
-        (
-            (800.0, (FractionalDamping(2e4, 1.7, 1.0, 1e3),)),
-            r"`fractional_damping.order` must lie from 0.02 to 0.98, but is 1.7",
-        ),
-        (
             (800.0, (PressureStiffness(1e5, 0.0),)),
             r"`pressure_stiffness.reference` must be positive, but is 0.0",
         ),
@@ -113,6 +115,26 @@ def test_elements_are_appended_and_the_rest_kept():
 def test_what_is_no_isolator_is_refused(unchecked, arguments, message):
     with pytest.raises(ValueError, match=message):
         Isolator(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("element", "message"),
+    [
+        (MaxwellBranch(1e5, -0.1), r"`maxwell_branch.time_constant` must be at least 0 s, but is -0.1"),
+        (
+            FractionalDamping(2e4, 1.7, 1.0, 1e3),
+            r"`fractional_damping.order` must lie from 0.02 to 0.98, but is 1.7",
+        ),
+    ],
+)
+def test_a_shape_that_no_element_admits_is_refused_where_a_model_is_asked_for(element, message):
+    model = Isolator(800.0, (LinearStiffness(1e6), element))
+    for ask in (
+        lambda: simulate(model, Harmonic(100.0, 5.0), duration=1.0, rate=100.0),
+        lambda: find_periodic_orbit(model, Harmonic(100.0, 5.0)),
+    ):
+        with pytest.raises(ValueError, match=message):
+            ask()
 
 
 def test_numbers_that_no_model_admits_do_not_replace_others():

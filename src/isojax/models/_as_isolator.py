@@ -2,6 +2,7 @@
 
 from typing import Protocol, runtime_checkable
 
+from .._parameters import element_names, own_parameters, refuse_outside
 from ._isolator import Isolator
 
 
@@ -27,7 +28,8 @@ def as_isolator(value: object, argument: str = "model", recorded: bool = False) 
         The isolator.
 
     Raises:
-        ValueError: if there is none, or a coefficient follows a condition that nothing states.
+        ValueError: if there is none, a coefficient follows a condition that nothing states, or a number of an
+            element is not admissible.
     """
     meant = value if isinstance(value, Isolator) else getattr(value, "model", None)
     if not isinstance(meant, Isolator):
@@ -41,4 +43,9 @@ def as_isolator(value: object, argument: str = "model", recorded: bool = False) 
             f"Argument `{argument}` must be an isolator at one {' and '.join(meant.conditions)}, which a "
             f"coefficient follows, such as {argument}.at({given})."
         )
+    for element, name in zip(meant.elements, element_names(meant), strict=True):
+        for field, spec in own_parameters(element):
+            # A strength may have either sign where a linear step gave it.
+            if field != element.strength:
+                refuse_outside(f"{name}.{field}", getattr(element, field), spec)
     return meant

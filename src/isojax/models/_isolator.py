@@ -14,7 +14,6 @@ from .._parameters import (
     find_parameter,
     full_names,
     list_parameters,
-    own_parameters,
     parameter,
     refuse_outside,
     replace_parameters,
@@ -78,8 +77,6 @@ class Isolator(eqx.Module):
                 raise ValueError(
                     f"Argument `elements` must hold elements, but elements[{place}] = {entry!r}."
                 )
-            for field, spec in own_parameters(entry):
-                refuse_outside(f"{entry.name}.{field}", getattr(entry, field), spec)
             # The rounding of a kink, and the pressure or temperature that others are compared with.
             for divisor in ("width", "reference"):
                 refuse_not_positive(f"{entry.name}.{divisor}", getattr(entry, divisor, 1.0))
@@ -145,9 +142,11 @@ class Isolator(eqx.Module):
         numbers = [entry.value for entry in list_parameters(self)]
         names = full_names(self, [name.replace("__", ".") for name in values])
         for name, value in zip(names, values.values(), strict=True):
-            numbers[find_parameter(self, name)] = jnp.asarray(value, dtype=float)
+            place = find_parameter(self, name)
+            numbers[place] = jnp.asarray(value, dtype=float)
+            refuse_outside(name, numbers[place], list_parameters(self)[place].spec)
         changed = replace_parameters(self, numbers)
-        return Isolator(changed.mass, changed.elements, changed.excitation)  # refuses what is none
+        return Isolator(changed.mass, changed.elements, changed.excitation)  # refuses a mass of zero
 
     def element(self, name: str) -> AbstractElement | None:
         """Give the first element of a catalogue name, or None.
