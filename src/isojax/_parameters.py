@@ -193,6 +193,28 @@ def replace_parameters(model: _Model, values: Sequence[Any] | Float[Array, " par
     return eqx.tree_at(_leaves, model, [as_float64(values[index]) for index in range(count)])
 
 
+def replace_named(model: _Model, values: Mapping[str, Any]) -> _Model:
+    """Give the same model with some numbers replaced.
+
+    Args:
+        model: an isolator or a single element.
+        values: new values by name or symbol.
+
+    Returns:
+        The model.
+
+    Raises:
+        ValueError: if there is no such parameter, it is given twice, or its number is not admissible.
+    """
+    listed = list_parameters(model)
+    numbers = [entry.value for entry in listed]
+    for name, value in zip(full_names(model, values), values.values(), strict=True):
+        place = find_parameter(model, name)
+        numbers[place] = jnp.asarray(value, dtype=float)
+        refuse_outside(name, numbers[place], listed[place].spec)
+    return replace_parameters(model, numbers)
+
+
 def find_parameter(model: eqx.Module, name: str, argument: str = "name", *others: str) -> int:
     """Find a parameter by its name in reports, or by its symbol where only one has it.
 

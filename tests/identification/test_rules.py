@@ -21,6 +21,7 @@ ACCURACY = {
     # Rounding, and what is too large to be a motion.
     "_alternative_laws": {"SAME_TRACE"},
     "_covariance": {"PARTNER", "SMALLEST_EIGENVALUE"},
+    "_elimination": {"SMALLEST_EIGENVALUE"},
     "_simulator": {"HUGE"},
     # Integration: steps, and when they are fine enough; loops of a law that must be closed.
     "_integration_steps": {"FINEST", "SEGMENTS_TRIED", "SMALL_ERROR"},

@@ -12,11 +12,9 @@ from .._parameters import (
     Parameter,
     element_names,
     find_parameter,
-    full_names,
     list_parameters,
     parameter,
-    refuse_outside,
-    replace_parameters,
+    replace_named,
 )
 from .._show import Row, amount, listed, shown
 from .._types import Lanes, Scalar
@@ -139,13 +137,7 @@ class Isolator(eqx.Module):
         Raises:
             ValueError: if there is no such parameter, it is given twice, or its number is not admissible.
         """
-        numbers = [entry.value for entry in list_parameters(self)]
-        names = full_names(self, [name.replace("__", ".") for name in values])
-        for name, value in zip(names, values.values(), strict=True):
-            place = find_parameter(self, name)
-            numbers[place] = jnp.asarray(value, dtype=float)
-            refuse_outside(name, numbers[place], list_parameters(self)[place].spec)
-        changed = replace_parameters(self, numbers)
+        changed = replace_named(self, {name.replace("__", "."): value for name, value in values.items()})
         return Isolator(changed.mass, changed.elements, changed.excitation)  # refuses a mass of zero
 
     def element(self, name: str) -> AbstractElement | None:

@@ -24,7 +24,8 @@ from ..._show import shown
 from ...models import NormalMixture
 
 SMALLEST_EIGENVALUE = 1e-11
-"""Relative eigenvalue of the scaled information below which a combination counts as undetermined.
+"""Relative eigenvalue of the scaled information below which a combination counts as undetermined, and share
+of a column below which what an elimination leaves of it is rounding.
 
 Products are accumulated in float64, so that shares of about 1e-13 are rounding; a hundred times that is the
 margin.

@@ -13,9 +13,7 @@ from jaxtyping import Float, Int
 
 from ..._show import shown
 from ..jacobian import STIFFNESS_SCALE_UNIT
-
-# Share of a column's squared size below which a remainder may be nothing but rounding of the elimination.
-_ROUNDING = 1e-11
+from ._covariance import SMALLEST_EIGENVALUE
 
 
 @shown
@@ -194,7 +192,8 @@ def eliminate(
     eliminated = np.zeros(nuisances.stiffness.size)
     np.add.at(eliminated, owner, taken)
     sizes, before = (np.diagonal(one, axis1=1, axis2=2).sum(axis=0)[:columns] for one in (left, matrices))
-    raw = np.maximum(sizes, _ROUNDING * before)
+    # What is left of a column that the states take whole is rounding.
+    raw = np.maximum(sizes, SMALLEST_EIGENVALUE * before)
     by_segment = left[:, columns, [columns, -1]] if has_scale else np.zeros((owner.size, 2))
     segments_map, segments_variance = np.zeros((0, left.shape[1])), np.zeros(0)
     if has_scale and spread.segments > 0.0:
