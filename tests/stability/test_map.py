@@ -242,8 +242,8 @@ def test_the_size_of_the_chunks_changes_no_number():
         ({"amplitudes": ["a"]}, "Argument `amplitudes` must be a list of real numbers, but is ['a']."),
         ({"amplitudes": [1j]}, "Argument `amplitudes` must be a list of real numbers, but is [1j]."),
         (
-            {"model": paper.y_direction().replace(mass=math.nan)},
-            "Argument `model` must hold finite numbers, but mass is nan.",
+            {"model": paper.y_direction().replace(k1=math.nan)},
+            "Argument `model` must hold finite numbers, but linear_stiffness.coefficient is nan.",
         ),
         *(
             (
