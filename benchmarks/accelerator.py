@@ -1,7 +1,7 @@
 """Time maps, orbits under vmap and fits on a GPU against the CPU of the same machine, in double precision.
 
 Run: python benchmarks/accelerator.py [--repeats 3] [--cores 0] (needs the extra `bench` and a jaxlib with
-CUDA; about six minutes). Each device works in a process of its own, since JAX chooses once where arrays
+CUDA; about four minutes). Each device works in a process of its own, since JAX chooses once where arrays
 live. `--cores 2` holds the CPU's process to two cores, as other benchmarks are.
 
 Printed of each task: seconds of the first call, which compiles; the median of later calls on both devices;

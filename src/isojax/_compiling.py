@@ -15,7 +15,8 @@ _FLAG = "--xla_cpu_use_fusion_emitters"
 def compile_quickly() -> bool:
     """Have XLA compile for CPUs without its fusion emitters: half the time, and the code is as fast.
 
-    It is a flag of the process (`XLA_FLAGS`), for all that uses JAX there, so isojax sets it only where
+    Fits, diagnoses, orbits, maps and curves are compiled so anyway. This is a flag of the process
+    (`XLA_FLAGS`), for all that uses JAX there, functions of your own included, so isojax sets it only where
     asked; the command line does. Call it before the first computation: XLA reads its flags once. Results
     differ by rounding.
 

@@ -193,12 +193,13 @@ def replace_parameters(model: _Model, values: Sequence[Any] | Float[Array, " par
     return eqx.tree_at(_leaves, model, [as_float64(values[index]) for index in range(count)])
 
 
-def replace_named(model: _Model, values: Mapping[str, Any]) -> _Model:
+def replace_named(model: _Model, names: Sequence[str], values: Iterable[Any]) -> _Model:
     """Give the same model with some numbers replaced.
 
     Args:
         model: an isolator or a single element.
-        values: new values by name or symbol.
+        names: names or symbols of the numbers.
+        values: the new value of each.
 
     Returns:
         The model.
@@ -208,7 +209,7 @@ def replace_named(model: _Model, values: Mapping[str, Any]) -> _Model:
     """
     listed = list_parameters(model)
     numbers = [entry.value for entry in listed]
-    for name, value in zip(full_names(model, values), values.values(), strict=True):
+    for name, value in zip(full_names(model, names), values, strict=True):
         place = find_parameter(model, name)
         numbers[place] = jnp.asarray(value, dtype=float)
         refuse_outside(name, numbers[place], listed[place].spec)

@@ -145,6 +145,13 @@ def test_numbers_that_no_model_admits_do_not_replace_others():
         model.replace(mass=0.0)
 
 
+def test_a_number_that_is_named_in_two_ways_is_refused():
+    model = Isolator(800.0, (LinearStiffness(1e6),))
+    twice = {"linear_stiffness.coefficient": 2e6, "linear_stiffness__coefficient": 3e6}
+    with pytest.raises(ValueError, match=r"linear_stiffness\.coefficient"):
+        model.replace(**twice)
+
+
 def test_a_model_is_built_inside_a_traced_function():
     @jax.jit
     def force(mass):

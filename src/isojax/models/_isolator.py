@@ -137,7 +137,7 @@ class Isolator(eqx.Module):
         Raises:
             ValueError: if there is no such parameter, it is given twice, or its number is not admissible.
         """
-        changed = replace_named(self, {name.replace("__", "."): value for name, value in values.items()})
+        changed = replace_named(self, [name.replace("__", ".") for name in values], values.values())
         return Isolator(changed.mass, changed.elements, changed.excitation)  # refuses a mass of zero
 
     def element(self, name: str) -> AbstractElement | None:
