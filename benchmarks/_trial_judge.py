@@ -131,6 +131,11 @@ def stays_unnamed(row: Row) -> bool:
     return admits_outside(row) or (bool(named) and all(name in known for name in named))
 
 
+def stays_within(row: Row) -> bool:
+    """Say the same; an effect that is no force may pass as well by a range that holds the true readings."""
+    return stays_unnamed(row) or row.get("reading_miss", float("inf")) <= WITHIN
+
+
 def table(rows: list[Row]) -> list[Mark]:
     """Judge all campaigns by the criteria of the diagnosis."""
     loops = [row for row in rows if row["task"] == "loop"]
@@ -184,6 +189,12 @@ def table(rows: list[Row]) -> list[Mark]:
             "left out of the catalogue: likewise, or a name it is known by, at least 90 %",
             left,
             stays_unnamed,
+            lambda f: f >= 0.9,
+        ),
+        _share(
+            "the same, or the range of models holds the true readings, where the effect is no force",
+            left,
+            stays_within,
             lambda f: f >= 0.9,
         ),
         _share("two effects at once, both named, at least 70 %", two, both_named, lambda f: f >= 0.7),

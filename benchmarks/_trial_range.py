@@ -1,5 +1,7 @@
-"""Whether the true force lies in the range of the laws that a closed loop reports."""
+"""Whether the true force, or the true reading, lies in the range of the models that a closed loop reports."""
 
+import dataclasses
+from pathlib import Path
 from typing import NamedTuple
 
 import equinox as eqx
@@ -8,10 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from isojax import rig
+from isojax import read_campaign, rig
 from isojax._parameters import list_parameters, replace_parameters
 from isojax.identification import Loop
+from isojax.identification.fitting import Spread
+from isojax.identification.fitting._errors import restart_records
+from isojax.identification.fitting._fit import simulator_for
 from isojax.models import Instant, Isolator
+from isojax.records import estimate_noise
 from isojax.rig import Tones, response
 
 CYCLES, SAMPLES = 16, 400
@@ -68,6 +74,56 @@ def miss(loop: Loop, plant: rig.Plant, levels: tuple[float, ...], frequencies: t
             slope = np.asarray(_slope(fit.model, tuple(places), motion))
             errors.append(np.sqrt(np.maximum(np.sum(slope @ covariance * slope, axis=1), 0.0)))
     return float(np.sqrt(np.mean(np.square(outside)) / np.mean(np.square(errors))))
+
+
+def reading_miss(
+    loop: Loop,
+    plant: rig.Plant,
+    bench: rig.Bench,
+    levels: tuple[float, ...],
+    frequencies: tuple[float, ...],
+    folder: Path,
+) -> float:
+    """Give how far what the bench reads lies outside of what the reported models read, in standard errors.
+
+    The bench, without its noise, records dwells at each level and frequency. Each model follows the recorded
+    drive, every dwell from its best start; the range goes from the least of their readings to the largest.
+    It is what `miss` is for effects that are no forces: of a channel, of the drive.
+
+    Args:
+        loop: a closed loop with findings.
+        plant: what its records are of.
+        bench: what recorded them.
+        levels: amplitudes of the force [N].
+        frequencies: of the force [Hz].
+        folder: for the records.
+
+    Returns:
+        rms of the distance to the range, over the rms standard error of the final model's readings.
+    """
+    quiet = dataclasses.replace(bench, noise=0.0, force_noise=0.0, drift=0.0)
+    plan = rig.SteppedSine(levels, frequencies, CYCLES, ("forward",))
+    told = read_campaign(rig.write_campaign(folder, plant, (plan,), 0, "true", quiet))
+    told = dataclasses.replace(told, output=dataclasses.replace(told.output, noise=bench.noise))
+    fit = loop.after
+    places = tuple(place for place, entry in enumerate(list_parameters(fit.model)) if entry.name in fit.free)
+
+    def run(model: Isolator, places: tuple[int, ...] = ()):
+        simulator = simulator_for(model, told, estimate_noise(told), None)
+        return restart_records(simulator, model, Spread(1e-9), None, places)
+
+    final = run(fit.model, places)
+    held = [final, *(run(law.model) for one in loop.alternatives[-1:] for law in one.laws)]
+    squares, count = 0.0, 0
+    for record, runs in enumerate(zip(*(one.runs for one in held), strict=True)):
+        simulated = np.stack([one.simulated for one in runs])
+        true = told.records[record].output
+        beyond = np.maximum(simulated.min(axis=0) - true, 0.0) + np.maximum(true - simulated.max(axis=0), 0.0)
+        squares += float(np.sum(beyond[runs[0].counted > 0.0] ** 2))
+        count += int(np.sum(runs[0].counted > 0.0))
+    information = final.point.reduced.matrix[:-1, :-1]
+    error = bench.noise**2 * np.trace(np.nan_to_num(np.asarray(fit.covariance)) @ information) / count
+    return float(np.sqrt(squares / count / error))
 
 
 def _steady(plant: rig.Plant, level: float, frequency: float) -> Motion:

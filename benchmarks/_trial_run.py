@@ -11,7 +11,7 @@ import numpy as np
 
 from _trial_campaign import Secret, Sketch, file_campaign, secrets, sketch
 from _trial_effects import EFFECTS, element_of, exact_class
-from _trial_range import miss
+from _trial_range import miss, reading_miss
 from _trial_wall_time import run_wall_time
 from isojax._parameters import own_parameters
 from isojax._results import is_successful
@@ -73,6 +73,12 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
             and len(laws) == len(hidden)
         ):
             row["miss"] = miss(loop, drawn.plant.plus(*laws), drawn.levels[:3], VISITED)
+        elif task == "leave_out" and row["verdict"] == "found":
+            plant = drawn.plant.plus(*(secret.law for secret in hidden))
+            with tempfile.TemporaryDirectory() as folder:
+                row["reading_miss"] = reading_miss(
+                    loop, plant, drawn.bench, drawn.levels[:3], VISITED, Path(folder)
+                )
         if kind != "outside" and (task == "coverage" or (kind != "none" and task == "loop")):
             row |= _oracle(drawn, hidden, campaign, with_errors=task == "loop")
     except Exception as problem:  # one campaign that fails is a failure of the trial, not its end

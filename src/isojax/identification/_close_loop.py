@@ -42,6 +42,7 @@ from .fitting import (
     on_all_samples,
     search_of,
     thinned,
+    unlocked_tone,
     weighted_by_residual,
 )
 from .guess import ClassicalGuess, as_campaign, classical_guess
@@ -50,7 +51,7 @@ from .remainder import Alternatives, Remainder, explain_remainder, find_alternat
 _GUESS, _FIT, _DIAGNOSIS, _NEXT, *_LAST = LOOP_SHARES
 _EXPERIMENT, _LAWS, _RUNS = _LAST
 
-Doubt = Literal["", "diverges", "worse", "not down to noise", "another law"]
+Doubt = Literal["", "diverges", "worse", "not down to noise", "another law", "a tone"]
 
 
 @shown
@@ -350,10 +351,11 @@ def doubt_of(before: Fit, final: Fit, alternatives: tuple[Alternatives, ...], ru
 
     Returns:
         Whether the final model diverges on held-out records, predicts them worse than without the findings,
-        or not down to their noise; whether another law explains the fitted ones better; "" where nothing
-        speaks against it.
+        or not down to their noise; whether another law explains the fitted ones better, or they hold a tone
+        that is not locked to the drive; "" where nothing speaks against it.
     """
-    other: Doubt = "another law" if any(one.better is not None for one in alternatives) else ""
+    tone: Doubt = "" if unlocked_tone(final, rules) is None else "a tone"
+    other: Doubt = "another law" if any(one.better is not None for one in alternatives) else tone
     first, last = before.errors["holdout"], final.errors["holdout"]
     if first is None or last is None:
         return other
@@ -365,7 +367,8 @@ def doubt_of(before: Fit, final: Fit, alternatives: tuple[Alternatives, ...], ru
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
     rise = last.chi2_per_dof - first.chi2_per_dof
     scatter = 2.0 * math.sqrt(max(rise, 0.0) / last.dof)
-    return "worse" if rise > scipy.stats.norm.isf(rules.significance) * scatter else "not down to noise"
+    worse = rise > scipy.stats.norm.isf(rules.significance) * scatter
+    return "worse" if worse else tone or "not down to noise"
 
 
 def overall_verdict(

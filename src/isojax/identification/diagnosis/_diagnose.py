@@ -14,6 +14,7 @@ from ..fitting import (
     Fit,
     Fitted,
     Search,
+    Tone,
     as_fit,
     complete,
     drive_noise,
@@ -22,6 +23,7 @@ from ..fitting import (
     plain_unit,
     search_of,
     thinned,
+    unlocked_tone,
     weighted_by_output,
     weighted_by_residual,
 )
@@ -167,11 +169,23 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
         refits[place] = best._replace(violation=against)
     ranking = rank_candidates(case.fit.estimate, test, refits, by_evidence(refits, rules), inflation)
     bounds = upper_bounds(test, None) if good else {}
-    verdict = "none" if good else "unexplained"
+    tone = unlocked_tone(case.fit, rules)
+    verdict = "none" if good and tone is None else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
-    if not good and not is_locked(case.fit, rules):
+    if tone is not None:
+        words = _words_of_tone(tone, case.fit)
+    elif not good and not is_locked(case.fit, rules):
         words = _words_of_noise(case.fit, rules)
-    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".")
+    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".", tone)
+
+
+def _words_of_tone(tone: Tone, fit: Fit) -> str:
+    """Word a tone that neither the model nor the drive explains."""
+    unit = plain_unit("SI unit of the output", fit.campaign)
+    return (
+        f"A tone at {tone.frequency:.4g} Hz ({tone.rms:.3g} {unit} rms) is left, which is not locked to the "
+        "drive: something that no channel records shakes the mass or its sensor; "
+    )
 
 
 def _words_of_noise(fit: Fit, rules: Rules) -> str:

@@ -6,7 +6,7 @@ from ..._quantities import typeset_p_value
 from ..._show import Row, amount, shown
 from ...elements import AbstractElement
 from ...models import Isolator
-from ..fitting import Estimate, Fit
+from ..fitting import Estimate, Fit, Tone
 from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
@@ -112,6 +112,7 @@ class Verdict(NamedTuple):
             empty where the fit is not good, because a bound takes the rest of the residual for noise.
         after: the fit with the effect; None where nothing was found.
         reason: one sentence.
+        tone: a tone that is left where nothing was found, and does not belong to the drive; or None.
     """
 
     verdict: VerdictWord
@@ -123,6 +124,7 @@ class Verdict(NamedTuple):
     bounds: dict[str, tuple[float, str]]
     after: Fit | None
     reason: str
+    tone: Tone | None = None
 
     @property
     def refit(self) -> Estimate | None:

@@ -1,7 +1,7 @@
 """Coefficients, error bars and errors of a model, straight from time histories.
 
-In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget` and
-`drive_noise` describe it.
+In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget`,
+`drive_noise` and `unlocked_tone` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
 What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture` and `_fit_result`;
@@ -66,3 +66,5 @@ from ._simulator import Simulator as Simulator
 from ._thinned import chi2_per_dof_of_all as chi2_per_dof_of_all
 from ._thinned import on_all_samples as on_all_samples
 from ._thinned import thinned as thinned
+from ._unlocked_tone import Tone as Tone
+from ._unlocked_tone import unlocked_tone as unlocked_tone

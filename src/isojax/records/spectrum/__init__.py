@@ -6,6 +6,8 @@ Read `_basis.py`, `_dwell_end.py` and `_harmonics.py` (dwells) first, then `_fil
 `_excited_band.py` (spectra), `_integrate.py`, `_mains.py` and `_filtered_receptance.py`.
 """
 
+from ._basis import USABLE_SHARE as USABLE_SHARE
+from ._basis import usable_orders as usable_orders
 from ._basis import without as without
 from ._dwell_end import MOST_HARMONICS as MOST_HARMONICS
 from ._dwell_end import Rest as Rest

@@ -17,7 +17,8 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
 
     "alternatives", other force laws in the place of the findings, is there only where something was found;
     "remainder" only where the verdict is "unexplained" or "partly_explained"; "integration", beside the
-    coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records.
+    coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records; "tone" only
+    where nothing was found and one is left.
 
     Args:
         loop: the closed loop.
@@ -44,6 +45,7 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
         **({"alternatives": alternatives_list(loop)} if loop.alternatives else {}),
         **({} if health is None else {"health": health_dict(health)}),
         **({} if remainder is None else {"remainder": remainder_dict(remainder)}),
+        **({} if loop.last.tone is None else {"tone": loop.last.tone._asdict()}),
     }
 
 

@@ -89,6 +89,10 @@ _DOUBTS = {
         "The model does not explain the held-out records down to their noise: another law may act there."
     ),
     "another law": "",  # the verdict itself says it
+    "a tone": (
+        "A tone that is not locked to the drive is left: something that no channel records shakes the mass "
+        "or its sensor."
+    ),
 }
 
 
@@ -141,6 +145,13 @@ def _verdict_words(loop: Loop) -> str:
         return (
             f"Something is missing. {_capital(effect_words(pending.effect))} explains it best but was not "
             f"added; {error} (noise alone: 1)."
+        )
+    tone = loop.last.tone
+    if tone is not None and not found:
+        unit = typeset_unit(OUTPUT_UNITS[loop.campaign.output.quantity])
+        return (
+            f"A tone at {tone.frequency:.4g} Hz ({tone.rms:.3g} {unit} rms) is not locked to the drive: "
+            f"something that no channel records shakes the mass or its sensor; {error} (noise alone: 1)."
         )
     known = f" even with {effects}" if found else ""
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
