@@ -1,14 +1,13 @@
 """The absent effect that balances the measured forces best: a start far from the fitted model."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from ..._parameters import own_parameters
 from ...elements import AbstractElement, Scales
 from ...models import Isolator
 from ...records import Campaign
-from ._dwell_balance import fit_all_dwells
-from ._force_balance import BalanceFit, fit_balance
+from ._dwell_balance import dwell_balance
+from ._force_balance import ForceBalance
 from ._measured_receptance import measured_receptance
 from ._motion import measured_motion
 from ._restoring_force import band_projections
@@ -52,12 +51,12 @@ def find_balance_start(
     """
     if any(element.internal_states for element in model.elements):
         return None
-    balance, names = _regression(campaign), tuple(element.name for element in model.elements)
-    before = balance(model, names).unexplained
+    balance, names = _balance(campaign, model), tuple(element.name for element in model.elements)
+    before = balance.fit(names).unexplained
     found: list[BalanceStart] = []
     for name in dict.fromkeys(probe.name for probe in absent):
         probe = next(one for one in absent if one.name == name)
-        tried = balance(model.with_elements(type(probe).guess(scales)), (*names, name))
+        tried = balance.fit(names, type(probe).guess(scales))
         if name in tried.fitted:
             element = tried.model.elements[-1]
             strength = float(getattr(element, element.strength))
@@ -68,12 +67,12 @@ def find_balance_start(
     return best if best is not None and best.unexplained < before else None
 
 
-def _regression(campaign: Campaign) -> Callable[[Isolator, tuple[str, ...]], BalanceFit]:
+def _balance(campaign: Campaign, model: Isolator) -> ForceBalance:
     """Give the balance that suits the records: of every dwell, or in time where a record has none."""
     records = campaign.fit_records
     if all(record.dwells for record in records):
         responses = tuple(measured_receptance(campaign, record) for record in records)
-        return lambda model, names: fit_all_dwells(model, names, responses, mass_free=campaign.mass_free)
+        return dwell_balance(model, responses, mass_free=campaign.mass_free)
     motions = tuple(measured_motion(campaign, record) for record in records)
     projections = band_projections(campaign, records, motions)
-    return lambda model, names: fit_balance(model, names, motions, projections, campaign.mass_free)
+    return ForceBalance(model, motions, projections, campaign.mass_free)

@@ -5,7 +5,7 @@ import numpy as np
 from ...elements import CATALOGUE
 from ...models import Isolator
 from ...records import Campaign, Record, driven_samples
-from ._dwell_balance import dwell_motion, fit_all_dwells
+from ._dwell_balance import dwell_balance, dwell_motion
 from ._force_balance import BalanceFit
 from ._logarithmic_decrement import about_rest, logarithmic_decrement
 from ._measured_receptance import MeasuredResponse
@@ -87,9 +87,7 @@ def start_from_decays(
         names = linear
     motion = dwell_motion(base, responses)
     highest, fastest = (float(np.max(np.abs(s))) for s in (motion.displacement, motion.velocity))
-    found, notes = fit_physically(
-        lambda chosen: fit_all_dwells(base, chosen, responses), names, highest, fastest
-    )
+    found, notes = fit_physically(dwell_balance(base, responses).fit, names, highest, fastest)
     # The balance is judged by the force that makes up for the decay; without a drive, inertia is what counts.
     made_up = np.concatenate([one.force[:, 0] for one in responses])
     inertia = campaign.mass * np.concatenate(

@@ -5,7 +5,7 @@ from jaxtyping import Complex, Float
 
 from ...models import Isolator
 from ...records import ExcitedBand
-from ._force_balance import BalanceFit, fit_balance
+from ._force_balance import ForceBalance
 from ._measured_receptance import MeasuredResponse
 from ._motion import Motion
 
@@ -45,14 +45,10 @@ def dwell_motion(model: Isolator, responses: tuple[MeasuredResponse, ...]) -> Mo
     )
 
 
-def fit_all_dwells(
-    model: Isolator,
-    names: tuple[str, ...],
-    responses: tuple[MeasuredResponse, ...],
-    harmonics: int = 1,
-    mass_free: bool = False,
-) -> BalanceFit:
-    """Fit the coefficients to the harmonic balance of every dwell, on and off resonance.
+def dwell_balance(
+    model: Isolator, responses: tuple[MeasuredResponse, ...], harmonics: int = 1, mass_free: bool = False
+) -> ForceBalance:
+    """Give the harmonic balance of every dwell, on and off resonance.
 
     At each dwell `(K_eq(X) - m omega^2) X = F cos(phi)` and `C_eq(X omega) omega X = F sin(phi)`; both are
     linear in the coefficients. The force of each law is evaluated over the measured motion with its
@@ -60,13 +56,12 @@ def fit_all_dwells(
 
     Args:
         model: the structure; its present strengths do not matter.
-        names: catalogue names of the elements to fit.
         responses: measured harmonics of the records.
         harmonics: how many harmonics must balance.
         mass_free: whether the mass is unknown too.
 
     Returns:
-        The fitted model.
+        The balance.
 
     Source: the paper, eqs. (5)-(8), used at every dwell instead of at resonance alone.
     """
@@ -75,4 +70,4 @@ def fit_all_dwells(
         lines = np.fft.rfft(signal.reshape(-1, _PHASES), axis=1)[:, 1 : harmonics + 1]
         return np.concatenate([lines.real.ravel(), lines.imag.ravel()]) * (2.0 / _PHASES)
 
-    return fit_balance(model, names, (dwell_motion(model, responses),), (project,), mass_free)
+    return ForceBalance(model, (dwell_motion(model, responses),), (project,), mass_free)

@@ -83,80 +83,98 @@ def _unit_force(
     return unit if size > 0 and in_proportion and np.all(np.isfinite(unit)) else None
 
 
-def _rows(
-    forces: list[Float[np.ndarray, " _"]], projections: tuple[BalanceProjection, ...]
-) -> Float[np.ndarray, " row"]:
-    return np.concatenate([project(force) for project, force in zip(projections, forces, strict=True)])
-
-
-def _regressors(
-    base: Isolator,
-    names: tuple[str, ...],
-    motions: tuple[Motion, ...],
-    projections: tuple[BalanceProjection, ...],
-) -> dict[int, Float[np.ndarray, " row"]]:
-    """Give the regressor of every named element that has one, by its place in the model."""
-    regressors = {}
-    for place, element in enumerate(base.elements):
-        forces = [_unit_force(base, element, motion) for motion in motions] if element.name in names else []
-        if any(force is not None for force in forces):
-            pairs = zip(forces, motions, strict=True)
-            filled = [np.zeros_like(motion.drive) if force is None else force for force, motion in pairs]
-            regressors[place] = _rows(filled, projections)
-    return regressors
-
-
-def fit_balance(
-    model: Isolator,
-    names: tuple[str, ...],
-    motions: tuple[Motion, ...],
-    projections: tuple[BalanceProjection, ...],
-    mass_free: bool = False,
-) -> BalanceFit:
-    """Fit the coefficients that enter the force balance linearly, by least squares within their bounds.
+class ForceBalance:
+    """The balance of measured forces for one structure; the force of each law is evaluated once.
 
     `m x'' + sum coefficient_i phi_i(x, x') = F` is linear in every coefficient, in the mass, in a gain and in
     an offset.
 
-    Args:
-        model: the structure; its present strengths do not matter.
-        names: catalogue names of the elements whose strength is fitted; the others are absent.
-        motions: measured motion and drive, one a record (or dwell).
-        projections: how the balance of each is summarised.
-        mass_free: whether the mass is unknown too; without a measured force it stays as declared.
-
-    Returns:
-        The fitted model.
-
     Source: S. F. Masri and T. K. Caughey, A nonparametric identification technique for nonlinear dynamic
     problems, J. Appl. Mech. 46 (1979) 433.
     """
-    elements = tuple(with_strength(element, 0.0) for element in model.elements)
-    base = Isolator(model.mass, elements, model.excitation)
-    heavier = Isolator(2.0 * model.mass, elements, model.excitation)
-    absent = _rows([_unbalanced_force(base, motion) for motion in motions], projections)
-    inertia = _rows([_unbalanced_force(heavier, motion) for motion in motions], projections) - absent
-    driven = inertia - absent
-    is_driven = bool(np.linalg.norm(driven) > _UNDRIVEN * np.linalg.norm(inertia))
-    mass_free = mass_free and is_driven
-    regressors = _regressors(base, names, motions, projections)
-    if not regressors and not mass_free:
-        return BalanceFit(base, 1.0, ())
-    specs = [dict(own_parameters(elements[place]))[elements[place].strength] for place in regressors]
-    lower = np.array([spec.lower for spec in specs] + [0.0] * mass_free)
-    upper = np.array([spec.upper for spec in specs] + [np.inf] * mass_free)
-    target = driven if mass_free else -absent
-    matrix = np.stack([*regressors.values(), *([inertia / float(model.mass)] if mass_free else [])], axis=1)
-    size = np.linalg.norm(matrix, axis=0)
-    size[size == 0] = 1.0
-    values = lsq_linear(matrix / size, target, (lower * size, upper * size), method="bvls").x / size
-    mass = float(values[-1]) if mass_free and values[-1] > 0 else float(model.mass)
-    found = list(elements)
-    for place, value in zip(regressors, values, strict=False):
-        found[place] = with_strength(elements[place], float(value))
-    reference = driven if is_driven else inertia
-    return BalanceFit(
-        model=Isolator(mass, tuple(found), model.excitation),  # pyright: ignore[reportArgumentType]
-        unexplained=float(np.linalg.norm(matrix @ values - target) / np.linalg.norm(reference)),
-        fitted=tuple(elements[place].name for place in regressors),
-    )
+
+    def __init__(
+        self,
+        model: Isolator,
+        motions: tuple[Motion, ...],
+        projections: tuple[BalanceProjection, ...],
+        mass_free: bool = False,
+    ):
+        """Take the structure and what was measured.
+
+        Args:
+            model: the structure; its present strengths do not matter.
+            motions: measured motion and drive, one a record (or dwell).
+            projections: how the balance of each is summarised.
+            mass_free: whether the mass is unknown too; without a measured force it stays as declared.
+        """
+        self._motions, self._projections = motions, projections
+        self._elements = tuple(with_strength(element, 0.0) for element in model.elements)
+        self._base = Isolator(model.mass, self._elements, model.excitation)
+        heavier = Isolator(2.0 * model.mass, self._elements, model.excitation)
+        absent, twice = (
+            self._rows([_unbalanced_force(one, motion) for motion in motions])
+            for one in (self._base, heavier)
+        )
+        self._absent, self._inertia = absent, twice - absent
+        self._driven = self._inertia - absent
+        self._is_driven = bool(np.linalg.norm(self._driven) > _UNDRIVEN * np.linalg.norm(self._inertia))
+        self._mass_free = mass_free and self._is_driven
+        self._regressors = [self._regressor(element) for element in self._elements]
+
+    def fit(self, names: tuple[str, ...], further: AbstractElement | None = None) -> BalanceFit:
+        """Fit the coefficients that enter the balance linearly, by least squares within their bounds.
+
+        Args:
+            names: catalogue names of the elements of the structure whose strength is fitted; the others are
+                absent.
+            further: an element that the structure lacks, fitted beside them.
+
+        Returns:
+            The fitted model.
+        """
+        elements, rows = list(self._elements), list(self._regressors)
+        if further is not None:
+            elements.append(with_strength(further, 0.0))
+            rows.append(self._regressor(elements[-1]))
+            names = (*names, further.name)
+        regressors = {
+            place: row
+            for place, (element, row) in enumerate(zip(elements, rows, strict=True))
+            if element.name in names and row is not None
+        }
+        base, mass_free = self._base, self._mass_free
+        if not regressors and not mass_free:
+            return BalanceFit(base, 1.0, ())
+        specs = [dict(own_parameters(elements[place]))[elements[place].strength] for place in regressors]
+        lower = np.array([spec.lower for spec in specs] + [0.0] * mass_free)
+        upper = np.array([spec.upper for spec in specs] + [np.inf] * mass_free)
+        target = self._driven if mass_free else -self._absent
+        columns = [*regressors.values(), *([self._inertia / float(base.mass)] if mass_free else [])]
+        matrix = np.stack(columns, axis=1)
+        size = np.linalg.norm(matrix, axis=0)
+        size[size == 0] = 1.0
+        values = lsq_linear(matrix / size, target, (lower * size, upper * size), method="bvls").x / size
+        mass = float(values[-1]) if mass_free and values[-1] > 0 else float(base.mass)
+        for place, value in zip(regressors, values, strict=False):
+            elements[place] = with_strength(elements[place], float(value))
+        reference = self._driven if self._is_driven else self._inertia
+        return BalanceFit(
+            model=Isolator(mass, tuple(elements), base.excitation),  # pyright: ignore[reportArgumentType]
+            unexplained=float(np.linalg.norm(matrix @ values - target) / np.linalg.norm(reference)),
+            fitted=tuple(elements[place].name for place in regressors),
+        )
+
+    def _rows(self, forces: list[Float[np.ndarray, " _"]]) -> Float[np.ndarray, " row"]:
+        pairs = zip(self._projections, forces, strict=True)
+        return np.concatenate([project(force) for project, force in pairs])
+
+    def _regressor(self, element: AbstractElement) -> Float[np.ndarray, " row"] | None:
+        """Give the balance of an element of strength one; None where it has no such force."""
+        forces = [_unit_force(self._base, element, motion) for motion in self._motions]
+        if all(force is None for force in forces):
+            return None
+        pairs = zip(forces, self._motions, strict=True)
+        return self._rows(
+            [np.zeros_like(motion.drive) if force is None else force for force, motion in pairs]
+        )

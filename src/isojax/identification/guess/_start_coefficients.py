@@ -7,8 +7,8 @@ import numpy as np
 from ...models import Isolator
 from ...records import Campaign, Record
 from ._decay_cycles import start_from_decays
-from ._dwell_balance import dwell_motion, fit_all_dwells
-from ._force_balance import BalanceFit, fit_balance
+from ._dwell_balance import dwell_balance, dwell_motion
+from ._force_balance import BalanceFit, ForceBalance
 from ._linear_response import LinearResponse, linear_response
 from ._logarithmic_decrement import Decrement, about_rest, logarithmic_decrement
 from ._measured_receptance import MeasuredResponse
@@ -40,9 +40,7 @@ def start_from_dwells(
 ) -> tuple[BalanceFit, tuple[str, ...]]:
     """Start from the harmonic balance of every dwell."""
     motion = dwell_motion(base, responses)
-    return fit_physically(
-        lambda chosen: fit_all_dwells(base, chosen, responses, mass_free=mass_free), names, *motion.largest
-    )
+    return fit_physically(dwell_balance(base, responses, mass_free=mass_free).fit, names, *motion.largest)
 
 
 def start_from_time(
@@ -67,7 +65,7 @@ def start_from_time(
     projections = band_projections(campaign, records, motions)
     highest, fastest = (max(sizes) for sizes in zip(*(motion.largest for motion in motions), strict=True))
     fit, notes = by_cycles or fit_physically(
-        lambda chosen: fit_balance(base, chosen, motions, projections, mass_free), names, highest, fastest
+        ForceBalance(base, motions, projections, mass_free).fit, names, highest, fastest
     )
     factor = -float(base.mass) if base.excitation == "base_acceleration" else 1.0
     linear = tuple(
