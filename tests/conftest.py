@@ -14,18 +14,23 @@ import jaxlib.version
 import jaxtyping
 import pytest
 from jaxtyping import install_import_hook
+from threadpoolctl import threadpool_limits
 
 
 def _keep_to_own_cores() -> None:
     """Give each worker cores of its own: the threads of several on the same few wait for each other.
 
-    XLA then need not cut what it compiles into parts for threads.
+    XLA then need not cut what it compiles into parts for threads. BLAS, which counted the cores before, must
+    not share its products among more threads than are left: they would wait for each other, too.
     """
     worker, count = os.environ.get("PYTEST_XDIST_WORKER"), int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1))
     if worker is None or count == 1 or not hasattr(os, "sched_setaffinity"):
         return
     cores, place = sorted(os.sched_getaffinity(0)), int(worker.removeprefix("gw"))
-    os.sched_setaffinity(0, cores[place::count] or [cores[place % len(cores)]])
+    own = cores[place::count] or [cores[place % len(cores)]]
+    os.sched_setaffinity(0, own)
+    threadpool_limits(len(own), user_api="blas")
+    os.environ["OPENBLAS_NUM_THREADS"] = str(len(own))  # of the processes that tests start
     if jaxlib.version.__version_info__ < (0, 11):  # XLA ends a process for a flag that it does not know
         flags = os.environ.get("XLA_FLAGS", "")
         os.environ["XLA_FLAGS"] = f"{flags} --xla_cpu_parallel_codegen_split_count=1".strip()

@@ -84,7 +84,7 @@ def simulated() -> Callable[..., Campaign]:
     """Gives the function that runs a plan on a plant and puts the records into a campaign."""
 
     def simulate(plant, plan, seed=1, bench=None, **changes) -> Campaign:
-        bench = bench or rig.Bench(rate=250.0, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+        bench = bench or rig.Bench(rate=250.0, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-7)
         records = tuple(_as_record(one) for one in rig.run(plant, plan, seed, bench))
         changes.setdefault("mass", plant.mass)
         changes["output"] = {"quantity": bench.output, "noise": bench.noise, **changes.get("output", {})}

@@ -20,7 +20,7 @@ RIVALS = ("quintic_stiffness", "stribeck_friction", "end_stop", "freeplay", "qua
 
 def _measured(simulated, effect, rate=200.0, plan=PLAN):
     """A plant with one effect, on the bench."""
-    bench = rig.Bench(rate=rate, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+    bench = rig.Bench(rate=rate, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-7)
     return simulated(PLANT.plus(effect), plan, 3, bench, stiffness=("linear", "cubic"), damping=("linear",))
 
 

@@ -16,7 +16,7 @@ from isojax.models import Integrator, Isolator
 from isojax.records import CONDITIONS
 
 PLAN = rig.Multisine((60.0, 110.0), 2.0, 14.0, period=2.0, periods=5, lines="full")
-EXACT = rig.Bench(rate=500.0, noise=2e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+EXACT = rig.Bench(rate=500.0, noise=2e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-7)
 
 
 class Case(NamedTuple):
@@ -144,7 +144,7 @@ def test_every_effect_is_recovered_from_the_bench(name, simulated):
             drift=0.0,
             force_noise=0.0,
             anti_alias=False,
-            tolerance=1e-8,
+            tolerance=1e-7,
         )
     )
     campaign = simulated(plant, PLAN, 3, bench)

@@ -38,7 +38,7 @@ PLAN = rig.Multisine(
     lines="full",
     holdout_levels=(90.0,),
 )
-BENCH = rig.Bench(rate=250.0, noise=1e-2, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+BENCH = rig.Bench(rate=250.0, noise=1e-2, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-7)
 BOTH = (rig.CubicStiffness(2.5e11), rig.CoulombFriction(4.0))
 
 

@@ -27,7 +27,7 @@ BENCH = rig.Bench(
     force_noise=0.0,
     shaker=rig.IDEAL_SHAKER,
     anti_alias=False,
-    tolerance=1e-8,
+    tolerance=1e-7,
 )
 DECLARED = {"mass": 800.0, "stiffness": ("linear", "cubic"), "damping": ("linear",)}
 

@@ -26,7 +26,7 @@ LAWS = {
 PLANT = rig.Plant((rig.LinearStiffness(1.08e6), rig.CubicStiffness(1e11), rig.LinearDamping(8e3)))
 START = Isolator(800.0, (LinearStiffness(1.05e6), CubicStiffness(1.2e11), LinearDamping(9e3)))
 DECLARED = {"stiffness": ("linear", "cubic"), "damping": ("linear",)}
-BENCH = rig.Bench(rate=200.0, noise=5e-3, drift=5e-4, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+BENCH = rig.Bench(rate=200.0, noise=5e-3, drift=5e-4, force_noise=0.0, anti_alias=False, tolerance=1e-7)
 RIVALS = ("pressure_stiffness", "pressure_damping", "stiffness_drift")
 PLANS = tuple(
     rig.AtPressure(rig.Multisine((150.0, 600.0), 2.0, 14.0, period=2.0, periods=2, lines="full"), pressure)

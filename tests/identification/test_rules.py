@@ -131,7 +131,7 @@ def rubbing(simulated):
     """A campaign of a plant with dry friction that the declared model lacks."""
     plant = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4), rig.CoulombFriction(4.0)))
     plan = rig.Multisine((40.0, 70.0, 110.0), 2.0, 14.0, period=2.0, periods=4, lines="full")
-    bench = rig.Bench(rate=250.0, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+    bench = rig.Bench(rate=250.0, noise=5e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-7)
     return simulated(plant, plan, 7, bench, stiffness=("linear",), damping=("linear",))
 
 

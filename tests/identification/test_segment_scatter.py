@@ -32,7 +32,7 @@ from isojax.models import Isolator
 from isojax.records import Dwell, Record
 
 PLAN = rig.SteppedSine((40.0, 80.0, 120.0), tuple(np.arange(4.2, 6.3, 0.3)), 12, repeats=2)
-BENCH = rig.Bench(rate=250.0, noise=5e-3, drift=3e-4, force_noise=0.0, anti_alias=False, tolerance=1e-8)
+BENCH = rig.Bench(rate=250.0, noise=5e-3, drift=3e-4, force_noise=0.0, anti_alias=False, tolerance=1e-7)
 START = Isolator(
     800.0,
     (
