@@ -136,6 +136,14 @@ def stays_within(row: Row) -> bool:
     return stays_unnamed(row) or row.get("reading_miss", float("inf")) <= WITHIN
 
 
+def _readings(left: list[Row]) -> list[Mark]:
+    """Judge left-out effects by readings as well; older rows do not have them."""
+    if not any("reading_miss" in row for row in left):
+        return []
+    words = "the same, or the range of models holds the true readings, where the effect is no force"
+    return [_share(words, left, stays_within, lambda f: f >= 0.9)]
+
+
 def table(rows: list[Row]) -> list[Mark]:
     """Judge all campaigns by the criteria of the diagnosis."""
     loops = [row for row in rows if row["task"] == "loop"]
@@ -191,12 +199,7 @@ def table(rows: list[Row]) -> list[Mark]:
             stays_unnamed,
             lambda f: f >= 0.9,
         ),
-        _share(
-            "the same, or the range of models holds the true readings, where the effect is no force",
-            left,
-            stays_within,
-            lambda f: f >= 0.9,
-        ),
+        *_readings(left),
         _share("two effects at once, both named, at least 70 %", two, both_named, lambda f: f >= 0.7),
         _quantile(
             "held-out excess removed against the oracle: median at least 0.95", shares, worth, 50, 0.95

@@ -14,13 +14,13 @@ from ._errors import Run
 from ._fit_result import Fit
 from ._lack_of_fit import HIGHEST_ORDER, lack_of_fit, shows_noise
 
-_OWN = 3
+_LINES_OF_A_TONE = 3
 """Lines to either side of one that its own power reaches through the window."""
 
-_BESIDE = 8
+_LINES_OF_NOISE = 8
 """Lines beyond these, on either side, that show the noise there."""
 
-_SHARED = 1.5
+_LINES_A_FREEDOM = 1.5
 """Neighbouring lines of a Hann window that hold as much as one independent line."""
 
 
@@ -139,7 +139,10 @@ def _lines(rest: Float[np.ndarray, " time"], kept: float, size: int) -> _Lines:
     window = signal.get_window("hann", rest.size)
     power = np.abs(np.fft.rfft(rest * window, size)) ** 2
     wider = size / rest.size
-    near, far = int(np.ceil(_OWN * wider)), int(np.ceil((_OWN + _BESIDE) * wider))
+    near, far = (
+        int(np.ceil(_LINES_OF_A_TONE * wider)),
+        int(np.ceil((_LINES_OF_A_TONE + _LINES_OF_NOISE) * wider)),
+    )
     beside = np.ones(2 * far + 1)
     beside[far - near : far + near + 1] = 0.0
     level = np.convolve(power, beside / (kept * beside.sum()), "valid")
@@ -147,5 +150,5 @@ def _lines(rest: Float[np.ndarray, " time"], kept: float, size: int) -> _Lines:
     own, level = (one[: int(2 * USABLE_SHARE * power.size) - far] for one in (own, level))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(level > 0.0, own / level, 0.0)
-    chance = stats.f.sf(ratio, 2, 2 * int(2 * _BESIDE / _SHARED))
+    chance = stats.f.sf(ratio, 2, 2 * int(2 * _LINES_OF_NOISE / _LINES_A_FREEDOM))
     return _Lines(far, np.maximum(chance, 1e-300), 2.0 * (own - level) / np.sum(window) ** 2)
