@@ -25,7 +25,7 @@ from isojax.identification import (
     scales,
 )
 from isojax.records import Campaign
-from isojax.rig import Law
+from isojax.rig import Instrument, Law
 
 Row = dict[str, Any]
 VISITED = (4.3, 5.0, 5.6)
@@ -66,7 +66,7 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
             excluded = exact_class(hidden[0].name)
             loop = close_loop(campaign, excluded=excluded)
             row |= {"excluded": excluded} | _said_of(loop)
-        laws = [secret.law for secret in hidden if isinstance(secret.law, Law)]
+        laws = [secret.law for secret in hidden if _is_force(secret.law)]
         if (
             (kind == "outside" or task == "leave_out")
             and row["verdict"] == "found"
@@ -85,6 +85,11 @@ def run_one(seed: int, kind: str, task: str, names: tuple[str, ...] | None = Non
         row["error"] = "".join(traceback.format_exception(problem))[-2000:]
     row["total_seconds"] = round(time.perf_counter() - begin, 2)
     return row
+
+
+def _is_force(effect: Law | Instrument) -> bool:
+    """Say whether an effect is a force of the motion alone, and not of when in the test it is."""
+    return isinstance(effect, Law) and type(effect).placed is Law.placed
 
 
 def simulated(drawn: Sketch, folder: Path, held_out: bool = True) -> tuple[tuple[Secret, ...], Path, float]:
