@@ -47,8 +47,8 @@ _COMPILED = _ALREADY or tempfile.mkdtemp(prefix="isojax-tests-")
 
 os.environ["JAX_COMPILATION_CACHE_DIR"] = _COMPILED
 jax.config.update("jax_compilation_cache_dir", _COMPILED)
-os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.1"
-jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
