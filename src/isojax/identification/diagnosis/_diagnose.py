@@ -14,7 +14,6 @@ from ..fitting import (
     Fit,
     Fitted,
     Search,
-    Tone,
     as_fit,
     complete,
     drive_noise,
@@ -173,19 +172,10 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     verdict = "none" if good and tone is None else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if tone is not None:
-        words = _words_of_tone(tone, case.fit)
+        words = tone.words(plain_unit("SI unit of the output", case.fit.campaign)) + "; "
     elif not good and not is_locked(case.fit, rules):
         words = _words_of_noise(case.fit, rules)
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".", tone)
-
-
-def _words_of_tone(tone: Tone, fit: Fit) -> str:
-    """Word a tone that neither the model nor the drive explains."""
-    unit = plain_unit("SI unit of the output", fit.campaign)
-    return (
-        f"A tone at {tone.frequency:.4g} Hz ({tone.rms:.3g} {unit} rms) is left, which is not locked to the "
-        "drive: something that no channel records shakes the mass or its sensor; "
-    )
 
 
 def _words_of_noise(fit: Fit, rules: Rules) -> str:

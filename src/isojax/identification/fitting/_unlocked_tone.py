@@ -38,6 +38,17 @@ class Tone(NamedTuple):
     rms: float
     p_value: float
 
+    def words(self, unit: str) -> str:
+        """Give what it means, without a full stop.
+
+        Args:
+            unit: SI unit of the output.
+        """
+        return (
+            f"A tone at {self.frequency:.4g} Hz ({self.rms:.3g} {unit} rms) is not locked to the drive: "
+            "something that no channel records shakes the mass or its sensor"
+        )
+
     def _headline(self) -> str:
         return f"{number(self.frequency)} Hz, {number(self.rms)} rms"
 

@@ -151,10 +151,7 @@ def _verdict_words(loop: Loop) -> str:
         unit = typeset_unit(OUTPUT_UNITS[loop.campaign.output.quantity])
         good = is_good(loop.after, loop.rules)
         rest = "Otherwise the model explains the records" if good else "More than noise is left beside it"
-        return (
-            f"A tone at {tone.frequency:.4g} Hz ({tone.rms:.3g} {unit} rms) is not locked to the drive: "
-            f"something that no channel records shakes the mass or its sensor. {rest}; {error}."
-        )
+        return f"{tone.words(unit)}. {rest}; {error}."
     known = f" even with {effects}" if found else ""
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
 
