@@ -54,13 +54,13 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
 def _sparing(check: Callable[..., Any]) -> Callable[..., Any]:
-    """Leave out functions inside functions that tell no shape: each call would prepare them for the check."""
+    """Leave out functions that tell no shape: each call would prepare them for the check, and Pyright sees
+    the types that they do tell."""
 
     def jaxtyped(function: Any = None, **options: Any) -> Any:
         if function is None:
             return lambda function: jaxtyped(function, **options)
-        is_inside = isinstance(function, FunctionType) and "<locals>" in function.__qualname__
-        if is_inside and "jaxtyping" not in repr(function.__annotations__):
+        if isinstance(function, FunctionType) and "jaxtyping" not in repr(function.__annotations__):
             return function
         return check(function, **options)
 

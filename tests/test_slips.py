@@ -177,6 +177,9 @@ def test_messages_say_what_to_pass():
     model = ij.paper.y_direction()
     with pytest.raises(ValueError, match=r"`model` must be an isolator, such as .* type Harmonic"):
         ij.models.as_isolator(ij.Harmonic(1.0, 5.0))
+    for wrong in (float("nan"), float("inf")):
+        with pytest.raises(ValueError, match=rf"`model` must hold finite numbers, but cubic.* is {wrong}"):
+            ij.find_periodic_orbit(model.replace(k3=wrong), ij.Harmonic(60.0, 5.0))
     with pytest.raises(ValueError, match=r"`fit` must be a fit, .* type Isolator"):
         ij.identification.as_fit(model)
     with pytest.raises(ValueError, match=r"nowhere"):

@@ -90,13 +90,14 @@ def _setting(integrator: Integrator, model: Isolator = MODEL, hold: str = "linea
     places = [place for place, entry in enumerate(list_parameters(model)) if entry.spec.fitted]
     directions = one_hot(model, places, [0.1 * values[place] for place in places])
     states = 2 + model.internal_states
-    start, scales = (np.repeat(one[:states, None], 2, axis=1) for one in (START, SCALES))
-    return prepared, Unknowns(model, directions, np.full(2, FACTOR), start, scales)
+    lanes = prepared.record.size
+    start, scales = (np.repeat(one[:states, None], lanes, axis=1) for one in (START, SCALES))
+    return prepared, Unknowns(model, directions, np.full(lanes, FACTOR), start, scales)
 
 
 def _simulated(integrator: Integrator, model: Isolator = MODEL, hold: str = "linear") -> np.ndarray:
     prepared, unknowns = _setting(integrator, model, hold)
-    return readings(unknowns.model, *unknowns[2:4], prepared)[:LENGTH]
+    return readings(unknowns.model, *unknowns[2:4], prepared)[:LENGTH, :2]
 
 
 @pytest.mark.parametrize("hold", ["linear", "zero_order"])

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from isojax import rig
-from isojax._cores import usable_cores
 from isojax._parameters import list_parameters, parameter, replace_parameters
 from isojax._types import Scalar
 from isojax.elements import (
@@ -199,18 +198,22 @@ def _deviation(found: np.ndarray, wanted: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", ["instruments", "delay"])
-def test_threads_give_what_one_thread_gives(monkeypatch, every_core, name):
-    shared, unknowns, _ = _setting(CASES[name])
-    assert len(shared.batches) == min(2, usable_cores())
-    found = information(unknowns, shared), readings(unknowns.model, *unknowns[2:4], shared)
-    with monkeypatch.context() as one_thread:
-        one_thread.setattr(_batch, "usable_cores", lambda: 1)
-        alone, same, _ = _setting(CASES[name])
-        assert len(alone.batches) == 1
-        wanted = information(same, alone), readings(same.model, *same[2:4], alone)
-    assert _deviation(found[0][0], wanted[0][0]) < 1e-12
-    assert _deviation(found[0][1], wanted[0][1]) < 1e-12
-    np.testing.assert_allclose(found[1], wanted[1], rtol=1e-12, atol=1e-15)
+def test_several_batches_in_threads_give_what_one_gives(monkeypatch, every_core, name):
+    alone, same, _ = _setting(CASES[name])
+    assert len(alone.batches) == 1
+    wanted = information(same, alone), readings(same.model, *same[2:4], alone)
+    used = len(alone.segments)
+    with monkeypatch.context() as narrow:
+        narrow.setattr(_batch, "NARROWEST", 1)
+        shared, _, _ = _setting(CASES[name])
+    assert len(shared.batches) == used
+    fields = ("stiffness_scale", "states", "state_scales")
+    own = same._replace(**{field: getattr(same, field)[..., :used] for field in fields})
+    found = information(own, shared), readings(own.model, *own[2:4], shared)
+    for lane, segment in enumerate(alone.segments):
+        assert _deviation(found[0][lane], wanted[0][lane]) < 1e-12
+        size = segment.stop - segment.start
+        np.testing.assert_allclose(found[1][:size, lane], wanted[1][:size, lane], rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.slow
@@ -334,11 +337,11 @@ def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
 def test_columns_of_a_few_lanes_at_a_time_are_those_of_the_exact_derivatives(monkeypatch):
     for module in (_batch, _score_columns):
         monkeypatch.setattr(module, "workers", lambda: 1)
-    # Room for two lanes: of three, the last block holds one again.
-    monkeypatch.setattr(_score_columns, "_ENTRIES", 1e5)
+    # Room for six lanes: of sixteen, the last block holds two again.
+    monkeypatch.setattr(_score_columns, "_ENTRIES", 5e5)
     segments = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0), Segment(0, 90, 300, 110))
     exact, found = _both_ways(Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))), segments=segments)
-    assert len(found) == 3
+    assert len(found) == 16
     for lane in range(3):
         assert _deviation(found[lane], exact[lane]) < 3e-4
 

@@ -29,7 +29,6 @@ ACCURACY = {
     # Where a search stands still, or goes astray.
     "_descent": {"IDLE", "REFUSALS_A_STEP", "SHRINKS", "STALLED"},
     "_estimate": {"ROUGH", "SMALLEST_SCATTER"},
-    "_evaluation": {"SAME_BRANCH"},
     "_initial_states": {"HALVINGS", "MOST_WORSENING", "SETTLED", "SHORTEST", "SMALL_STEP"},
     # Draws and intervals.
     "_scatter_mixture": {"LEAST_TAIL"},

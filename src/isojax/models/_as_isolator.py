@@ -2,7 +2,10 @@
 
 from typing import Protocol, runtime_checkable
 
-from .._parameters import element_names, own_parameters, refuse_outside
+import numpy as np
+from jax.core import Tracer
+
+from .._parameters import element_names, list_parameters, own_parameters, refuse_outside
 from ._isolator import Isolator
 
 
@@ -28,8 +31,8 @@ def as_isolator(value: object, argument: str = "model", recorded: bool = False) 
         The isolator.
 
     Raises:
-        ValueError: if there is none, a coefficient follows a condition that nothing states, or a number of an
-            element is not admissible.
+        ValueError: if there is none, a coefficient follows a condition that nothing states, or a number is
+            not finite or not admissible.
     """
     meant = value if isinstance(value, Isolator) else getattr(value, "model", None)
     if not isinstance(meant, Isolator):
@@ -43,6 +46,11 @@ def as_isolator(value: object, argument: str = "model", recorded: bool = False) 
             f"Argument `{argument}` must be an isolator at one {' and '.join(meant.conditions)}, which a "
             f"coefficient follows, such as {argument}.at({given})."
         )
+    for entry in list_parameters(meant):
+        if not isinstance(entry.value, Tracer) and not np.all(np.isfinite(np.asarray(entry.value))):
+            raise ValueError(
+                f"Argument `{argument}` must hold finite numbers, but {entry.name} is {entry.value}."
+            )
     for element, name in zip(meant.elements, element_names(meant), strict=True):
         for field, spec in own_parameters(element):
             # A strength may have either sign where a linear step gave it.

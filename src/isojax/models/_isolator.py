@@ -175,6 +175,8 @@ class Isolator(eqx.Module):
     def at(self, **conditions: Scalar | float) -> "Isolator":
         """Give the isolator at operating conditions: what follows them goes into plain coefficients.
 
+        The laws are followed to any condition, also far from those of the records, which no model knows.
+
         Args:
             **conditions: pressure [Pa] and temperature [K], absolute; every one that a coefficient follows.
 

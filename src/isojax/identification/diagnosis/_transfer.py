@@ -68,7 +68,7 @@ class _Prediction(NamedTuple):
 
 def _predict(part: Estimate, unseen: Problem, spread: Spread) -> _Prediction:
     """Predict data that a refit did not see; NaN where the motion diverges."""
-    simulator = Simulator(unseen, like=part.simulator)
+    simulator = Simulator(unseen)
     known = part.point.reduced.matrix[:-1, :-1]
     sizes = 1.0 / np.sqrt(np.maximum(np.diag(known), 1e-300))
     nuisances = best_nuisances(simulator, part.model, spread, places=part.places).nuisances
@@ -107,7 +107,7 @@ def transferred_share(fitted: Estimate, extended: Estimate, search: Search) -> f
     for found in (fitted, extended):
         search.progress("carry-over: refit on a part of the data")
         nuisances = found.point.nuisances
-        simulator = Simulator(seen, like=found.simulator)
+        simulator = Simulator(seen)
         part = estimate(simulator, found.model, found.places, quick, nuisances.afresh())
         if part.result == RESULTS.not_finite:
             return 0.0

@@ -10,22 +10,15 @@ from ._build_problem import build_problem
 from ._elimination import Nuisances
 from ._errors import Errors, Restarts, Run, restart_records, run_freely, summarise, without_values
 from ._estimate import Estimate
-from ._problem import Point, Problem
+from ._problem import Problem
 from ._simulator import Simulator
 
-SAME_BRANCH = 1e-3
-"""Difference in chi2/dof, over the fitted records, up to which restarts and the fit are one."""
 
-
-def _chi2_of(point: Point, places: list[int]) -> float:
-    """Give chi2 of some records."""
-    return float(point.reduced.by_record[places, -1, -1].sum())
-
-
-def _carried_over(found: Estimate, simulator: Simulator, places: list[int]) -> Nuisances:
+def _carried_over(found: Estimate, simulator: Simulator) -> Nuisances:
     """Give the nuisances of a fit for a simulator that has other records beside the fitted ones."""
     model, carried, old = found.model, len(found.model.elements), found.point.nuisances
     start = simulator.settle(None, model, carried, old.spread)
+    places = [place for place, record in enumerate(simulator.problem.records) if record.role == "fit"]
     own, scales = found.simulator.starts(model, found.simulator.prepared(model, carried))
     starts, units = simulator.starts(model, simulator.prepared(model, carried))
     reached = own + scales * old.states.T
@@ -94,16 +87,11 @@ class Evaluation:
                     found.simulator, found.model, nuisances.spread, nuisances, found.places
                 )
             else:
-                simulator = Simulator(everything)
-                restarts = restart_records(simulator, found.model, nuisances.spread)
-                places = [place for place, record in enumerate(everything.records) if record.role == "fit"]
-                lost = _chi2_of(restarts.point, places) - found.point.chi2
-                if is_successful(found.result) and not lost < SAME_BRANCH * found.dof:
+                simulator, known = Simulator(everything), None
+                if is_successful(found.result):
                     # Beside a fold the measured states may lead to another branch than the fit is on.
-                    known = _carried_over(found, simulator, places)
-                    again = restart_records(simulator, found.model, nuisances.spread, known)
-                    if _chi2_of(again.point, places) < lost + found.point.chi2:
-                        restarts = again
+                    known = _carried_over(found, simulator)
+                restarts = restart_records(simulator, found.model, nuisances.spread, known)
         if is_successful(found.result):
             return restarts
         return restarts._replace(runs=tuple(map(without_values, restarts.runs)))

@@ -42,7 +42,7 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
         prepared = simulator.prepared(model, len(model.elements))
         starts, _ = simulator.starts(model, prepared)
         outcomes.append(readings(model, np.ones(prepared.record.size), starts, prepared))
-    weight = np.concatenate([np.asarray(batch.weight) for batch in prepared.batches], axis=1)
+    weight = prepared.in_lanes(np.asarray(batch.weight).T for batch in prepared.batches).T
     difference = (outcomes[0] - outcomes[1]) * weight
     if not np.all(np.isfinite(difference)):
         return float("inf")

@@ -21,16 +21,13 @@ class Simulator:
     internal states of the model only; both are remade when those change and at no other time.
     """
 
-    def __init__(self, problem: Problem, at_rest: bool = False, like: "Simulator | None" = None):
+    def __init__(self, problem: Problem, at_rest: bool = False):
         """Keep the problem; nothing is simulated yet.
 
         Args:
             problem: the records.
             at_rest: whether internal states start at zero and are no nuisances.
-            like: simulator whose shapes are taken where they are large enough, so that compiled code serves
-                both.
         """
-        self._segments = problem.segments if like is None else like._segments
         self.problem = problem
         self.at_rest = at_rest
         self._heads = Simulator(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
@@ -73,7 +70,6 @@ class Simulator:
                 skew=key[2],
                 based=model.excitation == "base_acceleration",
                 channels=tuple(sorted(channels | known)),
-                room=self._segments,
                 integrator=problem.integrator,
                 whitening=problem.whitening,
             )

@@ -1,6 +1,7 @@
 """Segments side by side: what one compiled scan takes."""
 
 import dataclasses
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -18,11 +19,19 @@ from ._channels import channel_table, drive_table
 from ._segments import Segment
 from ._whitening import Whitening, find_whitening
 
+NARROWEST, WIDEST = 8, 16
+"""Segments that one scan carries on a CPU, a power of two, so that sets of all sizes share compiled code.
+What a step of more works on leaves the processor's nearest cache; beside other work that makes it slow."""
+
+SAMPLES = 256
+"""Tables have room for a multiple of so many samples, so that records of most lengths share compiled code."""
+
 
 class Batch(eqx.Module):
     """Segments of equal sampling, padded to one length; a lane a segment.
 
     Attributes:
+        count: samples of the longest of them.
         drive: recorded drive at the stages of each sample's integration steps [its SI unit].
         drive_rate: its time derivative.
         measured: measured output [its SI unit].
@@ -30,6 +39,7 @@ class Batch(eqx.Module):
         channels: signals of the records at the same times as the drive, by name.
     """
 
+    count: Int[Array, ""]
     drive: Float[Array, "time stage lanes"]
     drive_rate: Float[Array, "time stage lanes"]
     measured: Float[Array, "time lanes"]
@@ -51,7 +61,7 @@ class Batch(eqx.Module):
             The batch.
         """
         own = {name: self.channels[name] for name in model.channels}
-        return Batch(self.drive, self.drive_rate, self.measured, self.weight, channels=own)
+        return dataclasses.replace(self, channels=own)
 
 
 class Sampling(NamedTuple):
@@ -76,7 +86,8 @@ class Prepared(NamedTuple):
     """Batches of one set of segments, ready to simulate.
 
     Attributes:
-        batches: equal shapes, one a worker thread; lanes run through them in order.
+        batches: equal shapes, the longest segments first.
+        order: lanes as they run through the batches.
         segments: the segments, a lane each; padding lanes repeat none.
         record: record of each lane, padding lanes included (0 there).
         starts: measured displacement and velocity at each lane's first sample; shape (2, lanes).
@@ -86,12 +97,32 @@ class Prepared(NamedTuple):
     """
 
     batches: tuple[Batch, ...]
+    order: Int[np.ndarray, " lanes"]
     segments: tuple[Segment, ...]
     record: Int[np.ndarray, " lanes"]
     starts: Float[np.ndarray, "2 lanes"]
     spread: Float[np.ndarray, "2 lanes"]
     samples: Float[np.ndarray, " record"]
     sampling: Sampling
+
+    def own(self, values: np.ndarray, part: int) -> tuple[Array, ...]:
+        """Give what belongs to the lanes of one batch, row by row.
+
+        Args:
+            values: rows of one value a lane.
+            part: place of the batch.
+        """
+        width = self.order.size // len(self.batches)
+        return tuple(jnp.asarray(row) for row in values[:, self.order[part * width : (part + 1) * width]])
+
+    def in_lanes(self, parts: Iterable[np.ndarray]) -> np.ndarray:
+        """Join what the batches gave, lanes first, in the order of the lanes.
+
+        Args:
+            parts: of each batch.
+        """
+        joined = np.concatenate(list(parts))
+        return joined[np.argsort(self.order)]
 
 
 def coordinate_motion(
@@ -132,7 +163,6 @@ def prepare(
     skew: float = 0.0,
     based: bool = False,
     channels: tuple[str, ...] = (),
-    room: tuple[Segment, ...] = (),
     integrator: Integrator | None = None,
     whitening: tuple[float, ...] = (),
 ) -> Prepared:
@@ -148,17 +178,25 @@ def prepare(
         skew: rate at which this time grows in the course of a file [1].
         based: whether the drive is the acceleration of the base.
         channels: names of the signals of the records that are wanted beside the drive.
-        room: segments for which there shall be room, too: tables of one shape share their compiled code.
         integrator: what simulates the segments; RK4, which takes the steps given above, if omitted.
         whitening: coefficients of the filter that whitens the noise, see `find_whitening`.
 
     Returns:
         The batches and what belongs to their lanes.
     """
-    length = max(segment.stop - segment.start for segment in (*segments, *room))
-    most = max(len(segments), len(room))
-    threads = min(workers(), most)
-    lanes = -(-most // threads) * threads
+    how = Integrator() if integrator is None else integrator
+    sizes = np.array([segment.stop - segment.start for segment in segments])
+    length, width = sizes.max(), sizes.size
+    if jax.default_backend() == "cpu":
+        # At least two batches, where there is work for two threads.
+        width = min(max(NARROWEST, 1 << (-(-width // 2) - 1).bit_length()), WIDEST)
+    if how.is_locked:
+        length = -(-length // SAMPLES) * SAMPLES
+    else:  # a solver with steps of its own goes through all samples that there are
+        width = min(width, sizes.size)
+    lanes = -(-sizes.size // width) * width
+    # Long ones beside long ones: a batch is done when its longest segment is.
+    order = np.append(np.argsort(-sizes, kind="stable"), np.arange(sizes.size, lanes))
     stages = 2 * substeps + 1
     # Filled lane by lane, then turned: writing across the lanes would touch a cache line a sample.
     drive, rates = np.zeros((lanes, length, stages)), np.zeros((lanes, length, stages))
@@ -180,36 +218,35 @@ def prepare(
     with ThreadPoolExecutor(workers()) as pool:
         used = sorted({segment.record for segment in segments})
         content = dict(zip(used, pool.map(known, used), strict=True))
-    for lane, segment in enumerate(segments):
+    for row, lane in enumerate(order[: sizes.size]):
+        segment, size = segments[lane], sizes[lane]
         record = records[segment.record]
         (table, slopes), motion, extra = content[segment.record]
         window = slice(segment.start, segment.stop)
-        size = segment.stop - segment.start
-        drive[lane, :size], rates[lane, :size] = table[window], slopes[window]
+        drive[row, :size], rates[row, :size] = table[window], slopes[window]
         for name, values in extra.items():
-            beside[name][lane, :size] = values[window]
-        measured[lane, :size] = record.output[window]
-        weight[lane, segment.counted - segment.start : size] = 1.0
+            beside[name][row, :size] = values[window]
+        measured[row, :size] = record.output[window]
+        weight[row, segment.counted - segment.start : size] = 1.0
         owner[lane] = segment.record
         for state in range(2):
             starts[state, lane] = motion[state][segment.start]
             # A motion that rings down is largest at its start, far above the rms of its record.
-            size = np.ptp(motion[state][window]) if record.rings_down else np.std(motion[state][window])
-            spread[state, lane] = max(size, 1e-300)
-    share = lanes // threads
+            extent = np.ptp(motion[state][window]) if record.rings_down else np.std(motion[state][window])
+            spread[state, lane] = max(extent, 1e-300)
 
     def turned(values: np.ndarray, first: int) -> Array:
-        return jnp.moveaxis(jnp.asarray(values[first : first + share]), 0, -1)
+        return jnp.asarray(np.ascontiguousarray(np.moveaxis(values[first : first + width], 0, -1)))
 
     batches = tuple(
         Batch(
+            jnp.asarray(sizes[order[first]]),
             *(turned(values, first) for values in (drive, rates, measured, weight)),
             channels={name: turned(values, first) for name, values in beside.items()},
         )
-        for first in range(0, lanes, share)
+        for first in range(0, lanes, width)
     )
-    count = np.bincount(owner, weights=weight.sum(axis=1), minlength=len(records))
-    how = Integrator() if integrator is None else integrator
+    count = np.bincount(owner[order], weights=weight.sum(axis=1), minlength=len(records))
     jumps = hold == "zero_order"
     sampling = Sampling(quantity, 1.0 / records[0].rate, how, jumps, find_whitening(whitening))
-    return Prepared(batches, segments, owner, starts, spread, count, sampling)
+    return Prepared(batches, order, segments, owner, starts, spread, count, sampling)

@@ -1,6 +1,7 @@
 """Segments simulated by RK4 from sample to sample, under one scan, and split where a law jumps."""
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -45,6 +46,30 @@ def _sampler(model: Isolator, sampling: Sampling) -> Callable[..., tuple[Array, 
         return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)
 
     return sample
+
+
+def _over_samples(
+    body: Callable[[Any, Any], tuple[Any, Any]], begun: Any, tables: Any, count: Array
+) -> tuple[Any, Any]:
+    """Do what `jax.lax.scan` does with the first samples, whose count the compiled code does not depend on.
+
+    What the body gives is zero after them.
+    """
+
+    def at(place: Array | int) -> Any:
+        return jax.tree.map(lambda table: jax.lax.dynamic_index_in_dim(table, place, keepdims=False), tables)
+
+    time = jax.tree.leaves(tables)[0].shape[0]
+    given = jax.eval_shape(lambda: body(begun, at(0))[1])
+    blank = jax.tree.map(lambda one: jnp.zeros((time, *one.shape), one.dtype), given)
+
+    def step(place: Array, carry: tuple) -> tuple:
+        state, one = body(carry[0], at(place))
+        return state, jax.tree.map(
+            lambda rows, row: jax.lax.dynamic_update_index_in_dim(rows, row, place, 0), carry[1], one
+        )
+
+    return jax.lax.fori_loop(0, count, step, (begun, blank))
 
 
 @quick_jit
@@ -93,7 +118,7 @@ def fixed_information(
     silent = jnp.zeros((total + 1, lanes)) if model.splits else None
     begun = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
     tables = (batch.acting, batch.measured, batch.weight)
-    carry, rows = jax.lax.scan(body, begun, tables)
+    carry, rows = _over_samples(body, begun, tables, batch.count)
     if sampling.whitening is None or rows is None:
         return carry[2]
     return whitened_products(rows, batch.weight, sampling.whitening)
@@ -112,7 +137,7 @@ def fixed_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Arra
         return (state, after), reading if pending is None else reading + pending
 
     begun = (states, jnp.zeros_like(scale) if model.splits else None)
-    return jax.lax.scan(body, begun, batch.acting)[1]
+    return _over_samples(body, begun, batch.acting, batch.count)[1]
 
 
 @quick_jit

@@ -47,12 +47,6 @@ def find_stepping(prepared: Prepared) -> Stepping:
     return Stepping(solved_information, solved_readings, solved_path)
 
 
-def share_lanes(values: np.ndarray, part: int, parts: int) -> tuple[Array, ...]:
-    """Give one worker's lanes."""
-    size = values.shape[-1] // parts
-    return tuple(jnp.asarray(row[part * size : (part + 1) * size]) for row in values)
-
-
 def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "lanes column column"]:
     """Give the information matrix of each segment.
 
@@ -67,24 +61,22 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
     Returns:
         A^T A of each lane, lanes first; not finite where a simulation diverged.
     """
-    parts, stepping = len(prepared.batches), find_stepping(prepared)
+    stepping = find_stepping(prepared)
     moving = unknowns.moving
     changed = jnp.asarray(unknowns.directions[list(moving)])
 
     def one(part: int) -> np.ndarray:
-        own = Lanes(
-            unknowns.model,
-            share_lanes(unknowns.stiffness_scale[None], part, parts)[0],
-            share_lanes(unknowns.states, part, parts),
+        (scale,), states = (
+            prepared.own(one, part) for one in (unknowns.stiffness_scale[None], unknowns.states)
         )
-        scales = share_lanes(unknowns.state_scales, part, parts)
+        own, scales = Lanes(unknowns.model, scale, states), prepared.own(unknowns.state_scales, part)
         batch = prepared.batches[part].following(unknowns.model)
         result = stepping.information(own, moving, changed, scales, batch, prepared.sampling)
         return np.moveaxis(np.asarray(result), -1, 0)
 
     # JAX releases the interpreter while it computes, so that plain threads use every core on one device.
     with ThreadPoolExecutor(workers()) as pool:
-        return np.concatenate(list(pool.map(one, range(parts))))
+        return prepared.in_lanes(pool.map(one, range(len(prepared.batches))))
 
 
 def readings(
@@ -104,17 +96,16 @@ def readings(
     Returns:
         What the sensor chain records [SI unit of the output]; meaningless where the lane is padded.
     """
-    parts, stepping = len(prepared.batches), find_stepping(prepared)
+    stepping = find_stepping(prepared)
 
     def one(part: int) -> np.ndarray:
-        scale = share_lanes(stiffness_scale[None], part, parts)[0]
-        own = Lanes(model, scale, share_lanes(states, part, parts))
+        (scale,), own = prepared.own(stiffness_scale[None], part), prepared.own(states, part)
         batch = prepared.batches[part].following(model)
-        return np.asarray(stepping.readings(own, batch, prepared.sampling))
+        return np.asarray(stepping.readings(Lanes(model, scale, own), batch, prepared.sampling)).T
 
     def compute() -> tuple[np.ndarray]:
         with ThreadPoolExecutor(workers()) as pool:
-            return (np.concatenate(list(pool.map(one, range(parts))), axis=1),)
+            return (prepared.in_lanes(pool.map(one, range(len(prepared.batches)))).T,)
 
     (simulated,) = recall("readings", compute, model, stiffness_scale, states)
     return simulated

@@ -25,14 +25,14 @@ from ...models import Isolator, State
 from ._batch import Batch, Prepared, workers
 from ._effect_inputs import input_columns
 from ._families import ElementFamily, find_families, in_turn, stack_states
-from ._information import find_stepping, share_lanes
+from ._information import find_stepping
 from ._propagation import propagate, respond
 from ._slopes import Change, Slopes, impulse_at_samples, slopes_along
 from ._transitions import Transitions, transitions_along
 from ._unknowns import STIFFNESS_SCALE_UNIT, Lanes, Unknowns, has_stiffness_scale
 from ._whitening import whitened_products
 
-_ENTRIES = 5e6
+_ENTRIES = 6e6
 """Numbers that one table of columns along the motion may hold."""
 
 _LEAST_COLUMNS = 160
@@ -100,7 +100,6 @@ def score_information(
     Returns:
         A^T A of each lane, lanes first.
     """
-    parts = len(prepared.batches)
     layout = _layout(unknowns, carried)
     size = 2 + layout.model.internal_states
     columns = len(layout.units) + int(has_stiffness_scale(unknowns.model)) + size + 1
@@ -108,9 +107,10 @@ def score_information(
     def one(part: int) -> np.ndarray:
         batch = prepared.batches[part].following(unknowns.model)
         time = batch.drive.shape[0]
-        scale = share_lanes(unknowns.stiffness_scale[None], part, parts)[0]
-        states = share_lanes(unknowns.states, part, parts)
-        scales = share_lanes(unknowns.state_scales[:size], part, parts)
+        (scale,), states = (
+            prepared.own(one, part) for one in (unknowns.stiffness_scale[None], unknowns.states)
+        )
+        scales = prepared.own(unknowns.state_scales[:size], part)
         lanes = scale.shape[0]
         # A table of all columns along all lanes may not fit the memory: a few lanes at a time.
         blocks = -(-lanes // max(1, int(_ENTRIES / (time * max(columns, _LEAST_COLUMNS)))))
@@ -126,14 +126,14 @@ def score_information(
         return np.concatenate(done)
 
     with ThreadPoolExecutor(workers()) as pool:
-        products = np.concatenate(list(pool.map(one, range(parts))))
+        products = prepared.in_lanes(pool.map(one, range(len(prepared.batches))))
     give_memory_back()
     return products
 
 
 def _some_lanes(values: Array, begin: int, width: int) -> Array:
     """Give a few lanes of a table, by a function that is compiled once for all places of a shape."""
-    return jax.lax.dynamic_slice_in_dim(values, begin, width, axis=-1)
+    return jax.lax.dynamic_slice_in_dim(values, begin, width, axis=-1) if values.ndim else values
 
 
 def _block(

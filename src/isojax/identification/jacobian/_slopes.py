@@ -64,6 +64,7 @@ def _to_samples(values: Float[Array, "step lanes"], steps: int) -> Float[Array, 
     return _without_bend(mean)
 
 
+@quick_jit
 def impulse_at_samples(table: Float[Array, "time stage lanes"]) -> Float[Array, "time lanes"]:
     """Average a signal to the samples as slopes are: all of it may lie between them, as that of a hold does.
 

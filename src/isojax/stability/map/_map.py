@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._given_numbers import given_count
-from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ..._types import check_float64
 from ...models import (
@@ -142,9 +141,6 @@ def stability_map(
     refuse_transformed(model, _INSTEAD)
     for name, axis in (("amplitudes", amplitudes), ("frequencies", frequencies)):
         refuse_transformed(axis, _INSTEAD_OF_AXES, name)
-    for entry in list_parameters(model):
-        if not np.all(np.isfinite(np.asarray(entry.value))):
-            raise ValueError(f"Argument `model` must hold finite numbers, but {entry.name} is {entry.value}.")
     if integrator is not None:
         integrator = integrator_for(model, integrator)
     carried = None if fit is None else coefficient_errors(fit, model)
