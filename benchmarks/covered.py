@@ -1,6 +1,6 @@
 """Do the 95 % intervals hold the truth where few records tell how much the stiffness scatters?
 
-Run `python benchmarks/covered.py --seeds 700000:700070`, then `python benchmarks/coverage.py --report`. A
+Run `python benchmarks/covered.py --seeds 700000:700070`, then `python benchmarks/covered.py --report`. A
 run can be stopped and goes on where it stopped: a line of the file is a fit. About ten seconds a fit. The
 plant is the paper's y direction with every coefficient moved by up to 10 %, on the rig simulator, as in the
 blind trial, and nothing is hidden. Each seed is tested with two, three, four and six stepped sines of eight

@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import isojax as ij
+from isojax._given_numbers import as_numbers
 from isojax.demo import campaign_folder
 from reporting.conftest import RANKING, cut
 
@@ -173,7 +174,7 @@ def test_each_cell_of_a_map_says_how_its_search_ended():
     assert repr(smap.result).startswith(f"3 × 2 × 2 outcomes: {found.sum()} successful; ")
 
 
-def test_messages_say_what_to_pass():
+def test_messages_say_what_to_pass(unchecked):
     model = ij.paper.y_direction()
     with pytest.raises(ValueError, match=r"`model` must be an isolator, such as .* type Harmonic"):
         ij.models.as_isolator(ij.Harmonic(1.0, 5.0))
@@ -182,6 +183,10 @@ def test_messages_say_what_to_pass():
             ij.find_periodic_orbit(model.replace(k3=wrong), ij.Harmonic(60.0, 5.0))
     with pytest.raises(ValueError, match=r"`fit` must be a fit, .* type Isolator"):
         ij.identification.as_fit(model)
+    with pytest.raises(ValueError, match=r"as in `model.restoring_force\(\(x, v\)\)`, but is of type float"):
+        model.restoring_force(1e-3, 0.0)
+    with pytest.raises(ValueError, match=r"real numbers, but gave complex ones. Give their moduli"):
+        as_numbers("quantity", 1j)
     with pytest.raises(ValueError, match=r"nowhere"):
         ij.close_loop("nowhere")
     with pytest.raises(ValueError, match=r"nowhere"):

@@ -210,7 +210,10 @@ def as_numbers(name: str, given: Any, real: bool = True) -> Inexact[Array, "..."
             f"{type(given).__name__}."
         ) from None
     if real and jnp.iscomplexobj(numbers):
-        raise ValueError(f"Argument `{name}` must give real numbers, but gave complex ones.")
+        raise ValueError(
+            f"Argument `{name}` must give real numbers, but gave complex ones. Give "
+            "their moduli, as of `jnp.abs`, or their real and imaginary parts."
+        )
     return numbers
 
 

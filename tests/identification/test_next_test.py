@@ -9,7 +9,7 @@ import pytest
 
 from identification.test_scatter_mixture import PRIOR, UNIT, mean_of, reduced_of
 from isojax import plot, rig
-from isojax.elements import AddedMass, CubicStiffness, LinearDamping, LinearStiffness
+from isojax.elements import AddedMass, CubicStiffness, DahlFriction, LinearDamping, LinearStiffness
 from isojax.identification import fit, next_test
 from isojax.identification.experiment._test_plan import plan_of
 from isojax.identification.fitting._scatter_mixture import expect_uncertainty
@@ -177,10 +177,27 @@ def test_a_gain_is_separated_from_a_mass_error_by_no_drive_of_a_linear_isolator(
     asked = next_test(heavier, rivals=("added_mass", "input_gain"), bands=((4.0, 7.0),))
     assert asked.rivals == ("added_mass", "input_gain")
     assert max(one.chi2 for one in asked.proposals if not one.reason) < 0.5
+    assert 0.0 <= asked.chi2_now < 0.5
+    words = f"the present records alone: chi2 {asked.chi2_now:.3g} between added_mass and input_gain"
+    assert words in repr(asked)
     with pytest.raises(ValueError, match="begin with an effect of the model"):
         next_test(heavier, rivals=("coulomb_friction", "input_gain"))
     with pytest.raises(ValueError, match="a name of the catalogue"):
         next_test(heavier, rivals=("added_mass", "gain"))
+
+
+def test_a_rival_that_the_records_refute_already_says_so(fitted):
+    """No spring stands in for the damping: what the records hold alone is most of what one more would add."""
+    asked = next_test(fitted, rivals=("linear_damping", "quintic_stiffness"), bands=((4.0, 7.0),), dwells=6)
+    assert asked.chi2_now > 1e4
+    best = asked.best.chi2
+    assert asked.chi2_now < best < 4.0 * asked.chi2_now
+
+
+def test_a_rival_that_diverges_along_the_records_is_refused(fitted):
+    """A loop of a nanometre cannot be followed at the steps of the records."""
+    with pytest.raises(ValueError, match="stays finite along the motion of the records, but dahl_friction"):
+        next_test(fitted, rivals=("linear_damping", DahlFriction(0.0, 1e-9)))
 
 
 def test_the_picture_has_a_bar_for_each_record_that_could_be_simulated(found):

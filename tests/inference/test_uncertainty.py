@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.stats import norm, truncnorm
+from scipy.stats import chi2, norm, truncnorm
 
 import isojax as ij
 from isojax.demo import campaign_folder
@@ -42,6 +42,15 @@ def test_of_a_linear_quantity_the_error_is_that_of_the_covariance(fit):
     np.testing.assert_allclose(found.interval - found.value, norm.ppf([0.025, 0.975]) * expected, rtol=1e-9)
     assert np.std(found.draws) == pytest.approx(expected, rel=0.1)
     assert found.failed == 0.0
+
+
+def test_of_what_is_least_at_the_fit_the_interval_begins_there(wide):
+    """A distance squared of one normal coefficient: chi-square of one degree of freedom."""
+    stiffness = float(wide.model[STIFFNESS])
+    found = ij.uncertainty(wide, lambda model: ((model[STIFFNESS] - stiffness) / (0.1 * stiffness)) ** 2)
+    assert found.curved
+    assert found.interval[0] == found.value == 0.0
+    assert float(found.interval[1]) == pytest.approx(chi2.ppf(0.975, 1), rel=0.3)
 
 
 def test_no_interval_leaves_out_the_value_that_it_belongs_to(fit):

@@ -114,6 +114,7 @@ def test_what_has_no_pressure_says_how_to_give_one(ask):
             r"`temperature` must not be given.* follows pressure",
         ),
         (MODEL, {"pressure": 0.0}, r"`pressure` must be positive and finite, but is 0"),
+        (MODEL, {"pressure": 2.4}, r"`pressure` must be absolute, in its SI unit, and within a factor of 10"),
         (MODEL, {"pressure": math.inf}, r"`pressure` must be positive and finite, but is inf"),
         (MODEL, {"pressure": [2e5, 3e5]}, r"`pressure` must be one real number, but has shape \(2,\)"),
         (MODEL, {"pressure": "2 bar"}, r"`pressure` must be one real number, but is '2 bar'"),

@@ -85,6 +85,19 @@ def test_friction_alone_is_a_rectangle_of_its_level(found):
     assert np.mean(np.abs(force) > 0.99 * level) > 0.98
 
 
+def test_the_band_of_the_equivalent_stiffness_is_that_of_its_closed_form(found):
+    """Of a linear and a cubic spring it is k1 + 3/4 k3 X^2 (the paper, eq. 7)."""
+    figure = isojax.plot.equivalent(found.guess, [("before", found.before)])
+    (band,) = figure.axes[0].collections
+    corners = band.get_paths()[0].vertices
+    for x in (corners[:, 0].min(), corners[:, 0].max()):
+        wanted = isojax.uncertainty(
+            found.before, lambda m, x=1e-3 * x: 1e-3 * (m["k1"] + 0.75 * m["k3"] * x**2)
+        )
+        ends = corners[np.isclose(corners[:, 0], x), 1]
+        np.testing.assert_allclose([ends.min(), ends.max()], wanted.interval, rtol=1e-4)
+
+
 def test_without_dwells_there_is_no_cycle_to_average(plain):
     with pytest.raises(ValueError, match="must be a fit of records with dwells"):
         isojax.plot.cycle_residual(plain.before)

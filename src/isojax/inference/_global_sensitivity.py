@@ -187,8 +187,8 @@ def global_sensitivity(
     kept = ~failed.reshape(points.shape[:2]).any(axis=1)
     if not 2 * kept.sum() >= samples:
         raise ValueError(
-            "Argument `quantity` must succeed in more than half of the rows, but failed in "
-            f"{samples - kept.sum()} of {samples}: {reason}."
+            f"Argument `quantity` must succeed in more than half of the rows of {len(names) + 2} points, but "
+            f"failed in {samples - kept.sum()} of {samples} rows: {reason}."
         )
     shape = values.shape[1:]
     rows = values.reshape(samples, len(names) + 2, -1)[kept].astype(float)

@@ -10,13 +10,29 @@ from jax.core import Tracer
 
 from .._given_numbers import given_scalar
 from .._types import Scalar
-from ..elements import AbstractElement
+from ..elements import AbstractElement, Dependence
+
+_FARTHEST = 10.0
+"""Factor on the reference of a law up to which a condition is taken: none was tested so far from it. One in
+another unit, such as bar or degrees Celsius, lies beyond."""
 
 
 def followed_conditions(elements: tuple[AbstractElement, ...]) -> tuple[str, ...]:
     """Name the operating conditions that some coefficient of these effects follows."""
     followed = (element.dependence() for element in elements)
     return tuple(sorted({one.condition for one in followed if one is not None}))
+
+
+def _refuse_far(follows: Dependence, value: Scalar | float) -> None:
+    """Refuse a condition far from the reference of a law: most often it is in another unit."""
+    if isinstance(value, Tracer) or isinstance(follows.reference, Tracer):
+        return
+    reference = float(follows.reference)
+    if not reference / _FARTHEST <= float(value) <= reference * _FARTHEST:
+        raise ValueError(
+            f"Argument `{follows.condition}` must be absolute, in its SI unit, and within a factor of "
+            f"{_FARTHEST:g} of {reference:g}, the reference of the law that follows it, but is {value}."
+        )
 
 
 def plain_elements(
@@ -32,7 +48,8 @@ def plain_elements(
         The effects that follow none, with what the others add to their strengths.
 
     Raises:
-        ValueError: if a condition is missing, follows nothing, or is not one positive number.
+        ValueError: if a condition is missing, follows nothing, is not one positive number, or is far from
+            the reference of a law.
     """
     known = followed_conditions(elements)
     for name, value in conditions.items():
@@ -50,6 +67,7 @@ def plain_elements(
         if follows is None:
             continue
         law = cast(AbstractElement, follows.law)
+        _refuse_far(follows, conditions[follows.condition])
         share = follows.share(jnp.asarray(conditions[follows.condition], dtype=float))
         place = next((place for place, one in enumerate(plain) if one.name == law.name), len(plain))
         strength = share * getattr(law, law.strength)

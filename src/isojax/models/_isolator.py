@@ -184,7 +184,8 @@ class Isolator(eqx.Module):
             The isolator without effects that follow a condition, for orbits, maps and simulation.
 
         Raises:
-            ValueError: if a condition is missing, or is not positive.
+            ValueError: if a condition is missing, is not positive, or is far from the reference of a law, as
+                one in another unit is.
 
         Example:
             >>> chamber = ij.elements.PressureStiffness(change=8e5, reference=2e5)
@@ -293,7 +294,15 @@ class Isolator(eqx.Module):
 
         Returns:
             Force on the left-hand side of the balance [N].
+
+        Raises:
+            ValueError: if the state is no tuple.
         """
+        if not isinstance(state, tuple | list):
+            raise ValueError(
+                "Argument `state` must be one tuple, as in `model.restoring_force((x, v))`, but is of type "
+                f"{type(state).__name__}."
+            )
         return sum(law.forces(self.elements, state), start=0.0 * state[0])
 
     def acceleration(self, state: State, at: Instant, law: AbstractLaw = ROUNDED) -> Lanes:

@@ -56,7 +56,7 @@ class _Asked(NamedTuple):
         columns: its coefficients, and the rival of an effect.
         gradient: of each number of the quantity by the coefficients.
         quantity_errors: of each at present.
-        old: equations of the present records; None where no rival is asked for.
+        old: information of the present records, the rival among its columns; None where none is asked for.
         effect: column of the effect that has a rival.
         inflation: factor on the squared noise.
     """
@@ -65,9 +65,16 @@ class _Asked(NamedTuple):
     columns: Columns
     gradient: Float[np.ndarray, "number coefficient"]
     quantity_errors: Float[np.ndarray, " number"]
-    old: Point | None
+    old: Float[np.ndarray, "column column"] | None
     effect: int
     inflation: float
+
+    def expected_chi2(self, information: Float[np.ndarray, "column column"]) -> float:
+        """Give the chi2 between the rivals that records of this information are expected to show."""
+        count = len(self.fit.free)
+        strength = float(self.fit.model[self.fit.free[self.effect]]) / self.columns.sizes[self.effect]
+        known = tuple(place for place in range(count) if place != self.effect)
+        return expected_chi2(information, known, self.effect, count, strength) / self.inflation
 
 
 @blas_in_one_thread
@@ -89,14 +96,15 @@ def next_test(
     rate of the campaign, free initial states, and the scatter of the stiffness known from one record
     more. Without `quantity` the best candidate has the smallest determinant of it (D-optimal), with one the
     smallest variance `g' C g` of the quantity, g its gradient (c-optimal). With `rivals` it is the one with
-    the largest expected chi2 between the two, as in `find_separating_experiment`.
+    the largest expected chi2 between the two, over the present records and the new one.
 
     Args:
         fit: a fit, or what ends with one; a saved one has no records to add to.
         quantity: function of an isolator that gives real numbers, as in `uncertainty`; of several numbers,
             the geometric mean of their standard errors counts.
         rivals: catalogue name of an effect of the model with a fitted strength, and name or element of the
-            one that may stand in its place.
+            one that may stand in its place. Its strength is free, its shape is not: that of the element, or
+            a first guess where only a name is given.
         seconds: length of the record [s]; the mean of the fitted ones if omitted.
         levels: rms of the drive [N, or m/s^2 of the base]; those of the campaign and a third of the lowest if
             omitted.
@@ -170,6 +178,7 @@ def next_test(
         () if rivals is None else (rivals[0], asked.columns.probes[0].name),
         seconds,
         rank_proposals(proposals),
+        float("nan") if asked.old is None else asked.expected_chi2(asked.old),
     )
 
 
@@ -200,7 +209,12 @@ def _ask(
     probes, effect = _rival(fit, rivals)
     scales = campaign_scales(fit.campaign)
     columns = trial_columns(fit.estimate, probes, tuple(probe.typical_strength(scales) for probe in probes))
-    old = old_point(columns) if probes else None
+    old = full_matrix(columns, old_point(columns)) if probes else None
+    if old is not None and not np.all(np.isfinite(old)):
+        raise ValueError(
+            "Argument `rivals` must end with an effect that stays finite along the motion of the records, "
+            f"but {probes[0].name} does not. Give an element of another shape."
+        )
     return _Asked(fit, columns, gradient, errors, old, effect, fit.estimate.inflation)
 
 
@@ -323,10 +337,10 @@ def _proposal(
     chi2 = float("nan")
     count = len(fit.free)
     if asked.old is not None:
-        total = full_matrix(columns, asked.old) + repeats * full_matrix(columns, point._replace(reduced=own))
-        strength = float(fit.model[fit.free[asked.effect]]) / columns.sizes[asked.effect]
-        known = tuple(place for place in range(count) if place != asked.effect)
-        chi2 = expected_chi2(total, known, asked.effect, count, strength) / asked.inflation
+        new = full_matrix(columns, point._replace(reduced=own))
+        chi2 = asked.expected_chi2(asked.old + repeats * new)
+        if np.isnan(chi2):
+            return _left_out(asked, outline, experiment, DIVERGES)
     planned = own.rescaled(np.array(columns.sizes[:count]))
     estimate = fit.estimate
     after = expect_uncertainty(

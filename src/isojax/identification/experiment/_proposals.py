@@ -25,7 +25,7 @@ class Proposal(NamedTuple):
         quantity_errors: of each number of the quantity that was asked for; none without one.
         shrinkage: factor on the standard error of the quantity; without one, on those of all coefficients, as
             the geometric mean along the axes of their ellipsoid. NaN where nothing could be simulated.
-        chi2: expected, between the rival effects; NaN without rivals.
+        chi2: expected between the rival effects, over the present records and this one; NaN without rivals.
         reason: why it was left out; empty if it was not.
     """
 
@@ -84,6 +84,7 @@ class NextTest(NamedTuple):
         rivals: the effect and the other between which the test is to decide; none if not asked for.
         seconds: length of the record [s].
         proposals: the best first; those left out last.
+        chi2_now: expected between the rival effects over the present records alone; NaN without rivals.
     """
 
     names: tuple[str, ...]
@@ -95,6 +96,7 @@ class NextTest(NamedTuple):
     rivals: tuple[str, ...]
     seconds: float
     proposals: tuple[Proposal, ...]
+    chi2_now: float = float("nan")
 
     @property
     def best(self) -> Proposal | None:
@@ -117,6 +119,11 @@ class NextTest(NamedTuple):
         lines = [f"  … and {len(self.proposals) - _SHOWN} more"] if len(self.proposals) > _SHOWN else []
         reasons = list(dict.fromkeys(one.reason for one in left_out))
         lines += [f"  {len(left_out)} left out: {'; '.join(reasons)}"] if left_out else []
+        if self.rivals:
+            effect, other = self.rivals
+            lines.append(
+                f"  the present records alone: chi2 {self.chi2_now:.3g} between {effect} and {other}"
+            )
         if self.best is None:
             return lines
         lines.append("  standard errors with the first, after ← now:")

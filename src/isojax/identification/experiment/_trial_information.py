@@ -242,10 +242,12 @@ def expected_chi2(
         strength: of the effect [unit of its column].
 
     Returns:
-        The expected chi2.
+        The expected chi2; NaN where the simulation of a law diverged.
 
     Source: Hunter & Reiner 1965, Technometrics 7:307.
     """
+    if not np.all(np.isfinite(information)):
+        return float("nan")
     pair = [effect, other]
     size = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(size, size)

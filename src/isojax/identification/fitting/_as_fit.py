@@ -3,6 +3,7 @@
 from typing import Protocol, runtime_checkable
 
 from ._fit_result import Fit
+from ._saved_fit import SavedFit
 
 
 @runtime_checkable
@@ -29,6 +30,11 @@ def as_fit(value: object, argument: str = "fit") -> Fit:
         ValueError: if there is none.
     """
     meant = value if isinstance(value, Fit) else getattr(value, "after", None)
+    if isinstance(value, SavedFit):
+        raise ValueError(
+            f"Argument `{argument}` must hold the records that were fitted, but a saved fit holds none. Fit "
+            "them again: `fit(saved.model, campaign)`."
+        )
     if not isinstance(meant, Fit):
         raise ValueError(
             f"Argument `{argument}` must be a fit, such as `fit(guess.model, campaign)`, or an extension or "

@@ -3,12 +3,17 @@
 from collections.abc import Sequence
 from typing import Literal
 
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...identification import ClassicalGuess, Fit
-from ._force_cycles import equivalent_curves
+from ...models import Isolator
+from ._draw_band import PALE
+from ._force_cycles import SIDES, equivalent_curves, equivalent_of
+from ._force_plots import band_of
 from ._style import AFTER, BEFORE, CURVES, LEVELS, MEASURED, NEUTRAL, axes_for, entitle
 
 _LINES = {"forward": "-", "backward": "--", "none": "-"}
@@ -117,10 +122,18 @@ def centre_frequency(guess: ClassicalGuess) -> float:
 def _backbone(guess: ClassicalGuess, fit: Fit, label: str, colour: str, width: float, ax: Axes) -> None:
     lowest, highest = visited_amplitudes(guess)
     amplitudes = np.linspace(lowest, 1.05 * highest, 60)
-    stiffness, _ = equivalent_curves(fit.model, amplitudes, centre_frequency(guess))
-    physical = stiffness > 0.0
-    frequency = np.sqrt(stiffness[physical] / float(fit.model.mass)) / (2.0 * np.pi)
-    ax.plot(frequency, 1e3 * amplitudes[physical], color=colour, linewidth=width, label=f"backbone, {label}")
+    centre = centre_frequency(guess)
+
+    def frequencies(model: Isolator) -> Float[Array, "1 amplitude"]:
+        stiffness = equivalent_of(model, amplitudes, centre)[0]
+        return jnp.sqrt(jnp.where(stiffness > 0.0, stiffness, jnp.nan) / model.mass)[None] / (2.0 * np.pi)
+
+    (frequency,) = np.asarray(frequencies(fit.model))
+    ax.plot(frequency, 1e3 * amplitudes, color=colour, linewidth=width, label=f"backbone, {label}")
+    band = band_of(fit, ("frequency",), frequencies)
+    if band is not None:
+        lower, upper = (np.asarray(end["frequency"]) for end in (band.lower, band.upper))
+        ax.fill_betweenx(1e3 * amplitudes, lower, upper, color=colour, alpha=PALE, linewidth=0.0)
 
 
 def plot_equivalent(
@@ -150,6 +163,10 @@ def plot_equivalent(
     for (label, fit), colour, width in zip(fits, (BEFORE, AFTER), CURVES, strict=False):
         stiffness, damping = equivalent_curves(fit.model, amplitudes, frequency)
         x, y = (amplitudes, stiffness) if what == "stiffness" else (speeds, damping)
+        band = band_of(fit, SIDES, lambda model: equivalent_of(model, amplitudes, frequency))
+        if band is not None:
+            lower, upper = (1e-3 * np.asarray(end[what]) for end in (band.lower, band.upper))
+            ax.fill_between(1e3 * x, lower, upper, color=colour, alpha=PALE, linewidth=0.0)
         ax.plot(
             1e3 * x,
             1e-3 * y,

@@ -17,6 +17,10 @@ _SETTLING = 10
 """Cycles after which internal states count as periodic."""
 
 
+SIDES = ("stiffness", "damping")
+"""What a cycle amounts to, in the order of `equivalent_of`."""
+
+
 class Cycles(NamedTuple):
     """One steady cycle at each amplitude.
 
@@ -46,10 +50,17 @@ def trace_cycles(model: Isolator, amplitudes: Float[np.ndarray, " amplitude"], f
     """
     omega = 2.0 * np.pi * frequency
     phase = 2.0 * np.pi * np.arange(_POINTS) / _POINTS
-    force = _forces(model, jnp.asarray(amplitudes), jnp.asarray(omega))
+    force = cycle_forces(model, amplitudes, frequency)
     x = amplitudes * np.sin(phase)[:, None]
     v = omega * amplitudes * np.cos(phase)[:, None]
-    return Cycles(phase, x, v, np.asarray(force[-_POINTS:]))
+    return Cycles(phase, x, v, np.asarray(force))
+
+
+def cycle_forces(
+    model: Isolator, amplitudes: Float[np.ndarray, " amplitude"], frequency: float
+) -> Float[Array, "phase amplitude"]:
+    """Give the forces of `trace_cycles`, of a model that JAX may trace."""
+    return _forces(model, jnp.asarray(amplitudes), jnp.asarray(2.0 * np.pi * frequency))[-_POINTS:]
 
 
 @eqx.filter_jit
@@ -101,9 +112,16 @@ def equivalent_curves(
 
     Source: the paper, eqs. (7) and (8).
     """
-    cycles = trace_cycles(model, amplitudes, frequency)
-    sine, cosine = np.sin(cycles.phase)[:, None], np.cos(cycles.phase)[:, None]
-    weight = 2.0 / cycles.phase.size / amplitudes
+    stiffness, damping = np.asarray(equivalent_of(model, amplitudes, frequency))
+    return stiffness, damping
+
+
+def equivalent_of(
+    model: Isolator, amplitudes: Float[np.ndarray, " amplitude"], frequency: float
+) -> Float[Array, "2 amplitude"]:
+    """Give K_eq [N/m] and C_eq [N s/m] as `equivalent_curves` does, of a model that JAX may trace."""
+    phase = 2.0 * np.pi * np.arange(_POINTS) / _POINTS
     omega = 2.0 * np.pi * frequency
-    stiffness = weight * np.sum(cycles.force * sine, axis=0)
-    return stiffness, weight / omega * np.sum(cycles.force * cosine, axis=0)
+    force = cycle_forces(model, amplitudes, frequency)
+    sides = jnp.stack([jnp.asarray(np.sin(phase)), jnp.asarray(np.cos(phase)) / omega])
+    return sides @ force * (2.0 / _POINTS / jnp.asarray(amplitudes))[None]

@@ -1,7 +1,7 @@
 """Pictures of forces: that of a model over measured points, and that of one effect by itself."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import jax.numpy as jnp
@@ -14,8 +14,8 @@ from ..._results import is_successful
 from ...identification import Fit
 from ...models import Band, Isolator, coefficient_errors, find_band
 from ...records import Record, measured_state
-from ._draw_band import PALE
-from ._force_cycles import trace_cycles
+from ._draw_band import PALE, draw_band
+from ._force_cycles import cycle_forces, trace_cycles
 from ._style import AFTER, BAND, CURVES, MEASURED, NEUTRAL, axes_for, entitle, fits_meant, pair
 
 Slice = Literal["stiffness", "damping"]
@@ -88,8 +88,8 @@ def plot_restoring_force(
     grid = np.linspace(-1.25 * reach, 1.25 * reach, 801)
     for (label, fit, colour), width in zip(pair(before, after), CURVES, strict=False):
         ax.plot(1e3 * grid, _slice(fit.model, grid, what), color=colour, linewidth=width, label=label)
-        if is_successful(fit.result) and np.all(np.isfinite(fit.covariance)):
-            band = force_band(fit, grid, what)
+        band = band_of(fit, ("force",), lambda model: _force_along(model, grid, what)[None])
+        if band is not None:
             lower, upper = (np.asarray(end["force"]) for end in (band.lower, band.upper))
             ax.fill_between(1e3 * grid, lower, upper, color=colour, alpha=PALE, linewidth=0.0)
     ax.axvspan(-1e3 * reach, 1e3 * reach, color=BAND, alpha=0.6, zorder=0, label="visited")
@@ -161,6 +161,21 @@ def force_band(fit: Fit, grid: Float[np.ndarray, " point"], what: Slice) -> Band
     return find_band(errors, ("force",), lambda model: _force_along(model, grid, what)[None])
 
 
+def band_of(
+    fit: Fit, names: tuple[str, ...], curve: Callable[[Isolator], Float[Array, "quantity ..."]]
+) -> Band | None:
+    """Give the band around a curve that a picture draws; None where the fit has no errors to carry.
+
+    Args:
+        fit: the fit.
+        names: of the quantities.
+        curve: see `find_band`.
+    """
+    if not (is_successful(fit.result) and np.all(np.isfinite(fit.covariance))):
+        return None
+    return find_band(coefficient_errors(fit), names, curve)
+
+
 def effect_on_its_own(model: Isolator, effect: str) -> Isolator:
     """Give the isolator with one effect only.
 
@@ -191,8 +206,10 @@ def plot_effect(
         The figure.
     """
     figure, ax = axes_for(ax)
-    cycles = trace_cycles(
-        effect_on_its_own(fit.model, effect), np.asarray(amplitudes, dtype=float), frequency
+    sizes = np.asarray(amplitudes, dtype=float)
+    cycles = trace_cycles(effect_on_its_own(fit.model, effect), sizes, frequency)
+    band = band_of(
+        fit, ("force",), lambda model: cycle_forces(effect_on_its_own(model, effect), sizes, frequency)[None]
     )
     for column, amplitude in enumerate(amplitudes):
         x, force = cycles.displacement[:, column], cycles.force[:, column]
@@ -204,6 +221,10 @@ def plot_effect(
             linewidth=1.5,
             label=f"X = {1e3 * amplitude:.3g} mm",
         )
+        if band is not None:
+            ends = (np.asarray(end["force"])[:, column] for end in (band.lower, band.upper))
+            lower, upper = ((1e3 * np.append(x, x[0]), np.append(end, end[0])) for end in ends)
+            draw_band(ax, lower, upper, colour)
     ax.set_xlabel("displacement [mm]")
     ax.set_ylabel("force [N]")
     words = next(element.words for element in fit.model.elements if element.name == effect)

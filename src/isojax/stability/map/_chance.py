@@ -373,7 +373,8 @@ def chance_words(smap: "StabilityMap") -> str:
         words.append(f"{name}: at least 95 % in {sure} cells, uncertain in {doubtful}{lost}")
     if error is not None and np.isfinite(error):
         words.append(
-            f"a chance near a half is off by at most about {error:.2g}, "
-            f"and its standard error by the count of draws is below {0.5 / DRAWS**0.5:.2g}"
+            f"a chance near a half is off by about {error:.2g} in the mean over the map, by more next to a "
+            "fold where the grid is coarse beside the error of its force; "
+            f"its standard error by the count of draws is below {0.5 / DRAWS**0.5:.2g}"
         )
     return "; ".join(words)
