@@ -255,6 +255,19 @@ def report(rows: list[dict]) -> bool:
                 f"| {low:.2f} to {min(high, 1.0):.2f} | {len(some)} | {mean:.3f} | {real / len(some):.3f} | "
                 f"{ends[0]:.2f}-{ends[1]:.2f} |"
             )
+    rigs: dict[int, list[bool]] = {}
+    for row in rows:
+        if row.get("fold", {"truth": None})["truth"] is not None:
+            rigs.setdefault(row["seed"], []).append(holds(row["fold"]))
+    if rigs:
+        each = np.array([(sum(held), len(held)) for held in rigs.values()])
+        picks = np.random.default_rng(0).integers(len(each), size=(10_000, len(each)))
+        low, high = np.quantile(each[picks, 0].sum(axis=1) / each[picks, 1].sum(axis=1), [0.025, 0.975])
+        missed = each[:, 1] - each[:, 0]
+        print(
+            f"\nThe fold force by rigs, of which each gives several campaigns: {len(each)} rigs, bootstrap "
+            f"{low:.2f}-{high:.2f}; {missed.sum()} misses, {missed.max()} of them on one rig"
+        )
     rest = [row for row in rows if "others" in row]
     if not rest:
         return met

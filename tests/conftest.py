@@ -4,6 +4,7 @@ import gc
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType
@@ -68,7 +69,8 @@ def _sparing(check: Callable[..., Any]) -> Callable[..., Any]:
 
 
 jaxtyping.jaxtyped = _sparing(jaxtyping.jaxtyped)  # what the hook puts before each function
-install_import_hook("isojax", "beartype.beartype")
+if "ISOJAX_UNCHECKED" not in os.environ:  # a run inside a test, of a copy of what the run outside checks
+    install_import_hook("isojax", "beartype.beartype")
 
 
 _MOST_MAPPINGS = 40_000
@@ -188,6 +190,21 @@ def every_core() -> Iterator[None]:
     os.sched_setaffinity(0, range(os.cpu_count() or 1))
     yield
     os.sched_setaffinity(0, own)
+
+
+@pytest.fixture(scope="session")
+def demo_beside() -> Path | None:
+    """Folder of `isojax demo` where .ci/run runs it beside the tests, once it has ended; else None."""
+    if "ISOJAX_DEMO" not in os.environ:
+        return None
+    folder = Path(os.environ["ISOJAX_DEMO"])
+    ended = folder.with_suffix(".ended")
+    for _ in range(600):
+        if ended.exists():
+            break
+        time.sleep(1.0)
+    assert ended.read_text().strip() == "0", folder.with_suffix(".err").read_text(encoding="utf-8")
+    return folder
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 import html
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -209,11 +208,11 @@ def test_an_unknown_effect_is_refused_before_a_data_file_is_opened(tmp_path, cap
 
 
 @pytest.fixture
-def demo(tmp_path, capsys):
-    """Folder, output and messages of `isojax demo`, which .ci/run has run where nothing else is installed."""
-    if "ISOJAX_DEMO" in os.environ:
-        folder = Path(os.environ["ISOJAX_DEMO"])
-        return folder, *(folder.with_suffix(end).read_text(encoding="utf-8") for end in (".out", ".err"))
+def demo(tmp_path, capsys, demo_beside):
+    """Folder, output and messages of `isojax demo`, which .ci/run runs where nothing else is installed."""
+    if demo_beside is not None:
+        ends = (demo_beside.with_suffix(end).read_text(encoding="utf-8") for end in (".out", ".err"))
+        return demo_beside, *ends
     assert main(["demo", "--out", str(tmp_path)]) == 0
     return tmp_path, *capsys.readouterr()
 

@@ -46,7 +46,7 @@ def run(tmp_path_factory):
         found = subprocess.run(
             [sys.executable, *map(str, arguments)],
             cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200"},
+            env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "200", "ISOJAX_UNCHECKED": "1"},
             capture_output=True,
             text=True,
         )

@@ -198,14 +198,15 @@ def _deviation(found: np.ndarray, wanted: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("name", ["instruments", "delay"])
-def test_several_batches_in_threads_give_what_one_gives(monkeypatch, every_core, name):
-    alone, same, _ = _setting(CASES[name])
-    assert len(alone.batches) == 1
+def test_batches_of_one_lane_give_what_wider_ones_give(monkeypatch, every_core, name):
+    case = CASES[name]._replace(segments=4 * CASES[name].segments)
+    alone, same, _ = _setting(case)
+    assert len(alone.batches) == 2
     wanted = information(same, alone), readings(same.model, *same[2:4], alone)
     used = len(alone.segments)
     with monkeypatch.context() as narrow:
-        narrow.setattr(_batch, "NARROWEST", 1)
-        shared, _, _ = _setting(CASES[name])
+        narrow.setattr(_batch, "MOST_LANES", 1)
+        shared, _, _ = _setting(case)
     assert len(shared.batches) == used
     fields = ("stiffness_scale", "states", "state_scales")
     own = same._replace(**{field: getattr(same, field)[..., :used] for field in fields})
@@ -337,12 +338,12 @@ def test_many_columns_at_once_are_those_of_the_exact_derivatives(model):
 def test_columns_of_a_few_lanes_at_a_time_are_those_of_the_exact_derivatives(monkeypatch):
     for module in (_batch, _score_columns):
         monkeypatch.setattr(module, "workers", lambda: 1)
-    # Room for six lanes: of sixteen, the last block holds two again.
-    monkeypatch.setattr(_score_columns, "_ENTRIES", 5e5)
-    segments = (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0), Segment(0, 90, 300, 110))
+    # Room for three lanes: of eight, the last block holds one again.
+    monkeypatch.setattr(_score_columns, "_ENTRIES", 2.6e5)
+    segments = 3 * (Segment(0, 0, 300, 40), Segment(1, 0, 220, 0), Segment(0, 90, 300, 110))
     exact, found = _both_ways(Isolator(800.0, (*SPRING, MaxwellBranch(2e5, 0.04))), segments=segments)
     assert len(found) == 16
-    for lane in range(3):
+    for lane in range(len(segments)):
         assert _deviation(found[lane], exact[lane]) < 3e-4
 
 

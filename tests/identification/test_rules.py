@@ -34,6 +34,7 @@ ACCURACY = {
     "_scatter_mixture": {"LEAST_TAIL"},
     "_score": {"FEWEST_EXCEEDANCES", "NULL_DRAWS"},
     # How records are cut, repeats recognised and spectra read.
+    "_batch": {"MOST_LANES"},
     "_build_problem": {"SAME_RATE"},
     "_dwell_remainder": {"FEWEST_SETTLED_CYCLES", "HARMONICS", "SAMPLES_A_NUMBER"},
     "_force_residual": {"HIGHEST_SHARE"},

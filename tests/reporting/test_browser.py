@@ -6,7 +6,6 @@ import os
 import select
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -114,10 +113,10 @@ def browser(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def report(request):
-    """That of the demo, which .ci/run has written where nothing else is installed; else a smaller one."""
-    if "ISOJAX_DEMO" in os.environ:
-        return Path(os.environ["ISOJAX_DEMO"]) / "report.html"
+def report(request, demo_beside):
+    """That of the demo, which .ci/run makes where nothing else is installed; else a smaller one."""
+    if demo_beside is not None:
+        return demo_beside / "report.html"
     return request.getfixturevalue("written") / "report.html"
 
 

@@ -19,11 +19,11 @@ from ._channels import channel_table, drive_table
 from ._segments import Segment
 from ._whitening import Whitening, find_whitening
 
-NARROWEST, WIDEST = 8, 16
-"""Segments that one scan carries on a CPU, a power of two, so that sets of all sizes share compiled code.
-What a step of more works on leaves the processor's nearest cache; beside other work that makes it slow."""
+MOST_LANES = 16
+"""Segments that one scan carries on a CPU. What a step of more works on leaves the processor's nearest cache;
+beside other work that makes it slow."""
 
-SAMPLES = 256
+SAMPLES_A_TABLE = 256
 """Tables have room for a multiple of so many samples, so that records of most lengths share compiled code."""
 
 
@@ -188,10 +188,10 @@ def prepare(
     sizes = np.array([segment.stop - segment.start for segment in segments])
     length, width = sizes.max(), sizes.size
     if jax.default_backend() == "cpu":
-        # At least two batches, where there is work for two threads.
-        width = min(max(NARROWEST, 1 << (-(-width // 2) - 1).bit_length()), WIDEST)
+        # A power of two, so that sets of all sizes share compiled code; two batches for two threads.
+        width = min(1 << (-(-width // 2) - 1).bit_length(), MOST_LANES)
     if how.is_locked:
-        length = -(-length // SAMPLES) * SAMPLES
+        length = -(-length // SAMPLES_A_TABLE) * SAMPLES_A_TABLE
     else:  # a solver with steps of its own goes through all samples that there are
         width = min(width, sizes.size)
     lanes = -(-sizes.size // width) * width

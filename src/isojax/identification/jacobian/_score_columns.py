@@ -116,14 +116,17 @@ def score_information(
         blocks = -(-lanes // max(1, int(_ENTRIES / (time * max(columns, _LEAST_COLUMNS)))))
         width = -(-lanes // blocks)
         done = []
-        for first in range(0, lanes, width):
+        # Lanes without a segment come last, and hold nothing.
+        used = min(lanes, len(prepared.segments) - part * lanes)
+        for first in range(0, used, width):
             # The last block reaches back, so that all have one shape.
             begin = min(first, lanes - width)
             some: Any = (batch, scale, states, scales)
             if blocks > 1:
                 some = jax.tree_util.tree_map(partial(_some_lanes, begin=begin, width=width), some)
             done.append(_block(layout, prepared, columns, part, *some)[first - begin :])
-        return np.concatenate(done)
+        products = np.concatenate(done)
+        return np.pad(products, ((0, lanes - len(products)), (0, 0), (0, 0)))
 
     with ThreadPoolExecutor(workers()) as pool:
         products = prepared.in_lanes(pool.map(one, range(len(prepared.batches))))
