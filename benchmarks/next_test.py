@@ -159,8 +159,8 @@ def report(rows: list[dict]) -> None:
             )
             line = (
                 f"{name}, {words}, {len(some)} refits: predicted {predicted:.3f}, found {found:.3f}, "
-                f"ratio {found / predicted:.3f}, median of the ratios "
-                f"{np.median([row['found'] / row['predicted'] for row in some]):.2f}"
+                f"ratio {found / predicted:.3f} in the rms and "
+                f"{np.median([row['found'] / row['predicted'] for row in some]):.2f} in the median"
             )
             met = abs(found / predicted - 1.0) <= MARK
             marks.judge(f"{line} (mark 1 +- {MARK}); {some[0]['words']}", met)

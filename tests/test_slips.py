@@ -183,7 +183,7 @@ def test_messages_say_what_to_pass(unchecked):
             ij.find_periodic_orbit(model.replace(k3=wrong), ij.Harmonic(60.0, 5.0))
     with pytest.raises(ValueError, match=r"`fit` must be a fit, .* type Isolator"):
         ij.identification.as_fit(model)
-    with pytest.raises(ValueError, match=r"as in `model.restoring_force\(\(x, v\)\)`, but is of type float"):
+    with pytest.raises(ValueError, match=r"must be a tuple \(x, v\), not of type float"):
         model.restoring_force(1e-3, 0.0)
     with pytest.raises(ValueError, match=r"real numbers, but gave complex ones. Give their moduli"):
         as_numbers("quantity", 1j)

@@ -85,7 +85,7 @@ def test_a_sample_that_fails_is_counted_with_place_and_reason():
     assert silent.reason == "the quantity is not finite"
     assert ij.global_sensitivity(ishigami, CIRCLE, samples=64).reason == ""
     # A finite number of a search that failed is no answer either.
-    with pytest.raises(ValueError, match=r"failed in 64 of 64: .* stopped before it converged"):
+    with pytest.raises(ValueError, match=r"failed in 64 of 64 rows: .* stopped before it converged"):
         ij.global_sensitivity(lambda x: (x["a"], ij.RESULTS.not_converged), CIRCLE, samples=64)
 
 

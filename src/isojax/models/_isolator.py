@@ -141,13 +141,10 @@ class Isolator(eqx.Module):
         return Isolator(changed.mass, changed.elements, changed.excitation)  # refuses a mass of zero
 
     def element(self, name: str) -> AbstractElement | None:
-        """Give the first element of a catalogue name, or None.
+        """Give the first element of a catalogue name, or None if the model lacks the effect.
 
         Args:
             name: catalogue name.
-
-        Returns:
-            The element, or None if the model lacks the effect.
         """
         return next((element for element in self.elements if element.name == name), None)
 
@@ -175,8 +172,6 @@ class Isolator(eqx.Module):
     def at(self, **conditions: Scalar | float) -> "Isolator":
         """Give the isolator at operating conditions: what follows them goes into plain coefficients.
 
-        The laws are followed to any condition, also far from those of the records, which no model knows.
-
         Args:
             **conditions: pressure [Pa] and temperature [K], absolute; every one that a coefficient follows.
 
@@ -184,8 +179,7 @@ class Isolator(eqx.Module):
             The isolator without effects that follow a condition, for orbits, maps and simulation.
 
         Raises:
-            ValueError: if a condition is missing, is not positive, or is far from the reference of a law, as
-                one in another unit is.
+            ValueError: if a condition is missing, is not positive, or far from a law's reference.
 
         Example:
             >>> chamber = ij.elements.PressureStiffness(change=8e5, reference=2e5)
@@ -299,10 +293,7 @@ class Isolator(eqx.Module):
             ValueError: if the state is no tuple.
         """
         if not isinstance(state, tuple | list):
-            raise ValueError(
-                "Argument `state` must be one tuple, as in `model.restoring_force((x, v))`, but is of type "
-                f"{type(state).__name__}."
-            )
+            raise ValueError(f"Argument `state` must be a tuple (x, v), not of type {type(state).__name__}.")
         return sum(law.forces(self.elements, state), start=0.0 * state[0])
 
     def acceleration(self, state: State, at: Instant, law: AbstractLaw = ROUNDED) -> Lanes:
