@@ -203,6 +203,7 @@ def demo_beside() -> Path | None:
         if ended.exists():
             break
         time.sleep(1.0)
+    assert ended.exists(), "`isojax demo` did not end within ten minutes"
     assert ended.read_text().strip() == "0", folder.with_suffix(".err").read_text(encoding="utf-8")
     return folder
 

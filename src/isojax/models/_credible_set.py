@@ -92,7 +92,8 @@ def credible_set(
         curved = ~(np.max(np.abs(ends - np.stack([value - spread, value + spread])), axis=0) <= allowed)
     ends = np.where(held * (1.0 - confidence) >= _DRAWS_BEYOND, ends, np.nan)
     # A quantity that is least at the fit has all its draws on one side.
-    ends = np.stack([np.fmin(ends[0], value), np.fmax(ends[1], value)]) + 0.0 * ends
+    inside = np.where(np.isnan(value), ends, value)
+    ends = np.stack([np.minimum(ends[0], inside[0]), np.maximum(ends[1], inside[1])])
     # Where "none" may be all that is left out, the tail of the numbers is not known more exactly than that.
     reach = coverage_factor(np.where(share < 1.0, tail, wanted)) * error
     straight = np.stack([value - reach, value + reach])

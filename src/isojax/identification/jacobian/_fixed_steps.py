@@ -48,7 +48,7 @@ def _sampler(model: Isolator, sampling: Sampling) -> Callable[..., tuple[Array, 
     return sample
 
 
-def _over_samples(
+def _scan_first(
     body: Callable[[Any, Any], tuple[Any, Any]], begun: Any, tables: Any, count: Array
 ) -> tuple[Any, Any]:
     """Do what `jax.lax.scan` does with the first samples, whose count the compiled code does not depend on.
@@ -118,7 +118,7 @@ def fixed_information(
     silent = jnp.zeros((total + 1, lanes)) if model.splits else None
     begun = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
     tables = (batch.acting, batch.measured, batch.weight)
-    carry, rows = _over_samples(body, begun, tables, batch.count)
+    carry, rows = _scan_first(body, begun, tables, batch.count)
     if sampling.whitening is None or rows is None:
         return carry[2]
     return whitened_products(rows, batch.weight, sampling.whitening)
@@ -137,7 +137,7 @@ def fixed_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Arra
         return (state, after), reading if pending is None else reading + pending
 
     begun = (states, jnp.zeros_like(scale) if model.splits else None)
-    return _over_samples(body, begun, batch.acting, batch.count)[1]
+    return _scan_first(body, begun, batch.acting, batch.count)[1]
 
 
 @quick_jit

@@ -143,24 +143,6 @@ def _force_along(model: Isolator, grid: Float[np.ndarray, " point"], what: str) 
     return model.restoring_force((*pair, *(zero,) * model.internal_states))
 
 
-def force_band(fit: Fit, grid: Float[np.ndarray, " point"], what: Slice) -> Band:
-    """Give the band of the restoring force over displacement at rest, or of the damping force over velocity.
-
-    Args:
-        fit: the fit.
-        grid: displacements [m] or velocities [m/s].
-        what: "stiffness" over displacement, "damping" over velocity.
-
-    Returns:
-        The band of `force` [N].
-
-    Raises:
-        ValueError: if the fit failed or leaves a coefficient undetermined.
-    """
-    errors = coefficient_errors(fit)
-    return find_band(errors, ("force",), lambda model: _force_along(model, grid, what)[None])
-
-
 def band_of(
     fit: Fit, names: tuple[str, ...], curve: Callable[[Isolator], Float[Array, "quantity ..."]]
 ) -> Band | None:
