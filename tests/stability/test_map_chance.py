@@ -52,7 +52,7 @@ def test_the_chance_of_several_orbits_is_that_of_the_scaled_folds(smap):
         # At 4 Hz, beside the cusp, the lens is 0.36 N high, a third of a cell.
         np.testing.assert_allclose(found, expected, atol=0.01)
     assert smap.chance_error < 0.01
-    assert "a chance near a half is off by at most" in str(smap)
+    assert "a chance near a half is off by about" in str(smap)
 
 
 def test_a_chance_that_is_off_says_so():
