@@ -118,3 +118,17 @@ def _legend(figure):
     return [text for legend in figure.legends for text in legend.get_texts()] + [
         text for ax in figure.axes if ax.get_legend() for text in ax.get_legend().get_texts()
     ]
+
+
+def test_on_a_coarse_grid_orbits_near_escape_spoil_no_fold():
+    """Of a softening spring: no table knows the motion up there, but all of it around the folds."""
+    laws = [ij.LinearStiffness(4e4), ij.CubicStiffness(-2e8), ij.LinearDamping(60.0)]
+    softening = ij.Isolator(10.0, laws)
+    frequency, share = 0.8 * (4e3**0.5) / (2.0 * np.pi), 0.05
+    branch = ij.continue_branch(softening, parameter="amplitude", frequency=frequency, start=10.0, stop=120.0)
+    lower, upper = sorted(float(one.amplitude) for one in branch.special_points if one.kind == "fold")
+    found = scaled_map(softening, np.linspace(25.0, 400.0, 14), [frequency, 1.1 * frequency], share, softening)
+    force, several = np.asarray(found.amplitudes), np.asarray(found.probability_coexisting)[:, 0]
+    expected = norm.cdf((force / lower - 1.0) / share) - norm.cdf((force / upper - 1.0) / share)
+    assert np.any((expected > 0.1) & (expected < 0.9))
+    np.testing.assert_allclose(several, expected, atol=0.01)

@@ -13,14 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 from scipy.ndimage import binary_dilation
 from scipy.stats.qmc import Sobol
 
 from ...models import CoefficientErrors, Isolator
-from ..orbit import margin_beside_folds
+from ._orbit_curves import Column, Curves
 from ._sought import Sought
-from ._surface import Surface
 
 if TYPE_CHECKING:
     from ._stability_map import StabilityMap
@@ -33,13 +31,6 @@ _DISPLACEMENTS, _DOUBTFUL = 400, 160
 
 _BELOW, _ABOVE = np.geomspace(0.87, 0.97, 4), np.geomspace(1.01, 1.3, 9)
 """Amplitudes beside the window that are mapped as well, over its least and its largest."""
-
-_FEWEST_ON_CURVE = 6
-"""Orbits at one frequency that make a curve."""
-
-_SAME, _FLAT = 1e-9, 0.2
-"""Difference of log displacement below which two orbits are one; slope of log force over log displacement
-below which the determinant knows it better than a spline."""
 
 _SHARE_OF_DOUBT = 1.0 / (2.0**1.5 * np.pi)
 """Of a normal boundary that is misplaced by a small `d`: the error of the chance at its median,
@@ -119,10 +110,10 @@ def find_chances(
             away = np.zeros(errors.steps)
             away[place] = sign * _REACH
             found.append(find(errors.moved(jnp.asarray(away)), wide))
-    curves = _Curves(found)
+    curves = Curves(found)
     # One draw of the usual length, which no map of one step knows of, tells how good the chances are.
     check = int(np.argmin(np.abs(np.linalg.norm(steps, axis=1) - errors.steps**0.5)))
-    drawn = _Curves([find(errors.moved(jnp.asarray(steps[check])), wide)])
+    drawn = Curves([find(errors.moved(jnp.asarray(steps[check])), wide)])
     maps = [smap for smap, _ in found]
     weights = _weights(steps)
     forces, still = np.log(amplitudes), np.log(np.asarray(maps[0].response))[:, inner]
@@ -166,108 +157,8 @@ def _weights(steps: Float[np.ndarray, "draw step"]) -> Float[np.ndarray, "draw m
     )
 
 
-class _Column(NamedTuple):
-    """The orbits of a model at one frequency, over the logarithm of a displacement.
-
-    Attributes:
-        low: least displacement that is known.
-        high: largest one.
-        force: logarithm of the force that an orbit takes; where it falls the orbit is unstable.
-        margin: of each orbit, from any other loss of stability.
-        response: logarithm of half the peak-to-peak displacement.
-    """
-
-    low: float
-    high: float
-    force: Callable[[np.ndarray], np.ndarray]
-    margin: Callable[[np.ndarray], np.ndarray]
-    response: Callable[[np.ndarray], np.ndarray]
-
-
-def _read_off(surface: Surface, column: int) -> _Column:
-    """Give the orbits of one frequency that a surface holds."""
-
-    def force(grid: np.ndarray) -> np.ndarray:
-        drive = surface.at(column, grid)[:2]
-        return 0.5 * np.log(drive[0] ** 2 + drive[1] ** 2)
-
-    def margin(grid: np.ndarray) -> np.ndarray:
-        half_trace, determinant = surface.at(column, grid)[-3:-1]
-        # The roots of x^2 - trace x + determinant lie within the unit circle where these two are positive,
-        # and a third that vanishes at the folds.
-        return np.minimum(1.0 + 2.0 * half_trace + determinant, 1.0 - determinant)
-
-    def response(grid: np.ndarray) -> np.ndarray:
-        return grid + np.log(surface.at(column, grid)[-1])
-
-    return _Column(surface.breaks[0], surface.breaks[-1], force, margin, response)
-
-
-class _Curves:
-    """The orbits of several maps at each frequency: of their surfaces where these know all of them."""
-
-    def __init__(self, found: list[tuple["StabilityMap", Sought]]):
-        """Take maps with their surfaces."""
-        self.surfaces = [sought.surface for _, sought in found]
-        self.known = np.all([sought.known_columns for _, sought in found], axis=0)
-        self.orbits = [] if self.known.all() else [_MapOrbits(one) for one, _ in found]
-
-    def at(self, column: int) -> list[_Column] | None:
-        """Give those of one frequency, map by map; None where one map knows too few."""
-        if self.known[column]:
-            return [_read_off(surface, column) for surface in self.surfaces]
-        known = [curve for one in self.orbits if (curve := one.at(column)) is not None]
-        return known if len(known) == len(self.orbits) else None
-
-
-class _MapOrbits:
-    """The orbits of a map: displacement, force and distance from instability."""
-
-    def __init__(self, smap: "StabilityMap"):
-        """Read them off."""
-        self.response = np.log(np.asarray(smap.response))
-        roots = np.asarray(smap.multipliers)
-        self.fold = np.prod(1.0 - roots, axis=-1).real
-        self.others = margin_beside_folds(roots)
-        self.stable = np.asarray(smap.spectral_radius) < 1.0
-        self.force = np.broadcast_to(np.log(np.asarray(smap.amplitudes))[:, None], self.stable.shape)
-
-    def at(self, column: int) -> _Column | None:
-        """Give the orbits of one frequency; None where too few are known."""
-        x, y, fold, others, stable = (
-            one[..., column].ravel()
-            for one in (self.response, self.force, self.fold, self.others, self.stable)
-        )
-        good = np.isfinite(x) & np.isfinite(fold)
-        order = np.flatnonzero(good)[np.argsort(x[good], kind="stable")]
-        order = order[np.diff(x[order], prepend=-np.inf) > _SAME]
-        if order.size < _FEWEST_ON_CURVE:
-            return None
-        x, y, fold, others, stable = (one[order] for one in (x, y, fold, others, stable))
-        rise = CubicSpline(x, y).derivative()(x)
-        clear = np.abs(rise) > _FLAT
-        if np.count_nonzero(clear) < _FEWEST_ON_CURVE:
-            return None
-        # Both vanish at a fold, their ratio does not. Near one, where the orbits of a map lie far apart, the
-        # determinant therefore says how the force rises.
-        known = PchipInterpolator(x[clear], fold[clear] / rise[clear])
-        ratio = known(np.clip(x, *x[clear][[0, -1]]))
-        # Beyond the clear ones nothing interpolates it: where friction lets a mass go the force is flat, too,
-        # over a small displacement, and no fold.
-        between = (x > x[clear][0]) & (x < x[clear][-1])
-        rise = np.where(clear | between, rise, PchipInterpolator(x, y).derivative()(x))
-        known_better = ~clear & between & (ratio != 0.0)
-        rise = np.where(known_better, fold / np.where(ratio == 0.0, 1.0, ratio), rise)
-        # What is unstable though nothing says so, such as where two multipliers have left through one point,
-        # counts as it is.
-        margin = np.minimum(ratio, others)
-        margin = np.where(stable | (rise < 0.0), margin, -np.abs(margin))
-        force = CubicHermiteSpline(x, y, rise)
-        return _Column(x[0], x[-1], force, lambda grid: np.interp(grid, x, margin), lambda grid: grid)
-
-
 def _in_doubt(
-    curves: list[_Column], grid: Float[np.ndarray, " displacement"]
+    curves: list[Column], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, " doubtful"]:
     """Give log displacements that a draw may fold or destabilise; elsewhere all maps are far from it."""
     force, margin = _tables(curves, grid)
@@ -284,7 +175,7 @@ def _in_doubt(
 
 
 def _tables(
-    curves: list[_Column], grid: Float[np.ndarray, " displacement"]
+    curves: list[Column], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, "2 map displacement"]:
     """Give log force and margin of all maps over common displacements."""
     return np.array([[one.force(grid) for one in curves], [one.margin(grid) for one in curves]])

@@ -72,15 +72,20 @@ class Sought(NamedTuple):
         return any(group.name == "read" for group in self.groups)
 
     @property
+    def known_parts(self) -> Bool[np.ndarray, "frequency part"]:
+        """Whether the surface says well enough of the orbits of a part how probable they are."""
+        column, part = np.indices(self.surface.error.shape)
+        distance = self.surface.distance(column.ravel(), part.ravel()).reshape(column.shape)
+        enough = np.maximum(_KNOWN_TO, _KNOWN_SHARE * distance)
+        # Where the size of a motion cannot be read off it has several maxima, and as many places there.
+        return self.tabled & self.surface.sized & (self.surface.error <= enough)
+
+    @property
     def known_columns(self) -> Bool[np.ndarray, " frequency"]:
-        """Whether the surface says well enough of every orbit of a frequency how probable it is."""
-        columns = np.full(len(self.surface.frequencies), self.tabled)
+        """Whether the surface says so of every orbit of a frequency."""
+        columns, known = np.full(len(self.surface.frequencies), self.tabled), self.known_parts
         for _, _, candidates in self.groups:
-            column, part = candidates.frequency, candidates.part
-            error = self.surface.error[column, part]
-            enough = np.maximum(_KNOWN_TO, _KNOWN_SHARE * self.surface.distance(column, part))
-            # Where the size of a motion cannot be read off it has several maxima, and as many places there.
-            columns[column[(error > enough) | ~self.surface.sized[column, part]]] = False
+            columns[candidates.frequency[~known[candidates.frequency, candidates.part]]] = False
         return columns
 
     def with_steps(self, steps: int) -> "Sought":
