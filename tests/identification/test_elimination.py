@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from isojax.identification.fitting._elimination import Nuisances, Spread, eliminate, step_nuisances
+from isojax.identification.fitting._elimination import (
+    Nuisances,
+    Spread,
+    eliminate,
+    promised_misfits,
+    step_nuisances,
+)
 from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT
 
 NOISE, SPREAD, WITHIN = (0.3, 0.8), 2e-3, 1e-3
@@ -128,6 +134,43 @@ def test_a_step_of_coefficients_and_nuisances_is_that_of_dense_least_squares(set
     own = solution[end:] if nuisances.spread.segments else np.zeros(USED)
     np.testing.assert_allclose(segments, own, rtol=1e-8, atol=1e-10)
     np.testing.assert_array_equal(moved.states[USED:], nuisances.states[USED:])
+
+
+def test_each_segment_is_promised_what_it_leaves_after_a_step_where_all_is_linear(setting):
+    reduced, nuisances, has_scale, *_ = setting
+    blocks, step = _blocks(has_scale), np.array([0.3, -1.2, 0.7])
+    moved = step_nuisances(reduced, OWNER, nuisances, step)
+    expected = []
+    for lane in range(USED):
+        along = list(step)
+        if has_scale:
+            own = (moved.stiffness - nuisances.stiffness)[OWNER[lane]]
+            along.append(own + moved.segments[lane] - nuisances.segments[lane])
+        along += list(moved.states[lane] - nuisances.states[lane])
+        left = (blocks[lane, :, -1] - blocks[lane, :, :-1] @ along) / NOISE[OWNER[lane]]
+        expected.append(left @ left + moved.states[lane] @ moved.states[lane])
+    found = promised_misfits(reduced, OWNER, nuisances, moved, step)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_states_that_are_held_fast_are_as_good_as_known():
+    rng = np.random.default_rng(8)
+    nuisances, blocks = _nuisances(rng), _blocks(True)
+    matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)[:USED]
+    held = np.array([0.0, 1e12, 0.0, 0.0, 0.0, 0.0])
+    found = eliminate(matrices, NOISE, OWNER[:USED], COLUMNS, nuisances._replace(held=held))
+    blocks[1, :, COLUMNS + 1 : -1] = 0.0
+    rows, right, owner = _dense(blocks, True, nuisances)
+    known = COLUMNS + RECORDS + STATES + np.arange(STATES)
+    rows[:, known] = 0.0
+    table = np.concatenate([rows[:, :COLUMNS], right[:, None]], axis=1)
+    for record in range(RECORDS):
+        part, own = rows[owner == record][:, COLUMNS:], table[owner == record]
+        left = own - part @ np.linalg.lstsq(part, own, rcond=None)[0]
+        np.testing.assert_allclose(found.by_record[record], left.T @ left, rtol=1e-9, atol=1e-9)
+    moved = step_nuisances(found, OWNER, nuisances._replace(held=held), np.ones(COLUMNS))
+    np.testing.assert_allclose(moved.states[1], nuisances.states[1], atol=1e-10)
+    assert np.all(np.abs(moved.states[0] - nuisances.states[0]) > 1e-3)
 
 
 def test_a_column_that_is_not_finite_leaves_the_steps_of_the_others_alone():

@@ -143,7 +143,8 @@ def _told(
     apparent += noise * draw.standard_normal(apparent.size)
     information = (STIFFNESS_SCALE_UNIT / (assumed * noise)) ** 2
     left = (1.0 - known) * apparent / STIFFNESS_SCALE_UNIT
-    by_segment = np.stack([information, information * left], axis=1)
+    by_segment = np.zeros((information.size, 2, 2))
+    by_segment[:, 0] = np.stack([information, information * left], axis=1)
     lanes = len(segments)
     nothing = np.zeros((lanes, 0))
     reduced = Reduced(
@@ -156,6 +157,7 @@ def _told(
         np.zeros((0, 2)),
         np.zeros(0),
         by_segment,
+        np.zeros(lanes),
     )
     own = known * apparent / STIFFNESS_SCALE_UNIT
     nuisances = Nuisances(nothing, np.zeros(2), own, Spread(1e-2))

@@ -19,6 +19,13 @@ def damping(decay):
     return ij.profile(decay.fit, "c1")
 
 
+@pytest.fixture(scope="module")
+def beside_friction():
+    campaign = ij.read_campaign(campaign_folder())
+    start = ij.classical_guess(campaign).model.with_elements(ij.CoulombFriction(25.0, 1.6e-4))
+    return ij.fit(start, campaign)
+
+
 def test_a_curved_interval_is_that_of_a_scan(decay, damping):
     lowest = minimize_scalar(decay.lowest, bounds=(100.0, 1500.0), method="bounded")
     # Spring, damper and the two states of the start are fitted.
@@ -65,6 +72,19 @@ def test_the_ends_are_those_of_uncertainty_at_any_confidence():
         factor = (band[1] - found.value) / found.standard_error
         assert found.coverage_factor == pytest.approx(factor, rel=1e-9)
         assert np.all(np.abs(np.interp(found.interval, found.values, found.root)) > 0.9 * factor)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["Fc", "k3"])
+def test_dry_friction_does_not_keep_it_from_an_end(beside_friction, name):
+    """Initial states beside a kink would take chi2 up and down by more than the ends are away."""
+    found = ij.profile(beside_friction, name)
+    assert found.reasons == ()
+    assert np.all(np.diff(found.root) > 0.0)
+    # So many records and samples make the model all but linear in its coefficients.
+    np.testing.assert_allclose(found.interval, found.symmetric, atol=0.1 * found.standard_error)
+    truth = {"Fc": 30.0, "k3": 1.5e11}[name]
+    assert found.interval[0] < truth < found.interval[1]
 
 
 def walk(root, room=np.inf, fails_beyond=np.inf):

@@ -127,7 +127,9 @@ def test_on_a_coarse_grid_orbits_near_escape_spoil_no_fold():
     frequency, share = 0.8 * (4e3**0.5) / (2.0 * np.pi), 0.05
     branch = ij.continue_branch(softening, parameter="amplitude", frequency=frequency, start=10.0, stop=120.0)
     lower, upper = sorted(float(one.amplitude) for one in branch.special_points if one.kind == "fold")
-    found = scaled_map(softening, np.linspace(25.0, 400.0, 14), [frequency, 1.1 * frequency], share, softening)
+    found = scaled_map(
+        softening, np.linspace(25.0, 400.0, 14), [frequency, 1.1 * frequency], share, softening
+    )
     force, several = np.asarray(found.amplitudes), np.asarray(found.probability_coexisting)[:, 0]
     expected = norm.cdf((force / lower - 1.0) / share) - norm.cdf((force / upper - 1.0) / share)
     assert np.any((expected > 0.1) & (expected < 0.9))

@@ -11,7 +11,7 @@ from ..._parameters import ParameterSpec, list_parameters, replace_parameters, t
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
 from ...models import Isolator
-from ._elimination import Nuisances, step_nuisances
+from ._elimination import Nuisances, promised_misfits, step_nuisances
 from ._problem import Point, one_hot
 from ._search import Search
 from ._simulator import Simulator
@@ -28,6 +28,12 @@ MOST_REFUSALS = 10
 
 DOUBTFUL = 5
 """Refused steps in a row after which the nuisances of the best point are asked to keep what they promised."""
+
+KEPT = 0.25
+"""Share of its promised decrease that a segment must attain near the solution, else its states are held."""
+
+HOLDS = 16.0
+"""Weight of the first hold of the states of a segment, and by how much each further one is heavier."""
 
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
@@ -222,6 +228,13 @@ def descend(
             result = RESULTS.successful
             break
         owner = simulator.prepared(best.model, len(best.model.elements)).record
+        if model.splits and not accepted and point.is_finite and decrement < STALLED * best.chi2:
+            step = np.asarray(trial - best_free)
+            held = _held_where_promises_fail(best, point, owner, step, tolerance * max(1.0, chi2))
+            if held is not None:
+                search.progress("initial states near a kink are held back")
+                trial, trial_nuisances, best, state, refused = best_free, held, None, None, 0
+                continue
         if refused == DOUBTFUL and evaluations < search.max_steps - 2:
             slopes = physical(best_free)[1]
             settled = _with_implied_nuisances(simulator, best, places, slopes, owner)
@@ -243,6 +256,35 @@ def descend(
         trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
     assert best is not None
     return Descent(_in_physical_units(best, physical(best_free)[1]), result, evaluations)
+
+
+def _held_where_promises_fail(
+    best: Point,
+    point: Point,
+    owner: Int[np.ndarray, " lanes"],
+    step: Float[np.ndarray, " column"],
+    least: float,
+) -> Nuisances | None:
+    """Give the nuisances of a point, the states held whose linear step failed; None where no such step did.
+
+    Initial states from which a mass may stick or slide, touch or not, have no derivative that serves a whole
+    step. Without a hold chi2 would be now lower, now higher than any motion attains, by the side of the kink
+    on which it is asked, and a search would be refused where it ends.
+    """
+    if not best.reduced.by_segment.size:
+        return None
+    old = best.nuisances
+    promised = promised_misfits(best.reduced, owner, old, point.nuisances, step)
+    hoped, attained = best.reduced.misfits - promised, best.reduced.misfits - point.reduced.misfits
+    failed = (attained < KEPT * hoped) & (hoped - attained > least)
+    if not failed.any():
+        return None
+    held = np.zeros(owner.size) if old.held is None else old.held.copy()
+    lanes = np.flatnonzero(failed)
+    held[lanes] = np.maximum(HOLDS * held[lanes], HOLDS)
+    states, better = old.states.copy(), lanes[attained[lanes] > 0.0]
+    states[better] = point.nuisances.states[better]
+    return old._replace(states=states, held=held)
 
 
 def _with_implied_nuisances(

@@ -15,6 +15,9 @@ from ..._show import shown
 from ..jacobian import STIFFNESS_SCALE_UNIT
 from ._covariance import SMALLEST_EIGENVALUE
 
+_FAST = 1e12
+"""Weight of states that stay where they are."""
+
 
 @shown
 class Spread(NamedTuple):
@@ -39,16 +42,23 @@ class Nuisances(NamedTuple):
         stiffness: deviation of each record's linear stiffness [units of `STIFFNESS_SCALE_UNIT`].
         segments: further deviation of each segment's [the same units].
         spread: standard deviations of the priors of both.
+        held: weight by which each segment's states are held where they stand, over what the segment tells of
+            them: where a law has kinks, a whole linear step would not keep what it promises. None: nowhere.
     """
 
     states: Float[np.ndarray, "lanes state"]
     stiffness: Float[np.ndarray, " record"]
     segments: Float[np.ndarray, " lanes"]
     spread: Spread
+    held: Float[np.ndarray, " lanes"] | None = None
 
     def afresh(self) -> "Nuisances":
         """Give what is known of the records alone: other segments or states are to be found anew."""
-        return self._replace(states=np.zeros((0, 0)), segments=np.zeros(0))
+        return self._replace(states=np.zeros((0, 0)), segments=np.zeros(0), held=None)
+
+    def held_fast(self) -> "Nuisances":
+        """Give the same with initial states that stay where they are: chi2 is then smooth beside kinks."""
+        return self._replace(held=np.full(self.segments.size, _FAST))
 
     def factor(self, owner: Int[np.ndarray, " lanes"]) -> Float[np.ndarray, " lanes"]:
         """Give the factor on the linear stiffness of each lane.
@@ -79,8 +89,9 @@ class Reduced(NamedTuple):
             stiffness scale].
         segments_map: the same of the segments' own stiffness; no rows where it does not scatter.
         segments_variance: of each, given all else [relative stiffness squared].
-        by_segment: information of each segment on its own stiffness scale after its states, and the score
-            [units of `STIFFNESS_SCALE_UNIT`]; before any prior.
+        by_segment: the same as `by_record`, of each segment after its states alone; before the residual its
+            own stiffness scale, where the model has one [units of `STIFFNESS_SCALE_UNIT`], before any prior.
+        misfits: squared residual of each segment where its states stand, with their prior; whitened.
     """
 
     by_record: Float[np.ndarray, "record column column"]
@@ -91,7 +102,8 @@ class Reduced(NamedTuple):
     states_map: Float[np.ndarray, "lanes state column2"]
     segments_map: Float[np.ndarray, "segment column3"]
     segments_variance: Float[np.ndarray, " segment"]
-    by_segment: Float[np.ndarray, "lanes 2"]
+    by_segment: Float[np.ndarray, "lanes column4 column4"]
+    misfits: Float[np.ndarray, " lanes"]
 
     @property
     def matrix(self) -> Float[np.ndarray, "column column"]:
@@ -188,14 +200,15 @@ def eliminate(
     heads = None if heads is None else heads / power
     offset, spread = nuisances.states[: owner.size], nuisances.spread
     has_scale = matrices.shape[1] > columns + offset.shape[1] + 1
-    left, states_map, taken = _without_states(matrices, heads, columns + int(has_scale), offset)
+    misfits = matrices[:, -1, -1] + np.sum(offset**2, axis=1)
+    held = np.zeros(owner.size) if nuisances.held is None else nuisances.held[: owner.size]
+    left, states_map, taken = _without_states(matrices, heads, columns + int(has_scale), offset, held)
     eliminated = np.zeros(nuisances.stiffness.size)
     np.add.at(eliminated, owner, taken)
     sizes, before = (np.diagonal(one, axis1=1, axis2=2).sum(axis=0)[:columns] for one in (left, matrices))
     # What is left of a column that the states take whole is rounding.
     raw = np.maximum(sizes, SMALLEST_EIGENVALUE * before)
-    by_segment = left[:, columns, [columns, -1]] if has_scale else np.zeros((owner.size, 2))
-    segments_map, segments_variance = np.zeros((0, left.shape[1])), np.zeros(0)
+    by_segment, segments_map, segments_variance = left, np.zeros((0, left.shape[1])), np.zeros(0)
     if has_scale and spread.segments > 0.0:
         own = nuisances.segments[: owner.size]
         left, segments_map, segments_variance, taken = _without_scale(left, columns, own, spread.segments)
@@ -220,6 +233,7 @@ def eliminate(
         segments_map,
         segments_variance,
         by_segment,
+        misfits,
     )
 
 
@@ -228,6 +242,7 @@ def _without_states(
     heads: Float[np.ndarray, "segment column column"] | None,
     shared: int,
     offset: Float[np.ndarray, "segment state"],
+    held: Float[np.ndarray, " segment"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Give the matrices without the initial states, the map of their steps, and the freedom they took."""
     segments, states = offset.shape
@@ -236,6 +251,7 @@ def _without_states(
     # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
     source = matrices if heads is None else heads
     inner = source[:, drop[:, None], drop] + np.eye(states)
+    inner[:, range(states), range(states)] *= 1.0 + held[:, None]
     cross = source[:, drop[:, None], keep].copy()
     cross[:, :, -1] -= offset
     try:
@@ -306,4 +322,34 @@ def step_nuisances(
         coefficients = coefficients + reduced.states_map[:, :, step.size] * factor_step[:, None]
     states = nuisances.states.copy()
     states[:used] += reduced.states_map[:, :, -1] - coefficients
-    return Nuisances(states, nuisances.stiffness + stiffness_step, segments, nuisances.spread)
+    return nuisances._replace(
+        states=states, stiffness=nuisances.stiffness + stiffness_step, segments=segments
+    )
+
+
+def promised_misfits(
+    reduced: Reduced,
+    owner: Int[np.ndarray, " lanes"],
+    nuisances: Nuisances,
+    moved: Nuisances,
+    step: Float[np.ndarray, " column"],
+) -> Float[np.ndarray, " segment"]:
+    """Give what a step was to leave of the squared residual of each segment.
+
+    Args:
+        reduced: the equations before the step.
+        owner: record of each lane.
+        nuisances: where they stood.
+        moved: where they stand after it, by `step_nuisances`.
+        step: step of the coefficients, in the units of their columns.
+
+    Returns:
+        Squared residuals with the prior of the states; whitened.
+    """
+    used = reduced.misfits.size
+    scales = (moved.stiffness - nuisances.stiffness)[owner] + moved.segments - nuisances.segments
+    along = np.ones((used, reduced.by_segment.shape[1]))
+    along[:, : step.size] = -step
+    if along.shape[1] == step.size + 2:
+        along[:, step.size] = -scales[:used]
+    return np.einsum("lc,lcd,ld->l", along, reduced.by_segment, along)

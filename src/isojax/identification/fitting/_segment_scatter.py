@@ -80,7 +80,8 @@ def _pairs(records: tuple[Record, ...], segments: tuple[Segment, ...], point: Po
             if group.index(one) % 2:
                 continue
             lanes = np.array(_matched(records, held[one], held[other]), dtype=int).reshape(-1, 2)
-            information, score = point.reduced.by_segment[lanes].transpose(2, 0, 1)
+            own = point.reduced.by_segment[lanes]
+            information, score = own[..., -2, -2], own[..., -2, -1]
             seen = np.all(information > 0.0, axis=1)
             if np.count_nonzero(seen) > 1:
                 found = score[seen] / information[seen] + point.nuisances.segments[lanes[seen]]
