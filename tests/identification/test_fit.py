@@ -271,6 +271,7 @@ def test_a_start_that_grows_without_overflow_gives_no_number_either(linear):
 
 def test_a_search_cut_short_says_so_and_gives_no_error_bar(linear):
     found = fit(START, linear, integrator=ONE_STEP, max_steps=1)
+    assert np.all(np.isnan([found.stats.chi2, found.stats.aic, found.stats.bic]))
     assert found.result == RESULTS.not_converged
     assert np.isnan(found.errors["fit"]).all()
     assert all(np.isnan(error) for error in found.standard_errors.values())

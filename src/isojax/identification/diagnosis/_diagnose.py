@@ -282,4 +282,4 @@ def _verdict_of_finding(
 
 
 def _ratio(fit: Fit) -> float:
-    return fit.stats.chi2 / fit.stats.dof
+    return fit.estimate.chi2 / fit.estimate.dof  # also of a fit that failed

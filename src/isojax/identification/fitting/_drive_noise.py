@@ -46,7 +46,8 @@ def drive_noise(fit: Fit, rules: Rules = Rules()) -> DriveNoise | None:
     Source: Pintelon & Schoukens 2012, System Identification: A Frequency Domain Approach, sec. 9.2 (noise of
     both channels in the residual).
     """
-    if fit.noise.method not in ("cycle_scatter", "periods") or fit.stats.chi2 / fit.stats.dof <= rules.good:
+    ratio = fit.estimate.chi2 / fit.estimate.dof
+    if fit.noise.method not in ("cycle_scatter", "periods") or ratio <= rules.good:
         return None
     runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
     if not all(np.all(np.isfinite(run.residual)) for run in runs):
@@ -55,7 +56,7 @@ def drive_noise(fit: Fit, rules: Rules = Rules()) -> DriveNoise | None:
     if seen.method != fit.noise.method:
         return None
     own = np.array(fit.estimate.problem.noise)
-    if fit.stats.chi2 / fit.stats.dof > rules.good * np.mean((np.array(seen.whites) / own) ** 2):
+    if ratio > rules.good * np.mean((np.array(seen.whites) / own) ** 2):
         return None
     drive = _noise_of(fit, tuple(dataclasses.replace(run.record, output=run.record.input) for run in runs))
     return DriveNoise(drive.sigma, seen.sigma, fit.noise.sigma)

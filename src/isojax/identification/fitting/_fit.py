@@ -1,6 +1,7 @@
 """The fit: coefficients straight from the time histories of all records together."""
 
 import dataclasses
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,9 @@ from ._noise_left import noise_left
 from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
 from ._simulator import Simulator
+
+_OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter")
+"""Statistics that a search which failed does not have."""
 
 
 @blas_in_one_thread
@@ -271,6 +275,8 @@ def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseE
         found.problem.step_error,
         found.next_stiffness_scatter,
     )
+    if not is_successful(found.result):
+        stats = stats._replace(**dict.fromkeys(_OF_A_SOLUTION, math.nan))
     return Fit(
         found.model,
         start,

@@ -234,9 +234,6 @@ def _model(fit: Fit) -> list[str]:
 
 def _statistics(fit: Fit) -> list[str]:
     stats, unit = fit.stats, OUTPUT_UNITS[fit.campaign.output.quantity]
-    if not is_successful(fit.result):
-        nothing = dict.fromkeys(("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter"), math.nan)
-        stats = stats._replace(**nothing)
     scatter = f"{100 * stats.stiffness_scatter:.2g} % between records"
     if stats.segment_scatter > 0.0:
         scatter += f", {100 * stats.segment_scatter:.2g} % within them"

@@ -23,7 +23,7 @@ FORMAT = "isojax-fit"
 
 @shown
 class Statistics(NamedTuple):
-    """Counts and criteria of a fit.
+    """Counts and criteria of a fit; NaN, but for the counts, where it failed.
 
     Attributes:
         samples: samples that count, filtered noise counted by its independent samples.
