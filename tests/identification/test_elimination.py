@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from isojax import paper
+from isojax.identification.fitting._descent import _held_where_promises_fail
 from isojax.identification.fitting._elimination import (
     Nuisances,
     Spread,
@@ -10,6 +12,7 @@ from isojax.identification.fitting._elimination import (
     promised_misfits,
     step_nuisances,
 )
+from isojax.identification.fitting._problem import Point
 from isojax.identification.jacobian._unknowns import STIFFNESS_SCALE_UNIT
 
 NOISE, SPREAD, WITHIN = (0.3, 0.8), 2e-3, 1e-3
@@ -153,11 +156,35 @@ def test_each_segment_is_promised_what_it_leaves_after_a_step_where_all_is_linea
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
+def test_only_a_segment_that_breaks_its_promise_is_held_and_once(setting):
+    reduced, nuisances, *_ = setting
+    still = np.zeros(COLUMNS)
+    moved = step_nuisances(reduced, OWNER, nuisances, still)
+    promised = promised_misfits(reduced, OWNER, nuisances, moved, still)
+
+    def held(misfits, known=None):
+        before = Point(paper.y_direction(), nuisances._replace(held=known), reduced, np.ones(RECORDS))
+        after = before._replace(nuisances=moved, reduced=reduced._replace(misfits=misfits))
+        return _held_where_promises_fail(before, after, OWNER, still, 1e-2)
+
+    assert held(promised) is None
+    lane = int(np.argmax(reduced.misfits - promised))
+    worse, better = promised.copy(), promised.copy()
+    worse[lane] = reduced.misfits[lane] + 5.0
+    better[lane] = 0.9 * reduced.misfits[lane] + 0.1 * promised[lane]
+    for misfits, states in ((worse, nuisances.states), (better, moved.states)):
+        found = held(misfits)
+        assert np.flatnonzero(found.held).tolist() == [lane]
+        np.testing.assert_array_equal(found.states[lane], states[lane])
+        np.testing.assert_array_equal(np.delete(found.states, lane, 0), np.delete(nuisances.states, lane, 0))
+        assert held(misfits, found.held) is None
+
+
 def test_states_that_are_held_fast_are_as_good_as_known():
     rng = np.random.default_rng(8)
     nuisances, blocks = _nuisances(rng), _blocks(True)
     matrices = np.einsum("lsc,lsd->lcd", blocks, blocks)[:USED]
-    held = np.array([0.0, 1e12, 0.0, 0.0, 0.0, 0.0])
+    held = np.arange(OWNER.size) == 1
     found = eliminate(matrices, NOISE, OWNER[:USED], COLUMNS, nuisances._replace(held=held))
     blocks[1, :, COLUMNS + 1 : -1] = 0.0
     rows, right, owner = _dense(blocks, True, nuisances)

@@ -19,7 +19,7 @@ from isojax.elements import (
     MaxwellBranch,
 )
 from isojax.excitations import Sampled
-from isojax.identification import fit, scales
+from isojax.identification import fit, load_fit, scales
 from isojax.identification.fitting._build_problem import build_problem
 from isojax.identification.fitting._estimate import estimate
 from isojax.identification.fitting._fit import simulator_for
@@ -269,9 +269,12 @@ def test_a_start_that_grows_without_overflow_gives_no_number_either(linear):
     assert np.isnan(found.errors["fit"]).all()
 
 
-def test_a_search_cut_short_says_so_and_gives_no_error_bar(linear):
+def test_a_search_cut_short_says_so_and_gives_no_error_bar(linear, tmp_path):
     found = fit(START, linear, integrator=ONE_STEP, max_steps=1)
-    assert np.all(np.isnan([found.stats.chi2, found.stats.aic, found.stats.bic]))
+    stats = found.stats
+    assert np.all(np.isnan([stats.chi2, stats.aic, stats.bic, stats.stiffness_scatter]))
+    found.save(tmp_path / "fit.json")
+    assert np.isnan(load_fit(tmp_path / "fit.json").stats.chi2)
     assert found.result == RESULTS.not_converged
     assert np.isnan(found.errors["fit"]).all()
     assert all(np.isnan(error) for error in found.standard_errors.values())

@@ -150,6 +150,8 @@ def test_a_map_with_friction_holds_the_orbits_of_the_rig(monkeypatch):
     np.testing.assert_array_equal(
         smap.result == RESULTS.sticks, [[True, True], [False, False], [False, False]]
     )
+    assert "2 in which dry friction holds the mass, 0 without any" in " ".join(repr(smap).split())
+    assert "|hh" in repr(smap)
     for row, column in [(1, 0), (1, 1), (2, 0), (2, 1)]:
         exact = rig_orbit(plant, forces[row], band[column], y0[row, column])
         error = multiplier_error(np.asarray(smap.multipliers)[row, column], exact.multipliers)

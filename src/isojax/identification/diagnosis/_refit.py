@@ -180,9 +180,8 @@ def refit_to_convergence(found: Estimate, search: Search) -> Estimate:
     """Take a rough refit to the end of its search, with the scatter that repeats show beside its law."""
     search.progress("the finding, fitted to the end")
     again = estimate(found.simulator, found.model, found.places, search, found.point.nuisances, anew=True)
-    # With another scatter, or states that are held, another sum is made least.
-    old, new = found.point.nuisances, again.point.nuisances
-    comparable = new.spread == old.spread and new.held is None
+    # With another scatter another sum is made least.
+    comparable = again.point.nuisances.spread == found.point.nuisances.spread
     better = again.chi2 <= found.chi2 or not comparable
     return again if again.result == RESULTS.successful and better else found
 

@@ -32,9 +32,6 @@ DOUBTFUL = 5
 KEPT = 0.25
 """Share of its promised decrease that a segment must attain near the solution, else its states are held."""
 
-HOLDS = 16.0
-"""Weight of the first hold of the states of a segment, and by how much each further one is heavier."""
-
 IDLE = 3
 """Accepted steps that together must gain what a step must."""
 
@@ -231,9 +228,9 @@ def descend(
         if model.splits and not accepted and point.is_finite and decrement < STALLED * best.chi2:
             step = np.asarray(trial - best_free)
             held = _held_where_promises_fail(best, point, owner, step, tolerance * max(1.0, chi2))
-            if held is not None:
-                search.progress("initial states near a kink are held back")
-                trial, trial_nuisances, best, state, refused = best_free, held, None, None, 0
+            if held is not None and evaluations < search.max_steps:
+                search.progress("initial states beside a kink are held")
+                trial, trial_nuisances, best, state, refused, levels = best_free, held, None, None, 0, []
                 continue
         if refused == DOUBTFUL and evaluations < search.max_steps - 2:
             slopes = physical(best_free)[1]
@@ -255,7 +252,12 @@ def descend(
         trial = state.y_eval * unit
         trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
     assert best is not None
-    return Descent(_in_physical_units(best, physical(best_free)[1]), result, evaluations)
+    slopes = physical(best_free)[1]
+    if best.nuisances.held is not nuisances.held:
+        # What a search held for its own sake is neither known nor left out of the errors. Nothing moved.
+        free_again = best.nuisances._replace(held=nuisances.held)
+        best = simulator.evaluate(best.model, one_hot(best.model, places, slopes), free_again)
+    return Descent(_in_physical_units(best, slopes), result, evaluations)
 
 
 def _held_where_promises_fail(
@@ -265,25 +267,21 @@ def _held_where_promises_fail(
     step: Float[np.ndarray, " column"],
     least: float,
 ) -> Nuisances | None:
-    """Give the nuisances of a point, the states held whose linear step failed; None where no such step did.
+    """Give the nuisances of a point with more states held: of segments whose linear step failed; else None.
 
     Initial states from which a mass may stick or slide, touch or not, have no derivative that serves a whole
-    step. Without a hold chi2 would be now lower, now higher than any motion attains, by the side of the kink
-    on which it is asked, and a search would be refused where it ends.
+    step. Each new point would promise another chi2 that none attains, and a search be refused where it ends.
     """
-    if not best.reduced.by_segment.size:
-        return None
-    old = best.nuisances
+    used, old = best.reduced.misfits.size, best.nuisances
+    held = np.zeros(owner.size, bool) if old.held is None else old.held.copy()
     promised = promised_misfits(best.reduced, owner, old, point.nuisances, step)
     hoped, attained = best.reduced.misfits - promised, best.reduced.misfits - point.reduced.misfits
-    failed = (attained < KEPT * hoped) & (hoped - attained > least)
-    if not failed.any():
+    failed = np.flatnonzero((attained < KEPT * hoped) & (hoped - attained > least) & ~held[:used])
+    if not failed.size:
         return None
-    held = np.zeros(owner.size) if old.held is None else old.held.copy()
-    lanes = np.flatnonzero(failed)
-    held[lanes] = np.maximum(HOLDS * held[lanes], HOLDS)
-    states, better = old.states.copy(), lanes[attained[lanes] > 0.0]
+    states, better = old.states.copy(), failed[attained[failed] > 0.0]
     states[better] = point.nuisances.states[better]
+    held[failed] = True
     return old._replace(states=states, held=held)
 
 
@@ -310,7 +308,7 @@ def _from_measured_states(
     """Give a point again from the measured states, where those that it implies run away."""
     fresh = simulator.settle(
         best.nuisances.afresh(), best.model, len(best.model.elements), best.nuisances.spread
-    )
+    )._replace(held=best.nuisances.held)
     return simulator.evaluate(best.model, one_hot(best.model, places, slopes), fresh)
 
 

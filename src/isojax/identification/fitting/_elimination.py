@@ -9,14 +9,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ..._show import shown
 from ..jacobian import STIFFNESS_SCALE_UNIT
 from ._covariance import SMALLEST_EIGENVALUE
 
 _FAST = 1e12
-"""Weight of states that stay where they are."""
+"""Factor on what is known of a state that stays where it is."""
 
 
 @shown
@@ -42,23 +42,23 @@ class Nuisances(NamedTuple):
         stiffness: deviation of each record's linear stiffness [units of `STIFFNESS_SCALE_UNIT`].
         segments: further deviation of each segment's [the same units].
         spread: standard deviations of the priors of both.
-        held: weight by which each segment's states are held where they stand, over what the segment tells of
-            them: where a law has kinks, a whole linear step would not keep what it promises. None: nowhere.
+        held: segments whose initial states stay where they stand, as if they were known: of laws whose motion
+            is split at kinks linear steps of them may be of no use. None: nowhere.
     """
 
     states: Float[np.ndarray, "lanes state"]
     stiffness: Float[np.ndarray, " record"]
     segments: Float[np.ndarray, " lanes"]
     spread: Spread
-    held: Float[np.ndarray, " lanes"] | None = None
+    held: Bool[np.ndarray, " lanes"] | None = None
 
     def afresh(self) -> "Nuisances":
         """Give what is known of the records alone: other segments or states are to be found anew."""
         return self._replace(states=np.zeros((0, 0)), segments=np.zeros(0), held=None)
 
     def held_fast(self) -> "Nuisances":
-        """Give the same with initial states that stay where they are: chi2 is then smooth beside kinks."""
-        return self._replace(held=np.full(self.segments.size, _FAST))
+        """Give the same with all initial states where they stand: chi2 is then smooth beside kinks."""
+        return self._replace(held=np.full(self.segments.size, True))
 
     def factor(self, owner: Int[np.ndarray, " lanes"]) -> Float[np.ndarray, " lanes"]:
         """Give the factor on the linear stiffness of each lane.
@@ -89,9 +89,11 @@ class Reduced(NamedTuple):
             stiffness scale].
         segments_map: the same of the segments' own stiffness; no rows where it does not scatter.
         segments_variance: of each, given all else [relative stiffness squared].
-        by_segment: the same as `by_record`, of each segment after its states alone; before the residual its
-            own stiffness scale, where the model has one [units of `STIFFNESS_SCALE_UNIT`], before any prior.
-        misfits: squared residual of each segment where its states stand, with their prior; whitened.
+        by_segment: [[J'J, J'r], [r'J, r'r]] of each segment after its states alone, in the columns of
+            `eliminate`; before the residual its own stiffness scale, where the model has one [units of
+            `STIFFNESS_SCALE_UNIT`], without its prior.
+        misfits: squared residual of each segment where its states stand, with their prior unless the first
+            samples alone set them; whitened.
     """
 
     by_record: Float[np.ndarray, "record column column"]
@@ -200,8 +202,8 @@ def eliminate(
     heads = None if heads is None else heads / power
     offset, spread = nuisances.states[: owner.size], nuisances.spread
     has_scale = matrices.shape[1] > columns + offset.shape[1] + 1
-    misfits = matrices[:, -1, -1] + np.sum(offset**2, axis=1)
-    held = np.zeros(owner.size) if nuisances.held is None else nuisances.held[: owner.size]
+    misfits = matrices[:, -1, -1] + (0.0 if heads is not None else np.sum(offset**2, axis=1))
+    held = np.zeros(owner.size, bool) if nuisances.held is None else nuisances.held[: owner.size]
     left, states_map, taken = _without_states(matrices, heads, columns + int(has_scale), offset, held)
     eliminated = np.zeros(nuisances.stiffness.size)
     np.add.at(eliminated, owner, taken)
@@ -242,7 +244,7 @@ def _without_states(
     heads: Float[np.ndarray, "segment column column"] | None,
     shared: int,
     offset: Float[np.ndarray, "segment state"],
-    held: Float[np.ndarray, " segment"],
+    held: Bool[np.ndarray, " segment"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Give the matrices without the initial states, the map of their steps, and the freedom they took."""
     segments, states = offset.shape
@@ -251,11 +253,12 @@ def _without_states(
     # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
     source = matrices if heads is None else heads
     inner = source[:, drop[:, None], drop] + np.eye(states)
-    inner[:, range(states), range(states)] *= 1.0 + held[:, None]
     cross = source[:, drop[:, None], keep].copy()
     cross[:, :, -1] -= offset
+    still = inner.copy()
+    still[:, range(states), range(states)] *= np.where(held, _FAST, 1.0)[:, None]
     try:
-        states_map = np.linalg.solve(inner, cross)
+        states_map = np.linalg.solve(still, cross)
         taken = states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
     except np.linalg.LinAlgError:
         # Only a simulation that diverged makes a state's column as large as to drown its own prior.

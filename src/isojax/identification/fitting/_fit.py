@@ -27,7 +27,7 @@ from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
 from ._simulator import Simulator
 
-_OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter")
+_OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
 
 

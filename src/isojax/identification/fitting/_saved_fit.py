@@ -23,7 +23,7 @@ FORMAT = "isojax-fit"
 
 @shown
 class Statistics(NamedTuple):
-    """Counts and criteria of a fit; NaN, but for the counts, where it failed.
+    """Counts and criteria of a fit. Of one that failed chi2, criteria and scatters are NaN.
 
     Attributes:
         samples: samples that count, filtered noise counted by its independent samples.

@@ -168,9 +168,8 @@ class Simulator:
             heads = _matrices(unknowns, carried, self._heads.prepared(model, carried))[:used]
         owner = prepared.record[:used]
         reduced = eliminate(matrices, self.problem.noise, owner, directions.shape[1], nuisances, heads)
-        if carried < len(
-            model.elements
-        ):  # so many columns a segment would fill the memory, and serve nothing
+        # Of absent effects so many columns a segment would fill the memory, and serve nothing.
+        if carried < len(model.elements):
             reduced = reduced._replace(by_segment=reduced.by_segment[:0])
         return Point(model, nuisances, reduced, prepared.samples * self.problem.share)
 

@@ -258,10 +258,12 @@ def chance_words(smap: "StabilityMap") -> str:
     ):
         values = np.asarray(chance)
         sure = int(np.sum(values >= 1.0 - _IN_DOUBT))
+        still = int(np.sum(smap.held & (values >= 1.0 - _IN_DOUBT))) if name == "stable" else 0
+        how = f" (in {still} of them dry friction holds the mass)" if still else ""
         doubtful = int(np.sum((values > _IN_DOUBT) & (values < 1.0 - _IN_DOUBT)))
         unknown = int(np.sum(~np.isfinite(values)))
         lost = f", unknown in {unknown}" if unknown else ""
-        words.append(f"{name}: at least 95 % in {sure} cells, uncertain in {doubtful}{lost}")
+        words.append(f"{name}: at least 95 % in {sure} cells{how}, uncertain in {doubtful}{lost}")
     if error is not None and np.isfinite(error):
         words.append(
             f"a chance near a half is off by about {error:.2g} in the mean over the map, by more next to a "

@@ -138,11 +138,19 @@ class StabilityMap(eqx.Module):
             cells["with coexisting orbits"] = count > 1
             if self.incomplete.any():
                 cells["with an even count of them, where one is missing"] = self.incomplete
-        cells["without any"] = count == 0
+        if self.held.any():
+            cells["in which dry friction holds the mass"] = self.held
+        cells["without any"] = (count == 0) & ~self.held
         counted = ", ".join(f"{int(np.sum(which))} {words}" for words, which in cells.items())
         largest = number(found.max()) if found.size else "unknown"
         grid = " × ".join(map(str, count.shape))
         return f"{grid} cells of amplitude and frequency, {counted}; largest |mu| {largest}"
+
+    @property
+    def held(self) -> Bool[np.ndarray, "amplitude frequency"]:
+        """Whether dry friction holds the mass over the whole period: the cell is still, and has no orbit."""
+        held = np.asarray(self.result == RESULTS.sticks)
+        return np.any(held.reshape(-1, *held.shape[-2:]), axis=0)
 
     @property
     def _all_sought(self) -> bool:
@@ -161,6 +169,7 @@ class StabilityMap(eqx.Module):
         marks = np.where(count == 0, "?", np.where(count > 1, "2", "."))
         marks = np.where((count > 1) & (count < 10), count.astype(str), marks)
         marks = np.where((count == 1) & unstable, "x", marks)
+        marks = np.where(self.held, "h", marks)
         forces, band = np.asarray(self.amplitudes), np.asarray(self.frequencies)
         rows = np.unique(np.linspace(0, forces.size - 1, min(_ROWS, forces.size)).round().astype(int))
         columns = np.unique(np.linspace(0, band.size - 1, min(_COLUMNS, band.size)).round().astype(int))
@@ -171,6 +180,7 @@ class StabilityMap(eqx.Module):
             if self._all_sought
             else "  the orbit of smallest motion in each cell: . stable, x unstable, ? none found"
         )
+        legend += ", h held by friction" if self.held.any() else ""
         return [
             *drawn,
             f"  {'F0':>10} +{'-' * columns.size}",
