@@ -34,6 +34,7 @@ from ._fit import fit_by_output as fit_by_output
 from ._fit import weighted_by_output as weighted_by_output
 from ._fit import weighted_by_residual as weighted_by_residual
 from ._fit_result import Fit as Fit
+from ._fit_result import bent_words as bent_words
 from ._fit_result import fit_report as fit_report
 from ._held_fit import fit_held as fit_held
 from ._initial_states import best_nuisances as best_nuisances

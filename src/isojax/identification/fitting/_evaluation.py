@@ -12,6 +12,7 @@ from ._errors import Errors, Restarts, Run, restart_records, run_freely, summari
 from ._estimate import Estimate
 from ._problem import Problem
 from ._simulator import Simulator
+from ._valley import Bent, find_bent
 
 
 def _carried_over(found: Estimate, simulator: Simulator) -> Nuisances:
@@ -103,6 +104,11 @@ class Evaluation:
             "fit": summarise(self.free_runs, self.restarts, "fit", len(self._found.places)),
             "holdout": summarise(self.free_runs, self.restarts, "holdout", 0),
         }
+
+    @cached_property
+    def bent(self) -> tuple[Bent, ...]:
+        """Coefficients whose standard errors do not describe how chi2 rises; none if the fit failed."""
+        return find_bent(self._found) if is_successful(self._found.result) else ()
 
     @property
     def known_errors(self) -> dict[str, Errors | None] | None:

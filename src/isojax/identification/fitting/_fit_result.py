@@ -328,6 +328,7 @@ def warnings_of(fit: Fit) -> list[str]:
     if not is_successful(fit.result):
         return lines
     lines += _not_determined(fit)
+    lines += [bent_words(fit)] if fit.evaluation.bent else []
     start = {entry.name: float(entry.value) for entry in list_parameters(fit.start)}
     errors = fit.standard_errors
     for entry in list_parameters(fit.model):
@@ -343,6 +344,25 @@ def warnings_of(fit: Fit) -> list[str]:
         if abs(float(entry.value) - begun) <= _UNMOVED * abs(begun):
             lines.append(f"{entry.name} never moved from its start value {begun:g}.")
     return lines
+
+
+def bent_words(fit: Fit) -> str:
+    """Say which standard errors do not describe how chi2 rises, and by how much.
+
+    Args:
+        fit: the fit, of which there are some.
+
+    Returns:
+        A sentence.
+    """
+    names = ", ".join(fit.free[one.place] for one in fit.evaluation.bent)
+    rises = np.concatenate([one.rises for one in fit.evaluation.bent])
+    worst = max(rises[~np.isnan(rises)], key=lambda rise: abs(math.log(max(rise, 1e-3))))
+    return (
+        f"The standard errors of {names} describe no more than a tangent: one of them away from the fit chi2 "
+        f"rises by {worst:.3g} times what it should. The values that the data allow form a bent valley. Ask "
+        "`profile` for intervals."
+    )
 
 
 def _not_determined(fit: Fit) -> list[str]:

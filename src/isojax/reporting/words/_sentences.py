@@ -16,6 +16,7 @@ from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE
 from ...identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
 from ...identification.diagnosis import is_good
+from ...identification.fitting import bent_words
 from ...records import DataHealth
 
 
@@ -297,6 +298,8 @@ def caveats(loop: Loop) -> tuple[str, ...]:
         "or as one of them beside the laws that would do as well.",
         "χ²/dof is relative to the estimated noise of the output; an error of that estimate scales it.",
     ]
+    if after.evaluation.bent:
+        lines.append(bent_words(after))
     if after.errors["holdout"] is None:
         lines.append("No record was held out, so no error here is one on unseen data.")
     if loop.last.hidden:
