@@ -27,11 +27,12 @@ ACCURACY = {
     "_integration_steps": {"FINEST", "SEGMENTS_TRIED", "SMALL_ERROR"},
     "_passivity": {"STEADY", "WORK_OF_STEPS"},
     # Where a search stands still, or goes astray.
-    "_descent": {"IDLE", "REFUSALS_A_STEP", "SHRINKS", "STALLED"},
+    "_descent": {"IDLE", "KEPT", "REFUSALS_A_STEP", "SHRINKS", "STALLED"},
     "_estimate": {"ROUGH", "SMALLEST_SCATTER"},
     "_initial_states": {"HALVINGS", "MOST_WORSENING", "SETTLED", "SHORTEST", "SMALL_STEP"},
     # Draws and intervals.
     "_scatter_mixture": {"LEAST_TAIL"},
+    "_valley": {"SAME_RISE", "WELL_KNOWN"},
     "_score": {"FEWEST_EXCEEDANCES", "NULL_DRAWS"},
     # How records are cut, repeats recognised and spectra read.
     "_batch": {"MOST_LANES"},

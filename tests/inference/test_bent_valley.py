@@ -28,7 +28,7 @@ def closed_rise(decay, name, sign):
 @pytest.mark.parametrize("name", ["linear_stiffness.coefficient", "linear_damping.coefficient"])
 def test_chi2_rises_as_the_closed_form(decay, name, monkeypatch):
     monkeypatch.setattr(_valley, "_WELL_KNOWN", 0.0)
-    monkeypatch.setattr(_valley, "STRAIGHT", 1.0)  # everything counts as bent
+    monkeypatch.setattr(_valley, "SAME_RISE", 1.0)  # everything counts as bent
     place = decay.fit.free.index(name)
     found = next(one for one in find_bent(decay.fit.estimate) if one.place == place)
     expected = [closed_rise(decay, name, sign) for sign in (-1.0, 1.0)]

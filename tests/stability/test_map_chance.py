@@ -1,5 +1,6 @@
 """Chances of the cells of a map, against an independent table of folds and closed forms."""
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import diffrax
@@ -8,6 +9,7 @@ import pytest
 from scipy.stats import norm
 
 import isojax as ij
+from isojax.stability.map._chance import chance_words
 
 SUCCESS = ij.RESULTS.promote(diffrax.RESULTS.successful)
 PAPER = ij.paper.y_direction()
@@ -92,6 +94,16 @@ def test_so_it_is_under_dry_friction_and_what_begins_to_slide_is_stable():
     expected = np.stack([0.0 * force, np.where(force > 50.0, 1.0 - above, 0.0), above], axis=1)
     np.testing.assert_allclose(found.probability_coexisting, expected, atol=0.01)
     np.testing.assert_allclose(found.probability_stable, 1.0 - expected, atol=0.01)
+
+
+def test_cells_that_friction_holds_are_counted_among_the_stable_ones():
+    stable = np.array([[1.0, 1.0, np.nan], [1.0, 0.5, 0.0]])
+    held = np.array([[True, True, True], [False, False, False]])
+    smap = SimpleNamespace(
+        probability_stable=stable, probability_coexisting=0.0 * stable, chance_error=np.nan, held=held
+    )
+    words = "stable: at least 95 % in 3 cells (in 2 of them dry friction holds the mass), uncertain in 1"
+    assert chance_words(smap).startswith(f"{words}, unknown in 1")
 
 
 def test_a_cell_is_stable_where_it_holds_one_orbit(smap):

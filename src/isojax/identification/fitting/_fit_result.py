@@ -357,7 +357,7 @@ def bent_words(fit: Fit) -> str:
     """
     names = ", ".join(fit.free[one.place] for one in fit.evaluation.bent)
     rises = np.concatenate([one.rises for one in fit.evaluation.bent])
-    worst = max(rises[~np.isnan(rises)], key=lambda rise: abs(math.log(max(rise, 1e-3))))
+    worst = max(rises[~np.isnan(rises)], key=lambda rise: abs(rise - 1.0))
     return (
         f"The standard errors of {names} describe no more than a tangent: one of them away from the fit chi2 "
         f"rises by {worst:.3g} times what it should. The values that the data allow form a bent valley. Ask "

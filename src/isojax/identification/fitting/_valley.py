@@ -10,7 +10,7 @@ from ._elimination import step_nuisances
 from ._estimate import Estimate
 from ._problem import Point, one_hot
 
-STRAIGHT = 2.0
+SAME_RISE = 2.0
 """Factor between the rise of chi2 one standard error away and that of a parabola, up to which standard
 errors describe the valley."""
 
@@ -64,7 +64,7 @@ def find_bent(found: Estimate) -> tuple[Bent, ...]:
         along = np.nan_to_num(uncertainty.covariance[place]) / uncertainty.standard_error[place]
         rises = np.array([_rise(found, begun, columns, sign * along) for sign in (-1.0, 1.0)])
         known = rises[~np.isnan(rises)]
-        if np.any((known < 1.0 / STRAIGHT) | (known > STRAIGHT)):
+        if np.any((known < 1.0 / SAME_RISE) | (known > SAME_RISE)):
             bent.append(Bent(place, rises))
     return tuple(bent)
 
