@@ -121,6 +121,12 @@ def test_one_record_shows_no_scatter(fit):
         ij.next_record(alone)
 
 
+def test_an_operating_condition_comes_last(fit):
+    held = ij.models.FitAt(fit.model, fit.free, fit.covariance, fit.result)
+    with pytest.raises(ValueError, match=r"Ask for the condition last: `fit_at\(next_record\(fit\), ...\)`"):
+        ij.next_record(held)
+
+
 @pytest.mark.parametrize("calibration", [-0.01, float("nan"), 5.0])
 def test_a_calibration_is_a_share(fit, calibration):
     with pytest.raises(ValueError, match="`calibration` must be a share from 0 to below 1, but is "):

@@ -44,6 +44,18 @@ def test_of_a_linear_quantity_the_error_is_that_of_the_covariance(fit):
     assert found.failed == 0.0
 
 
+def test_a_dict_keeps_its_names(fit):
+    found = ij.uncertainty(
+        fit, lambda model: {"spring": model[STIFFNESS], "rate": model[DAMPING] / model.mass}
+    )
+    assert found.names == ("spring", "rate")
+    errors = [fit.standard_errors[STIFFNESS], fit.standard_errors[DAMPING] / float(fit.model.mass)]
+    np.testing.assert_allclose(found.standard_error, errors, rtol=1e-9)
+    assert "\n  spring " in repr(found)
+    with pytest.raises(ValueError, match="a dict of single numbers, but gives an array as 'spring'"):
+        ij.uncertainty(fit, lambda model: {"spring": model[STIFFNESS] * np.ones(2)})
+
+
 def test_of_what_is_least_at_the_fit_the_interval_begins_there(wide):
     """A distance squared of one normal coefficient: chi-square of one degree of freedom."""
     stiffness = float(wide.model[STIFFNESS])
@@ -303,8 +315,8 @@ def test_what_cannot_be_carried_is_refused(wide, unchecked):
         ij.uncertainty(wide._replace(covariance=negative), lambda model: model[STIFFNESS])
     with pytest.raises(ValueError, match=r"`quantity` must be a function of an isolator, .* but is 'k1'"):
         ij.uncertainty(wide, "k1")
-    with pytest.raises(ValueError, match=r"must give a number or an array, .* one of type dict"):
-        ij.uncertainty(wide, lambda model: {"mass": model.mass})
+    with pytest.raises(ValueError, match=r"must give a number or an array, .* one of type set"):
+        ij.uncertainty(wide, lambda model: {"mass"})
     with pytest.raises(ValueError, match="must give real numbers"):
         ij.uncertainty(wide, lambda model: 1j * model[STIFFNESS])
     with pytest.raises(ValueError, match="`confidence` must lie between 0 and 1"):

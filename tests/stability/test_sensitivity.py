@@ -253,6 +253,7 @@ def test_function_of_a_model_is_differentiated_by_name():
         ({"parameters": 3}, "`parameters` must list names of parameters, but is 3"),
         ({"covariance": np.eye(2), "covariance_of": ("k1", STATIC[0])}, "`covariance_of` must name linear_s"),
         ({"covariance": np.eye(2)}, "`covariance` and `covariance_of` must be given together"),
+        ({"covariance": -np.eye(1), "covariance_of": "k1"}, "must be symmetric, with no negative variance"),
         ({"covariance": np.eye(3), "covariance_of": STATIC[:2]}, "a row and a column for each of 2 names"),
         (
             {"parameters": ["mass"], "covariance": np.eye(2), "covariance_of": STATIC[:2]},

@@ -11,7 +11,7 @@ from .._results import RESULTS, is_successful
 from .._show import Row, shown
 from ..identification.fitting import Fit, Fitted, SavedFit, as_fit
 from ..identification.jacobian import stiffness_place
-from ..models import Isolator, NormalMixture
+from ..models import FitAt, Isolator, NormalMixture
 
 
 @shown
@@ -84,6 +84,11 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
         >>> bool(expected.standard_error > answer.standard_error)
         True
     """
+    if isinstance(fit, FitAt):
+        raise ValueError(
+            "Argument `fit` must be a fit, but is one at an operating condition. Ask for the condition last: "
+            "`fit_at(next_record(fit), ...)`."
+        )
     held = fit if isinstance(fit, SavedFit) else as_fit(fit)
     if not is_successful(held.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[held.result]}")

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .._given_numbers import asked_numbers, given_chance, given_count
+from .._given_numbers import as_numbers, asked_numbers, given_chance, given_count
 from .._progress import silent
 from .._show import Row, shown
 from .._types import check_float64
@@ -53,6 +53,7 @@ class UncertainQuantity(NamedTuple):
         weights: of the fits that the answer rests on, in their order.
         probability: that the quantity exists, by the share of the draws that have it.
         probability_error: standard error of that share, by the count of draws.
+        names: of the numbers, in the order of the arrays, where the quantity gives a dict; else empty.
     """
 
     value: Float[np.ndarray, "..."]
@@ -66,6 +67,7 @@ class UncertainQuantity(NamedTuple):
     weights: tuple[float, ...]
     probability: Float[np.ndarray, "..."]
     probability_error: Float[np.ndarray, "..."]
+    names: tuple[str, ...] = ()
 
     @property
     def may_not_exist(self) -> Bool[np.ndarray, "..."]:
@@ -99,7 +101,7 @@ class UncertainQuantity(NamedTuple):
         ]
         return [
             Row(
-                f"[{place}]",
+                self.names[place] if self.names else f"[{place}]",
                 # Where the draws are not symmetric a standard error would mislead beside their interval.
                 f"{value:.6g}" + ("" if bent else f" ± {error:.2g}") if np.isfinite(value) else "none",
                 self._in_words(low, high, share),
@@ -143,10 +145,10 @@ def uncertainty(
     Args:
         fit: a fit, a saved one, or what ends with one: an extension, a closed loop; or a list of fits to the
             same records, each of which is weighed by its evidence.
-        quantity: function of an isolator that gives real numbers: one, or an array. It must be differentiable
-            by `jax.jacfwd`. Where `jax.vmap` cannot go through it, draws are taken one by one; `find_again`
-            lets it go through folds and orbits. Where it is NaN or raises, at a draw or at the fitted
-            coefficients, it does not exist.
+        quantity: function of an isolator that gives real numbers: one, an array, or a dict of single ones by
+            their names, which the answer keeps. It must be differentiable by `jax.jacfwd`. Where `jax.vmap`
+            cannot go through it, draws are taken one by one; `find_again` lets it go through folds and
+            orbits. Where it is NaN or raises, at a draw or at the fitted coefficients, it does not exist.
         confidence: chance that the interval is to hold the truth.
         draws: how many; at least 100.
         seed: of the draws.
@@ -183,8 +185,9 @@ def uncertainty(
         raise ValueError("Argument `fit` must hold at least one fit, but the list is empty.")
     weights = _evidence(fits) if len(fits) > 1 else np.ones(1)
     counts = np.maximum(np.round(weights * draws), weights == weights.max()).astype(int)
+    asked = _Named(quantity) if callable(quantity) else quantity
     parts = [
-        _carried(coefficient_errors(fits[place]), quantity, int(counts[place]), seed + int(place), progress)
+        _carried(coefficient_errors(fits[place]), asked, int(counts[place]), seed + int(place), progress)
         for place in np.argsort(-weights, kind="stable")
         if counts[place]
     ]
@@ -211,7 +214,30 @@ def uncertainty(
         tuple(weights.tolist()),
         known.probability,
         known.probability_error,
+        asked.names if isinstance(asked, _Named) else (),
     )
+
+
+class _Named:
+    """A quantity whose dict of numbers, if it gives one, is an array; the names are kept beside."""
+
+    def __init__(self, quantity: Callable[[Isolator], Any]):
+        self.quantity = quantity
+        self.names: tuple[str, ...] = ()
+
+    def __call__(self, model: Isolator) -> Any:
+        """Give the numbers."""
+        given = self.quantity(model)
+        if not isinstance(given, dict):
+            return given
+        odd = [name for name, one in given.items() if np.ndim(one) != 0]
+        if odd or not given:
+            raise ValueError(
+                "Argument `quantity` must give a dict of single numbers, but gives "
+                + (f"an array as {odd[0]!r}." if odd else "an empty one.")
+            )
+        self.names = tuple(map(str, given))
+        return jnp.stack([as_numbers("quantity", one) for one in given.values()])
 
 
 class _Carried(NamedTuple):

@@ -20,6 +20,8 @@ from ._normal_mixture import NormalMixture
 class FitAt(NamedTuple):
     """What a fit says of the isolator at an operating condition; it goes wherever `fit=` is asked for.
 
+    Of a further record there: `fit_at(next_record(fit), ...)`.
+
     Attributes:
         model: the isolator at the condition.
         free: names of its coefficients that the fit moves.

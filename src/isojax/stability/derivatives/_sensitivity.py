@@ -20,6 +20,9 @@ from ..response import Resonance
 from ._parameter_values import DRIVE
 from ._subjects import Subject, as_subject
 
+_ROUNDING_OF_COVARIANCE = 1e-8
+"""Least eigenvalue of a covariance, over that of equal variances, down to which it is rounding."""
+
 
 @shown
 class Sensitivity(eqx.Module):
@@ -247,6 +250,15 @@ def _covariance(
             f"Argument `covariance` must have a row and a column for each of {len(covariance_of)} names, but "
             f"has shape {given.shape}."
         )
+    size = np.sqrt(np.abs(np.diag(given)))
+    scaled = given / np.outer(np.where(size > 0.0, size, 1.0), np.where(size > 0.0, size, 1.0))
+    if np.all(np.isfinite(given)):  # what the records do not determine may be NaN, and makes the error NaN
+        least = float(np.linalg.eigvalsh(scaled).min())
+        if np.any(np.abs(scaled - scaled.T) > _ROUNDING_OF_COVARIANCE) or least < -_ROUNDING_OF_COVARIANCE:
+            raise ValueError(
+                "Argument `covariance` must be symmetric, with no negative variance in any direction, but "
+                f"its least eigenvalue, over that of equal variances, is {least:.2g}."
+            )
     missing = [name for name in covariance_of if name not in names]
     if missing:
         raise ValueError(f"Argument `parameters` must hold all of `covariance_of`, but lacks {missing[0]!r}.")
