@@ -97,7 +97,8 @@ def test_failed_fit_is_written_with_nulls_and_said_in_the_report(plain, tmp_path
         rmse=np.nan, nrmse=np.nan, nrmse_segments=np.nan, chi2_per_dof=np.nan
     )
     runs, restarts = plain.after.free_runs, plain.after.restarts
-    held = SimpleNamespace(errors={"fit": unknown, "holdout": None}, free_runs=runs, restarts=restarts)
+    errors = {"fit": unknown, "holdout": None}
+    held = SimpleNamespace(errors=errors, free_runs=runs, restarts=restarts, bent=())
     failed = plain.after._replace(result=RESULTS.not_converged, evaluation=held)
     loop = dataclasses.replace(plain, before=failed, after=failed, verdict="unexplained")
     ClosedLoop(loop).report(tmp_path / "deep" / "out")

@@ -225,7 +225,9 @@ def descend(
             result = RESULTS.successful
             break
         owner = simulator.prepared(best.model, len(best.model.elements)).record
-        if model.splits and not accepted and point.is_finite and decrement < STALLED * best.chi2:
+        # Of records left whole the first samples set the states, whatever the rest would have them do.
+        own = model.splits and not simulator.problem.heads
+        if own and not accepted and point.is_finite and decrement < STALLED * best.chi2:
             step = np.asarray(trial - best_free)
             held = _held_where_promises_fail(best, point, owner, step, tolerance * max(1.0, chi2))
             if held is not None and evaluations < search.max_steps:

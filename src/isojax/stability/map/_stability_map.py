@@ -149,8 +149,8 @@ class StabilityMap(eqx.Module):
     @property
     def held(self) -> Bool[np.ndarray, "amplitude frequency"]:
         """Whether dry friction holds the mass over the whole period: the cell is still, and has no orbit."""
-        held = np.asarray(self.result == RESULTS.sticks)
-        return np.any(held.reshape(-1, *held.shape[-2:]), axis=0)
+        codes, sticks = (np.asarray(jax.tree.leaves(one)[0]) for one in (self.result, RESULTS.sticks))
+        return np.any((codes == sticks).reshape(-1, *codes.shape[-2:]), axis=0)
 
     @property
     def _all_sought(self) -> bool:
