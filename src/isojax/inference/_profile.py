@@ -128,8 +128,8 @@ def profile(
     noise, and s its standard error in the fit. The interval ends where |t| is the coverage factor of the
     fit, 1.96 for 95 %: where the model is linear in its coefficients, at the ends that `uncertainty` gives.
     So the noise that chi2/dof shows, and that records tell the scatter of the stiffness only so well, count
-    as in the fit. Where a law has kinks, such as dry friction, the initial states of the segments stay where
-    the fit found them, since beside a kink chi2 is rough in them.
+    as in the fit. Where the motion is split at kinks, as under dry friction or at a stop, the initial states
+    of the segments stay where the fit found them: beside a kink chi2 is rough in them.
 
     Each point starts from the optimum of its neighbour, by the search of the fit.
 
@@ -165,10 +165,7 @@ def profile(
     estimate = meant.estimate
     search = search_of(meant.campaign, Rules(), DEFAULT_SOLVER, silent)
     search = search._replace(tolerance=_STILL_GAINED)
-    begun = estimate.point
-    if estimate.model.splits:
-        # Near a kink of the law initial states would go from one local minimum to the next, point by point.
-        begun = begun._replace(nuisances=begun.nuisances.held_fast())
+    begun = estimate.point._replace(nuisances=estimate.comparable_nuisances)
     lowest = fit_held(estimate, None, one.value, begun, search).point
     place = meant.free.index(one.name)
     unit_variance = invert_information(lowest.reduced.matrix[:-1, :-1]).covariance[place, place]
@@ -247,7 +244,7 @@ def _walk(
                 points,
                 (),
                 lost,
-                "chi2 falls again on the way: another minimum, or the roughness of a law with kinks.",
+                "chi2 falls again on the way: another minimum, or the roughness beside a kink of a law.",
             )
         if away == room and held.root < quantile:
             return _Side(points, (), room, at_bound)

@@ -4,8 +4,9 @@ In: a start model and a campaign. Out: a `Fit`; `residual`, `drift_budget`,
 `drive_noise` and `unlocked_tone` describe it.
 Read `_fit` (the door) and `_search` (how to search), then `_estimate` and `_descent` (the search itself),
 then `_problem`, `_simulator`, `_elimination` and `_initial_states` (its equations, without the nuisances).
-What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture` and `_fit_result`;
-searches among effects run on `_thinned` records.
+What follows the search is in `_evaluation`, `_errors`, `_covariance`, `_scatter_mixture`, `_valley`
+(do standard errors describe how chi2 rises?) and `_fit_result`; searches among effects run on `_thinned`
+records.
 """
 
 from ._as_fit import Fitted as Fitted

@@ -42,8 +42,8 @@ class Nuisances(NamedTuple):
         stiffness: deviation of each record's linear stiffness [units of `STIFFNESS_SCALE_UNIT`].
         segments: further deviation of each segment's [the same units].
         spread: standard deviations of the priors of both.
-        held: segments whose initial states stay where they stand, as if they were known: of laws whose motion
-            is split at kinks linear steps of them may be of no use. None: nowhere.
+        held: segments whose initial states stay where they stand, as if they were known: where the motion is
+            split at kinks linear steps of them may be of no use. None: nowhere.
     """
 
     states: Float[np.ndarray, "lanes state"]

@@ -88,6 +88,15 @@ class Estimate(NamedTuple):
         return max(1.0, self.chi2 / self.dof)
 
     @property
+    def comparable_nuisances(self) -> Nuisances:
+        """Nuisances from which chi2 may be compared at other coefficients.
+
+        Where the motion is split at kinks chi2 is rough in the initial states: they stay where they stand.
+        """
+        own = self.point.nuisances
+        return own.held_fast() if self.model.splits else own
+
+    @property
     def shows_scatter(self) -> bool:
         """Whether error bars allow for a scatter of the stiffness; a single record shows none."""
         return has_stiffness_scale(self.model) and self.point.samples.size > 1

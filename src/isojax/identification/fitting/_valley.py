@@ -53,11 +53,8 @@ def find_bent(found: Estimate) -> tuple[Bent, ...]:
     ]
     if not asked:
         return ()
-    nuisances = found.point.nuisances
-    if found.model.splits:  # beside a kink chi2 is rough in the initial states
-        nuisances = nuisances.held_fast()
     columns = one_hot(found.model, found.places, [1.0] * len(found.places))
-    begun = found.simulator.evaluate(found.model, columns, nuisances)
+    begun = found.simulator.evaluate(found.model, columns, found.comparable_nuisances)
     bent = []
     for place in asked:
         # An undetermined coefficient, which has no covariance, stays.

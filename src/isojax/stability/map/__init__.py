@@ -6,8 +6,9 @@ which _spline lays splines), _shared_kinks, _starts (which orbit of the surface 
 (multipliers read off the surface), _batched_newton (those that cannot be, all at once; _map_method integrates
 them), _single_orbits (those of sharp laws; _states_at_zero gives their starts), _map_error (a sample of cells
 against finer steps), _sought (which orbits are found by which), _chunks (long maps, kept on disk), and _map,
-which calls them and gives what _stability_map describes; then _found_again (the cells of a known map for
-another model, in pure JAX) and _read_slopes (derivatives of cells read off tables of _node_slopes).
+which calls them and gives what _stability_map describes; then _chance (chances of cells, along
+_orbit_curves), _found_again (the cells of a known map for another model, in pure JAX) and _read_slopes
+(derivatives of cells read off tables of _node_slopes).
 """
 
 from ._chance import chance_words as chance_words

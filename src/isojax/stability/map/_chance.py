@@ -17,7 +17,7 @@ from scipy.ndimage import binary_dilation
 from scipy.stats.qmc import Sobol
 
 from ...models import CoefficientErrors, Isolator
-from ._orbit_curves import Column, Curves
+from ._orbit_curves import Curve, Curves
 from ._sought import Sought
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def _weights(steps: Float[np.ndarray, "draw step"]) -> Float[np.ndarray, "draw m
 
 
 def _in_doubt(
-    curves: list[Column], grid: Float[np.ndarray, " displacement"]
+    curves: list[Curve], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, " doubtful"]:
     """Give log displacements that a draw may fold or destabilise; elsewhere all maps are far from it."""
     force, margin = _tables(curves, grid)
@@ -175,7 +175,7 @@ def _in_doubt(
 
 
 def _tables(
-    curves: list[Column], grid: Float[np.ndarray, " displacement"]
+    curves: list[Curve], grid: Float[np.ndarray, " displacement"]
 ) -> Float[np.ndarray, "2 map displacement"]:
     """Give log force and margin of all maps over common displacements."""
     return np.array([[one.force(grid) for one in curves], [one.margin(grid) for one in curves]])

@@ -22,7 +22,7 @@ _SAME, _FLAT = 1e-9, 0.2
 below which the determinant knows it better than a spline."""
 
 
-class Column(NamedTuple):
+class Curve(NamedTuple):
     """The orbits of a model at one frequency, over the logarithm of a displacement.
 
     Attributes:
@@ -40,7 +40,7 @@ class Column(NamedTuple):
     response: Callable[[np.ndarray], np.ndarray]
 
 
-def _read_off(surface: Surface, column: int) -> Column:
+def _read_off(surface: Surface, column: int) -> Curve:
     """Give the orbits of one frequency that a surface holds."""
 
     def force(grid: np.ndarray) -> np.ndarray:
@@ -56,7 +56,7 @@ def _read_off(surface: Surface, column: int) -> Column:
     def response(grid: np.ndarray) -> np.ndarray:
         return grid + np.log(surface.at(column, grid)[-1])
 
-    return Column(surface.breaks[0], surface.breaks[-1], force, margin, response)
+    return Curve(surface.breaks[0], surface.breaks[-1], force, margin, response)
 
 
 class Curves:
@@ -68,7 +68,7 @@ class Curves:
         self.known = np.all([sought.known_columns for _, sought in found], axis=0)
         self.orbits = [] if self.known.all() else [_MapOrbits(*one) for one in found]
 
-    def at(self, column: int) -> list[Column] | None:
+    def at(self, column: int) -> list[Curve] | None:
         """Give those of one frequency, map by map; None where one map knows too few."""
         if self.known[column]:
             return [_read_off(surface, column) for surface in self.surfaces]
@@ -125,7 +125,7 @@ class _MapOrbits:
         order = order[np.diff(found.x[order], prepend=-np.inf) > _SAME]
         return _Points(*(one[order] for one in found))
 
-    def at(self, column: int) -> Column | None:
+    def at(self, column: int) -> Curve | None:
         """Give the orbits of one frequency; None where too few are known."""
         x, y, fold, others, stable = self._points(column)
         if x.size < _FEWEST_ON_CURVE:
@@ -149,7 +149,7 @@ class _MapOrbits:
         margin = np.minimum(ratio, others)
         margin = np.where(stable | (rise < 0.0), margin, -np.abs(margin))
         force = CubicHermiteSpline(x, y, rise)
-        return Column(x[0], x[-1], force, lambda grid: np.interp(grid, x, margin), lambda grid: grid)
+        return Curve(x[0], x[-1], force, lambda grid: np.interp(grid, x, margin), lambda grid: grid)
 
 
 def _read_points(surface: Surface, column: int, parts: np.ndarray, half: bool) -> _Points:
