@@ -88,8 +88,9 @@ def test_friction_alone_is_a_rectangle_of_its_level(found):
 def test_the_band_of_the_equivalent_stiffness_is_that_of_its_closed_form(found):
     """Of a linear and a cubic spring it is k1 + 3/4 k3 X^2 (the paper, eq. 7)."""
     figure = isojax.plot.equivalent(found.guess, [("before", found.before)])
-    (band,) = figure.axes[0].collections
-    corners = band.get_paths()[0].vertices
+    (band,) = figure.axes[0].patches
+    corners = band.get_path().vertices
+    assert [one.get_text() for one in figure.axes[0].get_legend().get_texts()].count("95 % band") == 1
     for x in (corners[:, 0].min(), corners[:, 0].max()):
         wanted = isojax.uncertainty(
             found.before, lambda m, x=1e-3 * x: 1e-3 * (m["k1"] + 0.75 * m["k3"] * x**2)

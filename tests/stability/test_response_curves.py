@@ -402,7 +402,9 @@ def test_the_ends_of_a_response_band_lie_on_the_curves_of_moved_models():
     np.testing.assert_allclose(np.abs(np.array(moved))[:, away], width, rtol=0.02)
     # One end lies below the peak all along: of the stiffer model on one flank, of the softer on the other.
     assert np.count_nonzero(np.diff(np.sign(moved[0][away]))) == 1
-    assert ij.plot.frequency_response(response).axes[0].patches
+    axes = ij.plot.frequency_response(response).axes[0]
+    assert axes.patches
+    assert "95 % band" in [one.get_text() for one in axes.get_legend().get_texts()]
 
 
 def test_a_band_asks_for_the_model_of_the_fit():

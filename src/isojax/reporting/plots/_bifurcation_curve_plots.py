@@ -76,7 +76,7 @@ def draw_lens(ax: Axes, curve: FoldCurve, *, filled: bool) -> list[Any]:
     _draw_curve_band(ax, curve, colour)
     ax.plot(frequency, amplitude, color=colour, linewidth=width)
     handles.insert(0, Line2D([], [], color=colour, linewidth=width, label=MARKS["fold"].words))
-    return handles + _special_handles(ax, curve)
+    return handles + ax.get_legend_handles_labels()[0] + _special_handles(ax, curve)
 
 
 def _draw_curve_band(
@@ -115,7 +115,7 @@ def plot_bifurcation_curve(
     _draw_curve_band(ax, curve, mark.colour)
     ax.plot(frequency, amplitude, color=mark.colour, linewidth=1.4)
     handles: list[Any] = [Line2D([], [], color=mark.colour, linewidth=1.4, label=mark.words)]
-    handles += _special_handles(ax, curve)
+    handles += ax.get_legend_handles_labels()[0] + _special_handles(ax, curve)
     ax.margins(0.08)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel(drive_words(excitation))

@@ -138,7 +138,7 @@ def plot_backbone(backbone: BackboneCurve, *, ax: Axes | None = None) -> Figure:
         The figure.
     """
     figure, ax = axes_for(ax, 5.6, 4.0)
-    handles = _draw_backbone(ax, backbone)
+    handles = [*_draw_backbone(ax, backbone), *ax.get_legend_handles_labels()[0]]
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("largest displacement [mm]")
     ax.set_ylim(bottom=0.0)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ...identification import ClassicalGuess, Fit
 from ...models import Isolator
-from ._draw_band import PALE
+from ._draw_band import draw_band
 from ._force_cycles import SIDES, equivalent_curves, equivalent_of
 from ._force_plots import band_of
 from ._style import AFTER, BEFORE, CURVES, LEVELS, MEASURED, NEUTRAL, axes_for, entitle
@@ -133,7 +133,7 @@ def _backbone(guess: ClassicalGuess, fit: Fit, label: str, colour: str, width: f
     band = band_of(fit, ("frequency",), frequencies)
     if band is not None:
         lower, upper = (np.asarray(end["frequency"]) for end in (band.lower, band.upper))
-        ax.fill_betweenx(1e3 * amplitudes, lower, upper, color=colour, alpha=PALE, linewidth=0.0)
+        draw_band(ax, (lower, 1e3 * amplitudes), (upper, 1e3 * amplitudes), colour)
 
 
 def plot_equivalent(
@@ -166,7 +166,7 @@ def plot_equivalent(
         band = band_of(fit, SIDES, lambda model: equivalent_of(model, amplitudes, frequency))
         if band is not None:
             lower, upper = (1e-3 * np.asarray(end[what]) for end in (band.lower, band.upper))
-            ax.fill_between(1e3 * x, lower, upper, color=colour, alpha=PALE, linewidth=0.0)
+            draw_band(ax, (1e3 * x, lower), (1e3 * x, upper), colour)
         ax.plot(
             1e3 * x,
             1e-3 * y,

@@ -6,7 +6,12 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
-PALE = 0.25
+from ...models import CONFIDENCE
+
+_PALE = 0.25
+
+_WORDS = f"{100.0 * CONFIDENCE:g} % band"
+"""Its entry of a legend; one stands for all of the axes."""
 
 
 def draw_band(
@@ -16,6 +21,8 @@ def draw_band(
     colour: str,
 ) -> None:
     """Fill the band around a curve, piece by piece between two points, so that it may fold back.
+
+    The first of the axes is labelled for their legend.
 
     Args:
         ax: the axes.
@@ -31,7 +38,8 @@ def draw_band(
     # One path of all pieces: where they overlap it is no darker.
     pieces = np.concatenate([whole, whole[:, :1]], axis=1)
     path = Path.make_compound_path(*(Path(_turning_left(piece), closed=True) for piece in pieces))
-    ax.add_patch(PathPatch(path, facecolor=colour, edgecolor="none", alpha=PALE, zorder=1))
+    label = "" if _WORDS in ax.get_legend_handles_labels()[1] else _WORDS
+    ax.add_patch(PathPatch(path, facecolor=colour, edgecolor="none", alpha=_PALE, zorder=1, label=label))
     ax.update_datalim(whole.reshape(-1, 2))
 
 

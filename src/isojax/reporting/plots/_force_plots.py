@@ -14,7 +14,7 @@ from ..._results import is_successful
 from ...identification import Fit
 from ...models import Band, Isolator, coefficient_errors, find_band
 from ...records import Record, measured_state
-from ._draw_band import PALE, draw_band
+from ._draw_band import draw_band
 from ._force_cycles import cycle_forces, trace_cycles
 from ._style import AFTER, BAND, CURVES, MEASURED, NEUTRAL, axes_for, entitle, fits_meant, pair
 
@@ -91,7 +91,7 @@ def plot_restoring_force(
         band = band_of(fit, ("force",), lambda model: _force_along(model, grid, what)[None])
         if band is not None:
             lower, upper = (np.asarray(end["force"]) for end in (band.lower, band.upper))
-            ax.fill_between(1e3 * grid, lower, upper, color=colour, alpha=PALE, linewidth=0.0)
+            draw_band(ax, (1e3 * grid, lower), (1e3 * grid, upper), colour)
     ax.axvspan(-1e3 * reach, 1e3 * reach, color=BAND, alpha=0.6, zorder=0, label="visited")
     ax.set_xlim(1e3 * grid[0], 1e3 * grid[-1])
     ax.set_xlabel("displacement [mm]" if what == "stiffness" else "velocity [mm/s]")

@@ -7,13 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from ...identification import MeasuredResponse
 from ...models import Isolator
 from ...stability import ResponseBands
-from ._draw_band import PALE, draw_band
+from ._draw_band import draw_band
 from ._stability_style import (
     MILLIMETRES,
     draw_curve,
@@ -76,9 +75,8 @@ def plot_response_bands(
                 fold.interval, (place, place), color=_GREY, marker="|", markersize=5, linewidth=1.0, zorder=4
             )
             folds.append(("fold", fold.frequency, place))
-    extra: list[Line2D | Patch] = [Patch(facecolor=_GREY, alpha=PALE, label="95 % band")]
-    if what == "displacement" and measured:
-        extra.append(_points(ax, bands, measured, colours))
+    dwells = what == "displacement" and len(measured) > 0
+    extra = [_points(ax, bands, measured, colours)] if dwells else []
     kinds = draw_special_points(ax, folds)
     _axes(ax, bands, what)
     entitle(ax, "", stability_handles(ax, kinds, unstable=unstable, extra=extra))
