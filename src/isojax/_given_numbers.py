@@ -17,6 +17,10 @@ _SHORT = 60
 """Letters up to which a message shows an argument as it was written."""
 
 
+class NoNumbersError(ValueError):
+    """A function of the caller gave no numbers: it will not at other points either."""
+
+
 def refuse_not_positive(name: str, value: Any) -> None:
     """Refuse a number, or any of several, that is zero or below; a traced one passes unseen.
 
@@ -198,19 +202,19 @@ def as_numbers(name: str, given: Any, real: bool = True) -> Inexact[Array, "..."
         The numbers; a yes or no is 1 or 0.
 
     Raises:
-        ValueError: if these are none, or complex though they must be real.
+        NoNumbersError: if these are none, or complex though they must be real.
     """
     try:
         numbers = 1.0 * jnp.asarray(given)
     except jax.errors.JAXTypeError:
         raise
     except (TypeError, ValueError):
-        raise ValueError(
+        raise NoNumbersError(
             f"Argument `{name}` must give a number or an array, as of jnp.stack([...]), but gave one of type "
             f"{type(given).__name__}."
         ) from None
     if real and jnp.iscomplexobj(numbers):
-        raise ValueError(
+        raise NoNumbersError(
             f"Argument `{name}` must give real numbers, but gave complex ones. Give "
             "their moduli, as of `jnp.abs`, or their real and imaginary parts."
         )

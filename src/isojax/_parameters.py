@@ -123,6 +123,24 @@ def refuse_outside(name: str, value: Any, spec: ParameterSpec) -> None:
         raise ValueError(f"Argument `{name}` must {wanted}{unit}, but is {value}.")
 
 
+def refuse_shapes_outside(names: Iterable[str], elements: Iterable[eqx.Module]) -> None:
+    """Refuse shapes of elements that their declarations do not admit.
+
+    Strengths pass: one may have either sign where a linear step gave it.
+
+    Args:
+        names: of the elements.
+        elements: as many.
+
+    Raises:
+        ValueError: if a number lies outside.
+    """
+    for name, element in zip(names, elements, strict=True):
+        for field, spec in own_parameters(element):
+            if field != getattr(element, "strength", None):
+                refuse_outside(f"{name}.{field}", getattr(element, field), spec)
+
+
 def required_parameters(module: type[eqx.Module]) -> tuple[str, ...]:
     """Name the parameters of a module's class that have no default."""
     return tuple(

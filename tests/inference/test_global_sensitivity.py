@@ -113,6 +113,19 @@ def test_a_function_that_cannot_be_mapped_is_evaluated_one_by_one():
     np.testing.assert_allclose(ij.global_sensitivity(plain, CIRCLE, samples=64).total, mapped.total)
 
 
+def test_a_function_that_gives_no_numbers_is_refused_at_once():
+    asked = []
+    for plain in (lambda one: one, float):  # with `jax.vmap`, and where that cannot go through
+
+        def names(x, plain=plain):
+            asked.append(plain(x["a"]))
+            return {"a": x["a"]}
+
+        with pytest.raises(ValueError, match=r"gave one of type dict"):
+            ij.global_sensitivity(names, CIRCLE, samples=64)
+    assert len(asked) == 2
+
+
 def test_what_makes_no_sense_is_refused(unchecked):
     model = ij.paper.y_direction()
     for ranges, words in (

@@ -119,6 +119,16 @@ def test_what_has_no_pressure_says_how_to_give_one(ask):
         (MODEL, {"pressure": [2e5, 3e5]}, r"`pressure` must be one real number, but has shape \(2,\)"),
         (MODEL, {"pressure": "2 bar"}, r"`pressure` must be one real number, but is '2 bar'"),
         (ij.Isolator(MASS, LAWS), {"pressure": 2e5}, r"`pressure` must not be given.* follows nothing"),
+        (
+            ij.Isolator(MASS, (*LAWS, PressureDamping(-DC, REFERENCE))),
+            {"pressure": 8e5},
+            r"at pressure=800000.0 they turn linear_damping from 8000 to -1000",
+        ),
+        (
+            ij.Isolator(MASS, (*LAWS, PressureStiffness(DK, REFERENCE, 50.0))),
+            {"pressure": 2.1e5},
+            r"`pressure_stiffness.curvature` must lie from -10 to 10, but is 50",
+        ),
     ],
 )
 def test_a_condition_that_is_missing_unknown_or_not_positive_is_refused(

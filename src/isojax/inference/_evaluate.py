@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .._given_numbers import NoNumbersError
 from .._progress import Counted, silent
 
 _POINTS_AT_ONCE = 1024
@@ -39,10 +40,13 @@ def evaluate(
         raised most often, "" where it never did.
 
     Raises:
+        NoNumbersError: if the function gives no numbers, at once.
         Exception: what the function raised, if it raised at every point.
     """
     try:
         return _mapped(function, points, progress), ""
+    except NoNumbersError:
+        raise
     except (jax.errors.JAXTypeError, ValueError):
         # A curve or a map refuses numbers that are traced; what else is wrong shows here as well.
         return _one_by_one(function, points, progress)
@@ -75,6 +79,8 @@ def _one_by_one(
     for done, point in enumerate(points, 1):
         try:
             given.append(jax.tree.map(np.asarray, function(jnp.asarray(point))))
+        except NoNumbersError:
+            raise
         except Exception as problem:  # what a fold is asked for where there is none may raise anything
             given.append(None)
             problems.append(problem)

@@ -5,7 +5,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jax.core import Tracer
 
-from .._parameters import element_names, list_parameters, own_parameters, refuse_outside
+from .._parameters import element_names, list_parameters, refuse_shapes_outside
 from ._isolator import Isolator
 
 
@@ -51,9 +51,5 @@ def as_isolator(value: object, argument: str = "model", recorded: bool = False) 
             raise ValueError(
                 f"Argument `{argument}` must hold finite numbers, but {entry.name} is {entry.value}."
             )
-    for element, name in zip(meant.elements, element_names(meant), strict=True):
-        for field, spec in own_parameters(element):
-            # A strength may have either sign where a linear step gave it.
-            if field != element.strength:
-                refuse_outside(f"{name}.{field}", getattr(element, field), spec)
+    refuse_shapes_outside(element_names(meant), meant.elements)
     return meant

@@ -1,14 +1,16 @@
 """Coefficients that follow an operating condition, such as the chamber pressure, at given values of it."""
 
 import math
-from collections.abc import Mapping
-from typing import cast
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 
 from .._given_numbers import given_scalar
+from .._parameters import refuse_shapes_outside
 from .._types import Scalar
 from ..elements import AbstractElement, Dependence
 
@@ -35,6 +37,22 @@ def _refuse_far(follows: Dependence, value: Scalar | float) -> None:
         )
 
 
+def _refuse_turned(
+    before: Sequence[AbstractElement], after: Sequence[AbstractElement], conditions: Mapping[str, Any]
+) -> None:
+    """Refuse conditions that turn the sign of a linear spring or damper: no record showed the law so far."""
+    for one, other in zip(before, after, strict=False):
+        was, is_now = (getattr(element, element.strength) for element in (one, other))
+        if not one.proportional_to or isinstance(was, Tracer) or isinstance(is_now, Tracer):
+            continue
+        if np.any(np.asarray(was) * np.asarray(is_now) < 0.0):
+            at = " and ".join(f"{name}={value}" for name, value in conditions.items())
+            raise ValueError(
+                f"Argument `{next(iter(conditions))}` must lie where the fitted laws hold, but at {at} they "
+                f"turn {one.name} from {float(was):.4g} to {float(is_now):.4g}."
+            )
+
+
 def plain_elements(
     elements: tuple[AbstractElement, ...], conditions: Mapping[str, Scalar | float]
 ) -> tuple[AbstractElement, ...]:
@@ -48,8 +66,9 @@ def plain_elements(
         The effects that follow none, with what the others add to their strengths.
 
     Raises:
-        ValueError: if a condition is missing, follows nothing, is not one positive number, or is far from
-            the reference of a law.
+        ValueError: if a condition is missing, follows nothing, is not one positive number, is far from the
+            reference of a law, or turns the sign of a linear spring or damper; if a shape of an effect lies
+            outside its bounds.
     """
     known = followed_conditions(elements)
     for name, value in conditions.items():
@@ -62,7 +81,9 @@ def plain_elements(
     for name in known:
         if name not in conditions:
             raise ValueError(f"Argument `{name}` must be given: a coefficient of the model follows it.")
-    plain = [element for element in elements if element.dependence() is None]
+    refuse_shapes_outside((element.name for element in elements), elements)
+    before = tuple(element for element in elements if element.dependence() is None)
+    plain = list(before)
     for follows in (element.dependence() for element in elements):
         if follows is None:
             continue
@@ -74,4 +95,5 @@ def plain_elements(
         if place < len(plain):
             strength = getattr(plain[place], law.strength) + strength
         plain[place : place + 1] = [eqx.tree_at(lambda one: getattr(one, one.strength), law, strength)]
+    _refuse_turned(before, plain, conditions)
     return tuple(plain)

@@ -51,8 +51,7 @@ def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitA
         The isolator at the condition with its covariance.
 
     Raises:
-        ValueError: if there is no fit; if a condition is missing, follows nothing, or is not one
-            positive number.
+        ValueError: if there is no fit; as `Isolator.at`.
 
     Example:
         A fitted stiffness that follows the pressure, k(p) = k + dk (p/p0 - 1):

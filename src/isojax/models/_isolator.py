@@ -179,7 +179,8 @@ class Isolator(eqx.Module):
             The isolator without effects that follow a condition, for orbits, maps and simulation.
 
         Raises:
-            ValueError: if a condition is missing, is not positive, or far from a law's reference.
+            ValueError: if a condition is missing, is not positive, is far from a law's reference, or turns
+                the sign of a linear spring or damper; if a shape of an effect lies outside its bounds.
 
         Example:
             >>> chamber = ij.elements.PressureStiffness(change=8e5, reference=2e5)
