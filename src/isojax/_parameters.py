@@ -311,7 +311,7 @@ def full_names(
     return tuple(found)
 
 
-def to_physical(free: Float[Array, ""], spec: ParameterSpec, scale: Scalar | float) -> Float[Array, ""]:
+def to_physical(free: Scalar | float, spec: ParameterSpec, scale: Scalar | float) -> Float[Array, ""]:
     """Map an unbounded variable to a physical number within its bounds.
 
     No bound: `scale * u`. One bound: softplus from it. Two: logistic between them.
@@ -334,8 +334,8 @@ def to_physical(free: Float[Array, ""], spec: ParameterSpec, scale: Scalar | flo
     return scale * free
 
 
-def to_free(value: Scalar | float, spec: ParameterSpec, scale: Scalar | float) -> Float[Array, ""]:
-    """Map a physical number to its unbounded variable: the inverse of `to_physical`.
+def to_free(value: Scalar | float, spec: ParameterSpec, scale: Scalar | float) -> float:
+    """Map a physical number to its unbounded variable: the inverse of `to_physical`, of known numbers.
 
     A value on or outside a bound starts a thousandth of its scale (or range) inside it.
 
@@ -348,12 +348,11 @@ def to_free(value: Scalar | float, spec: ParameterSpec, scale: Scalar | float) -
         The unbounded variable.
     """
     has_lower, has_upper = math.isfinite(spec.lower), math.isfinite(spec.upper)
-    value = jnp.asarray(value)
+    number, size = float(value), float(scale)
     if has_lower and has_upper:
-        share = jnp.clip((value - spec.lower) / (spec.upper - spec.lower), 1e-3, 1 - 1e-3)
-        return jnp.log(share) - jnp.log1p(-share)
+        share = min(max((number - spec.lower) / (spec.upper - spec.lower), 1e-3), 1 - 1e-3)
+        return math.log(share) - math.log1p(-share)
     if has_lower or has_upper:
-        distance = (value - spec.lower if has_lower else spec.upper - value) / scale
-        distance = jnp.maximum(distance, 1e-3)
-        return distance + jnp.log(-jnp.expm1(-distance))
-    return value / scale
+        distance = max((number - spec.lower if has_lower else spec.upper - number) / size, 1e-3)
+        return distance + math.log(-math.expm1(-distance))
+    return number / size

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 if TYPE_CHECKING:
@@ -33,6 +34,11 @@ def as_float64(value: object) -> Array:
     if isinstance(value, int | float) or hasattr(value, "dtype"):
         return jnp.asarray(value, dtype=jnp.result_type(float))
     return value  # type: ignore[return-value]  # jax passes sentinels through pytrees
+
+
+def on_device(values: np.ndarray) -> Array:
+    """Give an array of NumPy to JAX as it is; `jnp.asarray` compiles a program for each shape."""
+    return jax.device_put(values)
 
 
 def check_float64() -> None:

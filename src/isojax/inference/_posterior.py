@@ -221,7 +221,7 @@ class _Target:
         errors = fit.estimate.uncertainty.standard_error
         self._scales = np.maximum(np.abs([float(entry.value) for entry in entries]), errors)
         numbers = zip(entries, self._scales, strict=True)
-        self._centre = jnp.stack([to_free(entry.value, entry.spec, scale) for entry, scale in numbers])
+        self._centre = jnp.array([to_free(entry.value, entry.spec, scale) for entry, scale in numbers])
         slopes = jax.jvp(self._physical, (self._centre,), (jnp.ones_like(self._centre),))[1]
         root = np.linalg.cholesky(fit.estimate.uncertainty.correlation)
         self._root = jnp.asarray((errors / np.asarray(slopes))[:, None] * root)

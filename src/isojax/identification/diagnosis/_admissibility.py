@@ -3,8 +3,10 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
+from ..._types import on_device
 from ...models import Isolator, Quantity
 from ...records import Record
 from ..jacobian import coordinate_motion
@@ -30,9 +32,16 @@ def visited_range(model: Isolator, records: tuple[Record, ...], quantity: Quanti
     )
 
 
-def _static_force(model: Isolator, x: Float[jax.Array, ""], v: Float[jax.Array, ""]) -> Float[jax.Array, ""]:
-    """Give the force of all elements with their internal states at rest [N]."""
-    return model.restoring_force((x, v, *(jnp.zeros(()),) * model.internal_states))
+@quick_jit
+def _damping_power(
+    passive: Isolator, x: Float[Array, " state"], v: Float[Array, " state"]
+) -> Float[Array, " state"]:
+    """Give the power that the dampers of all elements take, their internal states at rest [W]."""
+
+    def force(x: Array, v: Array) -> Array:
+        return passive.restoring_force((x, v, *(jnp.zeros(()),) * passive.internal_states))
+
+    return jax.vmap(lambda x, v: (force(x, v) - force(x, jnp.zeros(()))) * v)(x, v)
 
 
 def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quantity) -> str | None:
@@ -52,21 +61,15 @@ def find_violation(model: Isolator, records: tuple[Record, ...], quantity: Quant
         A sentence, or None.
     """
     largest_x, largest_v = visited_range(model, records, quantity)
-    passive, still = (
-        Isolator(model.mass, tuple(one for one in model.elements if not one.active)),
-        jnp.zeros(()),
-    )
-    vs = jnp.linspace(-largest_v, largest_v, 101)
+    passive = Isolator(model.mass, tuple(one for one in model.elements if not one.active))
     # Over the ellipse that a sine of that size runs along, and its inside: all states that were visited.
-    turns, sizes = jnp.linspace(0.0, 2.0 * jnp.pi, 80, endpoint=False), jnp.linspace(0.0, 1.0, 26)[1:]
-    angle, size = (each.ravel() for each in jnp.meshgrid(turns, sizes))
-    places = jnp.concatenate([jnp.zeros(101), largest_x * size * jnp.cos(angle)])
-    speeds = jnp.concatenate([vs, largest_v * size * jnp.sin(angle)])
-    power = jax.vmap(lambda x, v: (_static_force(passive, x, v) - _static_force(passive, x, still)) * v)(
-        places, speeds
-    )
-    if float(power.min()) < -1e-9 * float(jnp.abs(power).max()):
-        where = 1e3 * float(speeds[int(jnp.argmin(power))])
+    turns, sizes = np.linspace(0.0, 2.0 * np.pi, 80, endpoint=False), np.linspace(0.0, 1.0, 26)[1:]
+    angle, size = (each.ravel() for each in np.meshgrid(turns, sizes))
+    places = np.concatenate([np.zeros(101), largest_x * size * np.cos(angle)])
+    speeds = np.concatenate([np.linspace(-largest_v, largest_v, 101), largest_v * size * np.sin(angle)])
+    power = np.asarray(_damping_power(passive, on_device(places), on_device(speeds)))
+    if power.min() < -1e-9 * np.abs(power).max():
+        where = 1e3 * speeds[np.argmin(power)]
         return f"its damping feeds energy in at {where:.3g} mm/s, within the visited motion"
     activities = (find_activity(element, largest_x, largest_v) for element in model.elements)
     return next((sentence for sentence in activities if sentence is not None), None)

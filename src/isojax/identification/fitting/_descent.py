@@ -10,6 +10,7 @@ from jaxtyping import Array, Float, Int
 from ..._parameters import ParameterSpec, list_parameters, replace_parameters, to_free, to_physical
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
+from ..._types import on_device
 from ...models import Isolator
 from ._elimination import Nuisances, promised_misfits, step_nuisances
 from ._problem import Point, one_hot
@@ -154,18 +155,19 @@ def descend(
     values = [entry.value for entry in listed]
     specs = tuple(listed[place].spec for place in places)
 
-    def physical(free: Array) -> tuple[Isolator, list[float]]:
-        found, slopes = _to_physical(free, jnp.asarray(sizes), specs)
+    def physical(free: np.ndarray) -> tuple[Isolator, list[float]]:
+        found, slopes = _to_physical(on_device(free), on_device(np.array(sizes)), specs)
         numbers = list(values)
         for place, number in zip(places, np.asarray(found), strict=True):
             numbers[place] = number
         return replace_parameters(model, numbers), [float(slope) for slope in np.asarray(slopes)]
 
-    free = jnp.stack([to_free(values[place], specs[c], sizes[c]) for c, place in enumerate(places)])
+    free = np.array([to_free(values[place], specs[c], sizes[c]) for c, place in enumerate(places)])
     # Marquardt's scaling: the solver's variables are those in which the first normal equations have an equal
     # diagonal.
     unit = np.ones(len(places))
-    trial, trial_nuisances, best_free, scaled = free, nuisances, free, free
+    trial, trial_nuisances, best_free = free, nuisances, free
+    scaled = on_device(free)
     best: Point | None = None
     state: Any = None
     result: Any = RESULTS.not_converged
@@ -180,9 +182,9 @@ def descend(
             if not point.is_finite:
                 return Descent(point, RESULTS.not_finite, evaluations)
             unit = np.sqrt(1.0 / FIRST_DAMPING / np.maximum(np.sum(jacobian**2, axis=0), 1e-300))
-        local = _Local(trial / unit, jnp.asarray(residual), jnp.asarray(jacobian * unit))
+        local = _Local(*map(on_device, (trial / unit, residual, jacobian * unit)))
         if state is None:
-            scaled = trial / unit
+            scaled = local.start
             state = _init(search.solver, scaled, local)
         accepted = best is None or (point.is_finite and point.chi2 <= best.chi2)
         # Only a refusal may count for several: an accepted point is one step on.
@@ -228,7 +230,7 @@ def descend(
         # Of records left whole the first samples set the states, whatever the rest would have them do.
         own = model.splits and not simulator.problem.heads
         if own and not accepted and point.is_finite and decrement < STALLED * best.chi2:
-            step = np.asarray(trial - best_free)
+            step = trial - best_free
             held = _held_where_promises_fail(best, point, owner, step, tolerance * max(1.0, chi2))
             if held is not None and evaluations < search.max_steps:
                 search.progress("initial states beside a kink are held")
@@ -251,8 +253,8 @@ def descend(
                 # What was promised is no measure of what is gained from here on.
                 levels = []
                 continue
-        trial = state.y_eval * unit
-        trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, np.asarray(trial - best_free))
+        trial = np.asarray(state.y_eval) * unit
+        trial_nuisances = step_nuisances(best.reduced, owner, best.nuisances, trial - best_free)
     assert best is not None
     slopes = physical(best_free)[1]
     if best.nuisances.held is not nuisances.held:

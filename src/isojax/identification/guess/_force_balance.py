@@ -6,16 +6,21 @@ from collections.abc import Callable
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from scipy.optimize import lsq_linear
 
 from ..._parameters import own_parameters
+from ..._quick_jit import quick_jit
+from ..._types import on_device
 from ...elements import AbstractElement
 from ...models import Instant, Isolator
 from ._motion import Motion
 
 BalanceProjection = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, " row"]]
 """Turns a force over time into the numbers that must balance, such as harmonics; must be linear."""
+
+_SIGNALS = ("displacement", "velocity", "acceleration", "drive")
+"""What of a measured motion enters the balance."""
 
 _UNDRIVEN = 0.01
 """A measured force below this share of the inertia is taken for noise, and the motion for a free decay."""
@@ -50,34 +55,34 @@ def with_strength(element: AbstractElement, strength: float) -> AbstractElement:
     return eqx.tree_at(lambda e: getattr(e, e.strength), element, jnp.asarray(strength, dtype=float))
 
 
-def _unbalanced_force(model: Isolator, motion: Motion) -> Float[np.ndarray, " time"]:
+@quick_jit
+def _unbalanced_force(model: Isolator, signals: tuple[Array, ...]) -> Float[Array, " time"]:
     """Give inertia plus restoring force minus drive [N]; zero where the model is right."""
-    x, v = jnp.asarray(motion.displacement), jnp.asarray(motion.velocity)
+    x, v, a, u = signals
     state = (x, v, *(jnp.zeros_like(x),) * model.internal_states)
-    drive, _ = model.drive(Instant(jnp.asarray(motion.drive)))
+    drive, _ = model.drive(Instant(u))
     inertia = sum((element.inertia() for element in model.elements), start=model.mass)
-    total = inertia * jnp.asarray(motion.acceleration) + model.restoring_force(state)
-    total = total + inertia * drive if model.excitation == "base_acceleration" else total - drive
-    return np.asarray(total)
+    total = inertia * a + model.restoring_force(state)
+    return total + inertia * drive if model.excitation == "base_acceleration" else total - drive
 
 
-def _force_of(model: Isolator, element: AbstractElement, motion: Motion) -> Float[np.ndarray, " time"]:
-    """Give the contribution of an element to the balance [N], never as a difference of large forces."""
-    x, v = jnp.asarray(motion.displacement), jnp.asarray(motion.velocity)
-    a, u = jnp.asarray(motion.acceleration), jnp.asarray(motion.drive)
+@quick_jit
+def _force_of(base: Isolator, element: AbstractElement, signals: tuple[Array, ...]) -> Float[Array, " time"]:
+    """Give the contribution of an element to the balance [N], never as a difference of large forces.
+
+    Of `base` the mass and what is driven count.
+    """
+    x, v, a, u = signals
     gained = element.drive(u, jnp.zeros_like(u))[0] - u
-    on_base = model.excitation == "base_acceleration"
+    on_base = base.excitation == "base_acceleration"
     inertia = element.inertia() * (a + u if on_base else a)
-    return np.asarray(element.force(x, v, ()) + inertia + (model.mass * gained if on_base else -gained))
+    return element.force(x, v, ()) + inertia + (base.mass * gained if on_base else -gained)
 
 
-def _unit_force(
-    model: Isolator, element: AbstractElement, motion: Motion
+def _where_proportional(
+    unit: Float[np.ndarray, " time"], twice: Float[np.ndarray, " time"]
 ) -> Float[np.ndarray, " time"] | None:
-    """Give the force of an element of strength one; None unless its force is proportional to its strength."""
-    if element.internal_states:
-        return None
-    unit, twice = (_force_of(model, with_strength(element, strength), motion) for strength in (1.0, 2.0))
+    """Give the force of a strength of one; None unless that of two is twice as large."""
     size = np.max(np.abs(unit), initial=0.0)
     in_proportion = np.max(np.abs(twice - 2.0 * unit), initial=0.0) <= 1e-9 * size
     return unit if size > 0 and in_proportion and np.all(np.isfinite(unit)) else None
@@ -108,13 +113,16 @@ class ForceBalance:
             projections: how the balance of each is summarised.
             mass_free: whether the mass is unknown too; without a measured force it stays as declared.
         """
-        self._motions, self._projections = motions, projections
+        # End to end: laws have no memory here, and compiled code is made for each length.
+        rows = ([getattr(one, name) for one in motions] for name in _SIGNALS)
+        self._signals = tuple(on_device(np.concatenate(row)) for row in rows)
+        self._ends = np.cumsum([one.drive.size for one in motions])[:-1]
+        self._projections = projections
         self._elements = tuple(with_strength(element, 0.0) for element in model.elements)
         self._base = Isolator(model.mass, self._elements, model.excitation)
         heavier = Isolator(2.0 * model.mass, self._elements, model.excitation)
         absent, twice = (
-            self._rows([_unbalanced_force(one, motion) for motion in motions])
-            for one in (self._base, heavier)
+            self._rows(self._apart(_unbalanced_force(one, self._signals))) for one in (self._base, heavier)
         )
         self._absent, self._inertia = absent, twice - absent
         self._driven = self._inertia - absent
@@ -165,16 +173,25 @@ class ForceBalance:
             fitted=tuple(elements[place].name for place in regressors),
         )
 
+    def _apart(self, forces: Float[Array, " time"]) -> list[Float[np.ndarray, " _"]]:
+        """Give forces motion by motion."""
+        return np.split(np.asarray(forces), self._ends)
+
     def _rows(self, forces: list[Float[np.ndarray, " _"]]) -> Float[np.ndarray, " row"]:
         pairs = zip(self._projections, forces, strict=True)
         return np.concatenate([project(force) for project, force in pairs])
 
     def _regressor(self, element: AbstractElement) -> Float[np.ndarray, " row"] | None:
         """Give the balance of an element of strength one; None where it has no such force."""
-        forces = [_unit_force(self._base, element, motion) for motion in self._motions]
+        if element.internal_states:
+            return None
+        bare = Isolator(self._base.mass, (), self._base.excitation)
+        unit, twice = (
+            self._apart(_force_of(bare, with_strength(element, strength), self._signals))
+            for strength in (1.0, 2.0)
+        )
+        forces = [_where_proportional(*pair) for pair in zip(unit, twice, strict=True)]
         if all(force is None for force in forces):
             return None
-        pairs = zip(forces, self._motions, strict=True)
-        return self._rows(
-            [np.zeros_like(motion.drive) if force is None else force for force, motion in pairs]
-        )
+        pairs = zip(forces, unit, strict=True)
+        return self._rows([np.zeros_like(one) if force is None else force for force, one in pairs])

@@ -7,6 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._quick_jit import quick_jit
+from ..._types import on_device
 from ...elements import AbstractElement
 from ...models import Isolator
 from ._force_balance import BalanceFit, with_strength
@@ -19,6 +21,24 @@ def _static(model: Isolator) -> Isolator:
     """Give the model without effects that have internal states."""
     static = tuple(element for element in model.elements if element.internal_states == 0)
     return Isolator(model.mass, static, model.excitation)
+
+
+@quick_jit
+def _slope_and_powers(
+    static: Isolator, x: Float[Array, " point"], v: Float[Array, " point"]
+) -> tuple[Float[Array, " point"], Float[Array, "3 point"]]:
+    """Give the tangent stiffness along `x` at rest [N/m], and the power of the damping along `v` [W].
+
+    The power is that at both ends of `x` and in its middle, which is zero.
+    """
+
+    def force(x: Array, v: Array) -> Array:
+        return static.restoring_force((x, v))
+
+    still = jnp.zeros_like(x)
+    _, slope = jax.jvp(lambda place: force(place, still), (x,), (jnp.ones_like(x),))
+    places = [jnp.full_like(v, place) for place in (x[0], 0.0, x[-1])]
+    return slope, jnp.stack([(force(here, v) - force(here, still)) * v for here in places])
 
 
 def unphysical_side(model: Isolator, displacement: float, velocity: float, points: int = 41) -> str | None:
@@ -36,22 +56,13 @@ def unphysical_side(model: Isolator, displacement: float, velocity: float, point
     Returns:
         "stiffness", "damping", or None where both are physical.
     """
-    static = _static(model)
-
-    def force(x: Float[Array, " point"], v: Float[Array, " point"]) -> Float[Array, " point"]:
-        return static.restoring_force((x, v))
-
-    x = jnp.linspace(-displacement, displacement, points)
-    still = jnp.zeros_like(x)
-    _, slope = jax.jvp(lambda place: force(place, still), (x,), (jnp.ones_like(x),))
+    span = np.linspace(-1.0, 1.0, points)
+    slope, powers = _slope_and_powers(
+        _static(model), on_device(displacement * span), on_device(velocity * span)
+    )
     if np.any(np.asarray(slope) != 0) and not np.all(np.asarray(slope) > 0):
         return "stiffness"
-    for place in (-displacement, 0.0, displacement):
-        v = jnp.linspace(-velocity, velocity, points)
-        here = jnp.full_like(v, place)
-        if not np.all(np.asarray((force(here, v) - force(here, still)) * v) >= 0):
-            return "damping"
-    return None
+    return None if np.all(np.asarray(powers) >= 0) else "damping"
 
 
 def _degree(unit: AbstractElement, side: str, displacement: float, velocity: float) -> float:

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._cores import usable_cores
+from ..._types import on_device
 from ...excitations import Hold
 from ...models import Instant, Integrator, Isolator, Quantity
 from ...records import Record, measured_state
@@ -113,7 +113,7 @@ class Prepared(NamedTuple):
             part: place of the batch.
         """
         width = self.order.size // len(self.batches)
-        return tuple(jnp.asarray(row) for row in values[:, self.order[part * width : (part + 1) * width]])
+        return tuple(on_device(row) for row in values[:, self.order[part * width : (part + 1) * width]])
 
     def in_lanes(self, parts: Iterable[np.ndarray]) -> np.ndarray:
         """Join what the batches gave, lanes first, in the order of the lanes.
@@ -236,11 +236,11 @@ def prepare(
             spread[state, lane] = max(extent, 1e-300)
 
     def turned(values: np.ndarray, first: int) -> Array:
-        return jnp.asarray(np.ascontiguousarray(np.moveaxis(values[first : first + width], 0, -1)))
+        return on_device(np.ascontiguousarray(np.moveaxis(values[first : first + width], 0, -1)))
 
     batches = tuple(
         Batch(
-            jnp.asarray(sizes[order[first]]),
+            on_device(np.asarray(sizes[order[first]])),
             *(turned(values, first) for values in (drive, rates, measured, weight)),
             channels={name: turned(values, first) for name, values in beside.items()},
         )

@@ -3,10 +3,9 @@
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from ..._types import Internal, Lanes
+from ..._types import Internal, Lanes, on_device
 from ...elements import AbstractElement
 from ...models import State
 
@@ -32,7 +31,7 @@ def find_families(probes: tuple[AbstractElement, ...]) -> tuple[ElementFamily, .
     for places in groups.values():
         members = [probes[place] for place in places]
         # By NumPy: JAX would compile a program for each number of members.
-        stacked = jax.tree_util.tree_map(lambda *leaves: jnp.asarray(np.stack(leaves)), *members)
+        stacked = jax.tree_util.tree_map(lambda *leaves: on_device(np.stack(leaves)), *members)
         families.append(ElementFamily(stacked, tuple(places)))
     return tuple(families)
 
@@ -60,7 +59,7 @@ def stack_states(
     """
     ends = np.cumsum([0, *(probe.internal_states for probe in probes)])
     return tuple(
-        jnp.asarray(np.stack([rows[ends[place] + state] for place in family.places]))
+        on_device(np.stack([rows[ends[place] + state] for place in family.places]))
         for family in families
         for state in range(family.elements.internal_states)
     )

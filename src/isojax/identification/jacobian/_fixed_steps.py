@@ -49,19 +49,19 @@ def _sampler(model: Isolator, sampling: Sampling) -> Callable[..., tuple[Array, 
 
 
 def _scan_first(
-    body: Callable[[Any, Any], tuple[Any, Any]], begun: Any, tables: Any, count: Array
+    body: Callable[[Any, Any], tuple[Any, Any]], begun: Any, tables: Any, count: Array, row: Any
 ) -> tuple[Any, Any]:
     """Do what `jax.lax.scan` does with the first samples, whose count the compiled code does not depend on.
 
-    What the body gives is zero after them.
+    What the body gives is zero after them: `row`, as of one sample. To ask the body for its shape would take
+    as long as to trace it.
     """
 
-    def at(place: Array | int) -> Any:
+    def at(place: Array) -> Any:
         return jax.tree.map(lambda table: jax.lax.dynamic_index_in_dim(table, place, keepdims=False), tables)
 
     time = jax.tree.leaves(tables)[0].shape[0]
-    given = jax.eval_shape(lambda: body(begun, at(0))[1])
-    blank = jax.tree.map(lambda one: jnp.zeros((time, *one.shape), one.dtype), given)
+    blank = jax.tree.map(lambda one: jnp.broadcast_to(one, (time, *one.shape)), row)
 
     def step(place: Array, carry: tuple) -> tuple:
         state, one = body(carry[0], at(place))
@@ -118,7 +118,8 @@ def fixed_information(
     silent = jnp.zeros((total + 1, lanes)) if model.splits else None
     begun = (states, changes.states, jnp.zeros((total + 1, total + 1, lanes)), silent)
     tables = (batch.acting, batch.measured, batch.weight)
-    carry, rows = _scan_first(body, begun, tables, batch.count)
+    row = None if sampling.whitening is None else jnp.zeros((total + 1, lanes))
+    carry, rows = _scan_first(body, begun, tables, batch.count, row)
     if sampling.whitening is None or rows is None:
         return carry[2]
     return whitened_products(rows, batch.weight, sampling.whitening)
@@ -137,7 +138,7 @@ def fixed_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Arra
         return (state, after), reading if pending is None else reading + pending
 
     begun = (states, jnp.zeros_like(scale) if model.splits else None)
-    return _scan_first(body, begun, batch.acting, batch.count)[1]
+    return _scan_first(body, begun, batch.acting, batch.count, jnp.zeros_like(scale))[1]
 
 
 @quick_jit

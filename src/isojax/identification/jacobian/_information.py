@@ -4,11 +4,11 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._kept import recall
+from ..._types import on_device
 from ...models import Isolator
 from ._batch import Prepared, workers
 from ._fixed_steps import fixed_information, fixed_path, fixed_readings
@@ -63,7 +63,7 @@ def information(unknowns: Unknowns, prepared: Prepared) -> Float[np.ndarray, "la
     """
     stepping = find_stepping(prepared)
     moving = unknowns.moving
-    changed = jnp.asarray(unknowns.directions[list(moving)])
+    changed = on_device(unknowns.directions[list(moving)])
 
     def one(part: int) -> np.ndarray:
         (scale,), states = (

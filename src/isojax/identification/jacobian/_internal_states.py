@@ -2,10 +2,10 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._types import on_device
 from ...models import Isolator
 from ...records import Record
 from ._batch import Prepared, coordinate_motion, workers
@@ -17,7 +17,7 @@ def _stages(values: Float[np.ndarray, "time lanes"], steps: int) -> Float[Array,
     """Give values at start, middle and end of each integration step, straight between samples."""
     share = (np.arange(steps)[:, None] + np.array([0.0, 0.5, 1.0])) / steps
     now, ahead = values[:-1, None, None], values[1:, None, None]
-    return jnp.asarray((now + share[..., None] * (ahead - now)).reshape(-1, 3, values.shape[1]))
+    return on_device((now + share[..., None] * (ahead - now)).reshape(-1, 3, values.shape[1]))
 
 
 def internal_starts(
@@ -79,7 +79,7 @@ def internal_starts(
     def along(task: tuple[ElementFamily, int]) -> None:
         family, part = task
         own, step = owned[part], prepared.sampling.time / steps
-        rest = (jnp.zeros((len(family.places), lanes // parts)),) * family.elements.internal_states
+        rest = (on_device(np.zeros((len(family.places), lanes // parts))),) * family.elements.internal_states
         first, _ = internal_state_path(family.elements, leading[part], rest, step)
         places = [[int(ends[place]) + state for place in family.places] for state in range(len(rest))]
         for state, values in zip(places, first, strict=True):

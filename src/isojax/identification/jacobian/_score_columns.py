@@ -15,12 +15,12 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..._cores import give_memory_back
 from ..._parameters import list_parameters, own_parameters
+from ..._types import on_device
 from ...models import Isolator, State
 from ._batch import Batch, Prepared, workers
 from ._effect_inputs import input_columns
@@ -175,7 +175,7 @@ def _block(
             group.solve(table)
     group.solve(table)
     if sampling.whitening is not None:
-        rows = jnp.asarray(table.transpose(2, 1, 0))
+        rows = on_device(table.transpose(2, 1, 0))
         return np.moveaxis(np.asarray(_weigh(rows, batch.weight, sampling.whitening)), -1, 0)
     # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -289,8 +289,8 @@ class _Group:
     def solve(self, table: np.ndarray) -> None:
         """Solve, and put what the readings do into the table."""
         if self.columns:
-            forcing, direct, starts = map(jnp.asarray, (self.forcing, self.direct, self.starts))
-            kicks = None if self.kicks is None else jnp.asarray(self.kicks)
+            forcing, direct, starts = map(on_device, (self.forcing, self.direct, self.starts))
+            kicks = None if self.kicks is None else on_device(self.kicks)
             rows = respond(self.propagation, self.readings, forcing, kicks, direct, starts, self.weight)
             # Turned here, and not in compiled code, which takes four times as long.
             table[:, self.columns] = np.asarray(rows).transpose(2, 1, 0)[:, : len(self.columns)]

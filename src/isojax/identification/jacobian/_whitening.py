@@ -6,6 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._types import on_device
+
 SHORTEST_BLOCK = 16
 """Samples of which one product filters a multiple. Laws are filled up with zeros to as many coefficients, so
 that a few compiled functions serve all orders."""
@@ -45,7 +47,7 @@ def find_whitening(coefficients: tuple[float, ...]) -> Whitening | None:
         law = (law[:-1] - reflection * law[-2::-1]) / (1.0 - reflection**2)
         scale *= np.sqrt(1.0 - reflection**2)
         start[row, : row + 1] = scale * np.append(law[::-1], 1.0)
-    return Whitening(jnp.asarray(start), jnp.asarray(np.array([1.0, *padded])))
+    return Whitening(on_device(start), on_device(np.array([1.0, *padded])))
 
 
 def whiten(
