@@ -55,13 +55,15 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
 def _sparing(check: Callable[..., Any]) -> Callable[..., Any]:
-    """Leave out functions that tell no shape: each call would prepare them for the check, and Pyright sees
-    the types that they do tell."""
+    """Leave out functions that tell no shape, whose types Pyright sees, and those inside others: these would
+    be prepared for the check at each call of the function around them."""
 
     def jaxtyped(function: Any = None, **options: Any) -> Any:
         if function is None:
             return lambda function: jaxtyped(function, **options)
-        if isinstance(function, FunctionType) and "jaxtyping" not in repr(function.__annotations__):
+        if isinstance(function, FunctionType) and (
+            "<locals>" in function.__qualname__ or "jaxtyping" not in repr(function.__annotations__)
+        ):
             return function
         return check(function, **options)
 
