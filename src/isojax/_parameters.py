@@ -324,6 +324,7 @@ def to_physical(free: Scalar | float, spec: ParameterSpec, scale: Scalar | float
     Returns:
         The physical number.
     """
+    free = jnp.asarray(free, dtype=float)
     has_lower, has_upper = math.isfinite(spec.lower), math.isfinite(spec.upper)
     if has_lower and has_upper:
         return spec.lower + (spec.upper - spec.lower) * jax.nn.sigmoid(free)
