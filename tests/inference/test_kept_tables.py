@@ -18,10 +18,11 @@ def page() -> str:
     return (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
 
 
-def report_of(name: str, capsys: pytest.CaptureFixture) -> list[str]:
-    """Print what a script says of its kept rows; one that misses a mark exits."""
+def report_of(name: str, capsys: pytest.CaptureFixture, file: str = "") -> list[str]:
+    """Print what a script says of its kept rows, or of those in another file; a missed mark exits."""
     script = importlib.import_module(name)
-    rows = [json.loads(line) for line in script.RESULTS.read_text(encoding="utf-8").splitlines()]
+    kept = script.RESULTS.with_name(file) if file else script.RESULTS
+    rows = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
     with contextlib.suppress(SystemExit):
         script.report(rows)
     return capsys.readouterr().out.splitlines()
@@ -34,6 +35,14 @@ def test_intervals_from_few_records_are_those_of_the_rows(page, capsys):
     assert (len(judged), len(chances)) == (9, 7)
     for line in (*judged, *chances):
         assert line in page.splitlines()
+
+
+def test_intervals_of_later_rigs_are_those_of_the_rows(page, capsys):
+    printed = report_of("covered", capsys, "intervals_later.jsonl")
+    judged = [line.replace("| all ", "", 1) for line in printed if line.startswith("| all ")]
+    assert len(judged) == 9
+    table = page[page.index("**Later rigs.**") :]
+    assert all(line in table.splitlines() for line in judged)
 
 
 def test_shrinkage_by_the_next_record_is_that_of_the_rows(page, capsys):
