@@ -1,12 +1,10 @@
 """Shared fixtures: float64 before any array is made, shape checks, and the folder of third-party data."""
 
-import functools
 import gc
 import os
 import shutil
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType
@@ -56,38 +54,16 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
-_MOST_CHECKS = 20
-"""Calls of a function in one test whose shapes are checked: of what is traced a thousand times the first
-tell, and the check takes longer than most functions."""
-
-_calls: Counter[Callable[..., Any]] = Counter()
-"""Calls of each function in the present test, as far as they are checked."""
-
-
 def _sparing(check: Callable[..., Any]) -> Callable[..., Any]:
-    """Check the first calls of each function.
-
-    Left out are functions that tell no shape, whose types Pyright sees, and those inside others: these would
-    be prepared for the check at each call of the function around them.
-    """
+    """Leave out functions that tell no shape: each call would prepare them for the check, and Pyright sees
+    the types that they do tell."""
 
     def jaxtyped(function: Any = None, **options: Any) -> Any:
         if function is None:
             return lambda function: jaxtyped(function, **options)
-        if not isinstance(function, FunctionType):
-            return check(function, **options)
-        if "<locals>" in function.__qualname__ or "jaxtyping" not in repr(function.__annotations__):
+        if isinstance(function, FunctionType) and "jaxtyping" not in repr(function.__annotations__):
             return function
-        checked = check(function, **options)
-
-        @functools.wraps(function)
-        def called(*arguments: Any, **named: Any) -> Any:
-            if _calls[function] >= _MOST_CHECKS:
-                return function(*arguments, **named)
-            _calls[function] += 1
-            return checked(*arguments, **named)
-
-        return called
+        return check(function, **options)
 
     return jaxtyped
 
@@ -174,7 +150,6 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     Elsewhere small records run no slower than they would compile. Processes that the test starts do alike, so
     that they find what was compiled here.
     """
-    _calls.clear()
     optimise = any(part in item.nodeid for part in _WORTH_OPTIMISING)
     jax.config.update("jax_disable_most_optimizations", not optimise)
     os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = str(not optimise).lower()
