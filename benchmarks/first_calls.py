@@ -33,6 +33,9 @@ def call(case: str) -> Any:
     import isojax as ij
 
     model = ij.paper.y_direction()
+    if case == "branch, response":
+        branch = ij.continue_branch(model, parameter="amplitude", frequency=4.3, start=1.0, stop=400.0)
+        return branch, ij.frequency_response(model, 150.0, (3.5, 6.0))
     if case == "curve of folds":
         return ij.fold_curve(model, amplitude_range=(100.0, 250.0), frequency_range=(3.8, 4.8))
     if case == "orbit with end stops":
@@ -44,7 +47,7 @@ def call(case: str) -> Any:
     return ij.stability_map(model, np.linspace(1.0, 300.0, 60), np.linspace(3.0, 8.0, 60))
 
 
-CASES = ("curve of folds", "orbit with end stops", "derivative of an orbit", "map")
+CASES = ("branch, response", "curve of folds", "orbit with end stops", "derivative of an orbit", "map")
 
 
 def time_case(case: str) -> None:

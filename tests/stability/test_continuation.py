@@ -1,5 +1,7 @@
 """Branches of periodic orbits against closed forms, harmonic balance and an independent table of folds."""
 
+import re
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -27,6 +29,25 @@ def along_force(model, frequency, start=1.0, stop=400.0, **options):
     return ij.continue_branch(
         model, parameter="amplitude", frequency=frequency, start=start, stop=stop, **asked
     )
+
+
+def test_what_is_compiled_for_one_part_of_the_drive_serves_the_other_and_any_length(caplog):
+    parts = {"_starts", "trace", "_points_of_block", "_locate", "polish"}
+
+    def compiled(parameter, start, stop, **drive):
+        caplog.clear()
+        with jax.log_compiles():
+            branch = ij.continue_branch(
+                DUFFING, parameter=parameter, start=start, stop=stop, other_periods=(), **drive
+            )
+        return branch, parts & set(re.findall(r"Compiling jit\((\w+)\)", caplog.text))
+
+    force, first = compiled("amplitude", 0.1, 10.0, frequency=0.2)
+    swept, again = compiled("frequency", 0.05, 0.4, amplitude=0.3)
+    assert (force.special_points[0].kind, swept.special_points[0].kind) == ("fold", "fold")
+    assert (first, again) == (parts, set())
+    blocks = {-(-branch.points.value.size // 128) for branch in (force, swept)}
+    assert len(blocks) == 2
 
 
 @pytest.fixture(scope="module")

@@ -90,7 +90,7 @@ def _curve(branch: Branch) -> Callable[[Isolator], Float[Array, "quantity ..."]]
 
     def moved(isolator: Isolator) -> Array:
         there = dataclasses.replace(family, model=isolator)
-        found = branch_points(there, method, scale, unknowns, tangents)
+        found, _ = branch_points(there, method, scale, unknowns, tangents)
         both = jnp.stack([found.value, found.response])[..., :count]
         return both[:, 0] if single else both
 

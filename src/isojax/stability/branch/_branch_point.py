@@ -8,6 +8,7 @@ from ..._implicit import frozen, with_derivatives
 from ..._small_systems import solve
 from ..orbit import ShootingMethod, half_range, multipliers, trajectory, value_and_jacobian
 from ._branch import BranchPoints
+from ._criticality import critical_values
 from ._parameter_family import ParameterFamily
 
 
@@ -17,8 +18,8 @@ def branch_point(
     scale: Float[Array, " state"],
     unknown: Float[Array, " unknown"],
     tangent: Float[Array, " unknown"],
-) -> BranchPoints:
-    """Give what is known of one point of a branch.
+) -> tuple[BranchPoints, Float[Array, " test"]]:
+    """Give what is known of one point of a branch, and what changes sign where the branch bifurcates.
 
     Args:
         family: isolators and drives.
@@ -28,9 +29,13 @@ def branch_point(
         tangent: along the branch.
 
     Returns:
-        The point. Its derivatives by the model are those of the branch moving across itself.
+        The point, and `critical_values` there without derivatives. The derivatives of the point by the model
+        are those of the branch moving across itself.
     """
-    return orbit_at(family, method, scale, moved_across(family, method, scale, unknown, tangent), tangent)
+    moved, slope = moved_across(family, method, scale, unknown, tangent)
+    states = scale.shape[0]
+    tests = critical_values(slope[:states, :states] + jnp.eye(states), frozen(tangent))
+    return orbit_at(family, method, scale, moved, tangent), tests
 
 
 def moved_across(
@@ -39,7 +44,7 @@ def moved_across(
     scale: Float[Array, " state"],
     unknown: Float[Array, " unknown"],
     tangent: Float[Array, " unknown"],
-) -> Float[Array, " unknown"]:
+) -> tuple[Float[Array, " unknown"], Float[Array, "unknown unknown"]]:
     """Give a point of a branch with its derivatives by the model: those of the branch moving across itself.
 
     Args:
@@ -50,12 +55,16 @@ def moved_across(
         tangent: along the branch.
 
     Returns:
-        Scaled state and share.
+        Scaled state and share; and, at `unknown` and without derivatives, the slopes of the open end and of
+        the way along the tangent.
     """
     held = method, scale, tangent, unknown
-    left, slope = value_and_jacobian(lambda here: _across(here, frozen(family), held)[0], unknown)
+    still = frozen(held[1:])
+    left, slope = value_and_jacobian(
+        lambda here: _across(here, frozen(family), (method, *still))[0], frozen(unknown)
+    )
     closed = unknown - solve(slope, left)
-    return with_derivatives(closed, _across, closed, family, held)
+    return with_derivatives(closed, _across, closed, family, held), slope
 
 
 def orbit_at(

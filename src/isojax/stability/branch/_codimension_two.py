@@ -33,9 +33,9 @@ from ._branch_switching import switch_branch
 from ._continuation import continue_branch, follow_branches, swept_family, tracing_steps
 from ._criticality import BifurcationKind
 from ._extended_system import Polished
-from ._locating import BranchCurves, locate
+from ._locating import BranchCurves, critical_values_along, locate
 from ._orbit_curve import CurvePoints, CurveStart, OrbitCurve, Whole
-from ._parameter_family import ParameterFamily
+from ._parameter_family import family_of
 from ._tracing import room_for
 
 
@@ -292,7 +292,7 @@ def _curve(
         start = CurveStart(start.amplitude, start.frequency, start.y0, method)
     low, high = (jnp.asarray(np.array(ends)) for ends in zip(*search.window, strict=True))
     zero = jnp.asarray(np.zeros(()))
-    family = ParameterFamily(model, zero, zero, low, high, ("amplitude", "frequency"))
+    family = family_of(model, (zero, zero), (low, high), ("amplitude", "frequency"))
     return OrbitCurve(family, start.method, search.kind, start, search.stride)
 
 
@@ -325,7 +325,9 @@ def _meet(model: Isolator, search: _Search, integrator: Integrator) -> CurveStar
     scale, followed = follow_branches(family, method, None, search.stride)
     found = np.asarray(followed.found)
     room = room_for(found, search.stride.most)
-    curves = BranchCurves(scale, followed.unknowns[:, :room], followed.tangents[:, :room], found)
+    points = followed.unknowns[:, :room], followed.tangents[:, :room]
+    tests = critical_values_along(family, method, scale, *points)
+    curves = BranchCurves(scale, *points, found, tests)
     met = locate(family, method, curves)
     for point in met:
         if point.kind == search.kind:

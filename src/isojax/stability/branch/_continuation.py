@@ -37,7 +37,7 @@ from ._branch import Branch, BranchEvent
 from ._branch_bands import with_bands, with_probability
 from ._criticality import BifurcationKind
 from ._other_branches import BranchSearch, find_other_branches
-from ._parameter_family import ParameterFamily
+from ._parameter_family import ParameterFamily, family_of
 from ._possible_points import find_possible_points
 from ._tracing import assemble, trace
 
@@ -292,7 +292,7 @@ def swept_family(
         raise ValueError(f"Argument `{parameter}`'s partner must be a number or a list, but has {shape}.")
     lanes = {name: jnp.broadcast_to(value, shape or (1,)) for name, value in drive.items()}
     drives = lanes["amplitude"], lanes["frequency"]
-    return ParameterFamily(model, *drives, start[None], stop[None], (parameter,)), bool(shape)
+    return family_of(model, drives, (start[None], stop[None]), (parameter,)), bool(shape)
 
 
 @quick_jit

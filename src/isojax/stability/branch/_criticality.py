@@ -43,6 +43,25 @@ def criticality(kind: BifurcationKind, matrix: Float[Array, "state state"]) -> F
     return _determinant(matrix - CRITICAL[kind] * jnp.eye(matrix.shape[0]))
 
 
+def critical_values(
+    matrix: Float[Array, "state state"], tangent: Float[Array, " unknown"]
+) -> Float[Array, " test"]:
+    """Give what changes sign where a branch bifurcates.
+
+    The parameter's part of the tangent (fold), and the polynomials of `criticality` for a doubling, or a
+    broken symmetry on the half-period map, and for a pair.
+
+    Args:
+        matrix: derivative of the map.
+        tangent: along the branch, the parameter last.
+
+    Returns:
+        The three values.
+    """
+    others = [criticality(kind, matrix) for kind in ("period_doubling", "neimark_sacker")]
+    return jnp.stack([tangent[-1], *others])
+
+
 def second_compound(matrix: Float[Array, "state state"]) -> Float[Array, "pair pair"]:
     """Give the minors of order two: the matrix whose eigenvalues are the products of pairs of multipliers."""
     first, second = np.triu_indices(matrix.shape[0], 1)

@@ -13,7 +13,7 @@ from ..._small_systems import solve
 from ..orbit import ShootingMethod, is_odd, period_map, value_and_jacobian
 from ._branch import BranchEvent, BranchPoints
 from ._branch_point import orbit_at
-from ._criticality import BifurcationKind, criticality
+from ._criticality import BifurcationKind, critical_values
 from ._extended_system import PointGuess
 from ._parameter_family import ParameterFamily
 
@@ -51,31 +51,14 @@ class BranchCurves(NamedTuple):
         unknowns: points: scaled states and shares.
         tangents: along the branches.
         counts: points found on each.
+        tests: `critical_values` at each point.
     """
 
     scale: Float[Array, "branch state"]
     unknowns: Float[Array, "branch point unknown"]
     tangents: Float[Array, "branch point unknown"]
     counts: Int[np.ndarray, " branch"]
-
-
-def critical_values(
-    matrix: Float[Array, "state state"], tangent: Float[Array, " unknown"]
-) -> Float[Array, " test"]:
-    """Give what changes sign where a branch bifurcates.
-
-    The parameter's part of the tangent (fold), and the polynomials of `criticality` for a doubling, or a
-    broken symmetry on the half-period map, and for a pair.
-
-    Args:
-        matrix: derivative of the map.
-        tangent: along the branch, the parameter last.
-
-    Returns:
-        The three values.
-    """
-    others = [criticality(kind, matrix) for kind in ("period_doubling", "neimark_sacker")]
-    return jnp.stack([tangent[-1], *others])
+    tests: Float[Array, "branch point test"]
 
 
 def _slopes(
@@ -86,7 +69,7 @@ def _slopes(
 
 
 @quick_jit
-def _critical_values_along(
+def critical_values_along(
     family: ParameterFamily, method: ShootingMethod, scale: Array, unknowns: Array, tangents: Array
 ) -> Float[Array, "branch point test"]:
     """Give the test functions of bifurcations at every point of a batch of branches."""
@@ -222,8 +205,8 @@ def locate(
     Returns:
         Where they are, branch after branch.
     """
-    scale, unknowns, tangents, counts = curves
-    tests = np.asarray(_critical_values_along(family, method, scale, unknowns, tangents))
+    scale, unknowns, _, counts, _ = curves
+    tests = np.asarray(curves.tests)
     if events:
         tests = np.concatenate([tests, np.asarray(_event_values(events, points))], axis=-1)
     with np.errstate(over="ignore"):

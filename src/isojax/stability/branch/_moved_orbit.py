@@ -29,7 +29,7 @@ from ..orbit import (
     trajectory,
 )
 from ._moved_point import Move, Place, zero_along
-from ._parameter_family import ParameterFamily
+from ._parameter_family import ParameterFamily, family_of
 
 _STEPS = 0.02 * 1.16 ** np.arange(56)
 """Steps along the branch either way, over the size of motion and drive: a resonance may move far."""
@@ -95,11 +95,10 @@ def _moved_start(
     # The model moves first, under the drive as it was; another amplitude is sought along the branch.
     wanted = drive.amplitude / unit
 
-    names = ("amplitude",)
-
     def family(isolator: Isolator, at: Harmonic, unit: Array) -> ParameterFamily:
         ends = jnp.zeros(1), unit[None]
-        return ParameterFamily(isolator, as_float64(at.amplitude), as_float64(at.frequency), *ends, names)
+        drives = as_float64(at.amplitude), as_float64(at.frequency)
+        return family_of(isolator, drives, ends, ("amplitude",))
 
     def test(unknown: Array, _: Array, __: Array) -> Array:
         return unknown[-1] - wanted

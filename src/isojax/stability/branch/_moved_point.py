@@ -20,9 +20,9 @@ from ..._implicit import frozen
 from ..._small_systems import solve
 from ..orbit import ShootingMethod, state_scale, trajectory, value_and_jacobian
 from ._branch import SpecialPoint
-from ._criticality import BifurcationKind
+from ._criticality import BifurcationKind, critical_values
 from ._extended_system import PointGuess
-from ._locating import TEST_OF, critical_values
+from ._locating import TEST_OF
 from ._parameter_family import ParameterFamily
 
 _STAGES = 4

@@ -245,5 +245,6 @@ def distinct(family: ParameterFamily, closed: OrbitStarts) -> OrbitStarts:
 
 
 def _frequencies(family: ParameterFamily, shares: Float[np.ndarray, " start"]) -> Float[np.ndarray, " start"]:
-    drive = jax.vmap(lambda share: jnp.asarray(family.at(share[None]).frequency))
-    return np.asarray(drive(jnp.asarray(shares)))
+    start, stop = (float(end[0]) for end in (family.start, family.stop))
+    is_frequency = bool(np.asarray(family.of_drive)[0, 1])
+    return start + shares * (stop - start) if is_frequency else np.full(shares.shape, float(family.frequency))

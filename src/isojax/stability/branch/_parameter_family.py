@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..._parameters import find_parameter, list_parameters, replace_parameters
 from ..._show import shown
-from ..._types import Lanes
+from ..._types import Lanes, on_device
 from ...models import Isolator
 from ..orbit import PeriodicDrive, ShootingMethod, is_held, period_map, recorded_sine
 
@@ -16,8 +17,32 @@ _ALL_BUT_HELD = 1e-3
 """Excess of the drive over what frees a mass, as a share of its amplitude, up to which the mass counts as
 held: it then moves for some hundredths of the period, and its multipliers go to one with the excess."""
 
+_DRIVE = ("amplitude", "frequency")
+
 _STILL = 1e-6
 """Velocity over its size up to which a mass that friction can hold counts as held."""
+
+
+def family_of(
+    model: Isolator,
+    drive: tuple[Lanes, Lanes],
+    ends: tuple[Float[Array, " parameter"], Float[Array, " parameter"]],
+    names: tuple[str, ...],
+) -> "ParameterFamily":
+    """Give the family along named parameters.
+
+    Args:
+        model: the isolator.
+        drive: F0 and f [Hz] where they are no parameters.
+        ends: value of each parameter at shares 0 and 1.
+        names: "amplitude", "frequency" or a coefficient by its name in reports.
+
+    Returns:
+        The family.
+    """
+    of_drive = np.array([[name == part for part in _DRIVE] for name in names])
+    coefficients = tuple("" if name in _DRIVE else name for name in names)
+    return ParameterFamily(model, *drive, *ends, on_device(of_drive), coefficients)
 
 
 class Setting(NamedTuple):
@@ -49,7 +74,9 @@ class ParameterFamily(eqx.Module):
         frequency: f [Hz] where it is no parameter.
         start: value of each parameter at share 0.
         stop: value of each parameter at share 1.
-        names: "amplitude", "frequency" or a coefficient by its name in reports.
+        of_drive: whether each parameter is F0, and whether it is f: numbers and no names, so that what is
+            compiled for the one serves the other.
+        coefficients: name in reports of each parameter that is a coefficient; "" of one of the drive.
     """
 
     model: Isolator
@@ -57,7 +84,14 @@ class ParameterFamily(eqx.Module):
     frequency: Lanes
     start: Float[Array, " parameter"]
     stop: Float[Array, " parameter"]
-    names: tuple[str, ...] = eqx.field(static=True)
+    of_drive: Bool[Array, "parameter 2"]
+    coefficients: tuple[str, ...] = eqx.field(static=True)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each parameter: "amplitude", "frequency" or a coefficient's in reports."""
+        found = zip(self.coefficients, np.asarray(self.of_drive), strict=True)
+        return tuple(name or _DRIVE[int(np.argmax(own))] for name, own in found)
 
     def driven(self, amplitude: Lanes, frequency: Lanes) -> "ParameterFamily":
         """Give the same isolators under another drive.
@@ -95,12 +129,15 @@ class ParameterFamily(eqx.Module):
         Returns:
             Both.
         """
-        found = dict(zip(self.names, self.values(shares), strict=True))
-        amplitude, frequency = found.pop("amplitude", self.amplitude), found.pop("frequency", self.frequency)
+        drive = self.amplitude, self.frequency
         numbers = [entry.value for entry in list_parameters(self.model)]
-        for name, value in found.items():
-            numbers[find_parameter(self.model, name)] = value
-        return Setting(replace_parameters(self.model, numbers), amplitude, frequency)
+        found = zip(self.coefficients, self.of_drive, self.values(shares), strict=True)
+        for name, own, value in found:
+            if name:
+                numbers[find_parameter(self.model, name)] = value
+            else:
+                drive = tuple(jnp.where(is_it, value, part) for is_it, part in zip(own, drive, strict=True))
+        return Setting(replace_parameters(self.model, numbers), *drive)
 
     def is_held(
         self, velocity: Float[Array, ""], shares: Float[Array, " parameter"], speed: Float[Array, ""]

@@ -23,8 +23,7 @@ from ...models import CoefficientErrors, Isolator
 from ..orbit import ShootingMethod, value_and_jacobian
 from ._branch import Branch, SpecialPoint
 from ._branch_point import moved_across
-from ._criticality import BifurcationKind
-from ._locating import critical_values
+from ._criticality import BifurcationKind, critical_values
 from ._parameter_family import ParameterFamily
 from ._tracing import lanes_of
 
@@ -117,7 +116,7 @@ def _tests(
         here, states = family.driven(amplitude, frequency), scale.shape[0]
 
         def point(u: Array, t: Array) -> Array:
-            moved = moved_across(here, method, scale, u, t)
+            moved, _ = moved_across(here, method, scale, u, t)
             _, slope = value_and_jacobian(lambda at: here.open_end(method, scale, at), moved)
             ahead = solve(jnp.concatenate([slope, t[None]]), jnp.zeros(states + 1).at[-1].set(1.0))
             return critical_values(slope[:, :states] + jnp.eye(states), ahead / jnp.linalg.norm(ahead))

@@ -8,13 +8,17 @@ from jaxtyping import Array, Float, Int
 
 from ..._quick_jit import quick_jit
 from ..._results import RESULTS
-from ..orbit import ShootingMethod
+from ..._types import on_device
+from ..orbit import ShootingMethod, is_traced
 from ._arc_length import HELD, REACHED_BOUND, RETURNED, STIFF, Departure, Followed, Stride, follow
 from ._branch import Branch, BranchEvent, BranchPoints
 from ._branch_point import branch_point
 from ._locating import BranchCurves
 from ._parameter_family import ParameterFamily
 from ._special_points import find_special_points
+
+_POINTS_A_BLOCK = 128
+"""Points of each branch in one compiled batch."""
 
 
 @quick_jit
@@ -50,15 +54,14 @@ def trace(
     return jax.vmap(lane)(family.amplitude, family.frequency, scale, departure)
 
 
-@quick_jit
 def branch_points(
     family: ParameterFamily,
     method: ShootingMethod,
     scale: Float[Array, "branch state"],
     unknowns: Float[Array, "branch point unknown"],
     tangents: Float[Array, "branch point unknown"],
-) -> BranchPoints:
-    """Give what is known of the points of a batch of branches.
+) -> tuple[BranchPoints, Float[Array, "branch point test"]]:
+    """Give what is known of the points of a batch of branches, and what changes sign at bifurcations.
 
     Args:
         family: isolators and drives, drive with a leading axis.
@@ -68,12 +71,44 @@ def branch_points(
         tangents: along the branches.
 
     Returns:
-        The points. Their derivatives by the model are those of the branches moving across themselves.
+        The points, and `critical_values` there without derivatives. The derivatives of the points by the
+        model are those of the branches moving across themselves.
     """
+    count = unknowns.shape[1]
+    blocks = [
+        _points_of_block(family, method, scale, *(_block(values, begin) for values in (unknowns, tangents)))
+        for begin in range(0, count, _POINTS_A_BLOCK)
+    ]
+    return jax.tree.map(lambda *parts: _joined(parts, count), *blocks)
+
+
+def _joined(parts: tuple[Array, ...], count: int) -> Array:
+    """Give the numbers of all blocks without what fills the last; by NumPy, which compiles nothing."""
+    if is_traced(parts):
+        return jnp.concatenate(parts, axis=1)[:, :count]
+    return on_device(np.concatenate([np.asarray(own) for own in parts], axis=1)[:, :count])
+
+
+def _block(values: Float[Array, "branch point unknown"], begin: int) -> Float[Array, "branch block unknown"]:
+    """Give a block of points, filled up with NaN."""
+    own = values[:, begin : begin + _POINTS_A_BLOCK]
+    fill = _POINTS_A_BLOCK - own.shape[1]
+    return jnp.pad(own, ((0, 0), (0, fill), (0, 0)), constant_values=jnp.nan) if fill else own
+
+
+@quick_jit
+def _points_of_block(
+    family: ParameterFamily,
+    method: ShootingMethod,
+    scale: Float[Array, "branch state"],
+    unknowns: Float[Array, "branch block unknown"],
+    tangents: Float[Array, "branch block unknown"],
+) -> tuple[BranchPoints, Float[Array, "branch block test"]]:
+    """Give what is known of a block of points of each branch, for which one compiled shape serves all."""
 
     def lane(
         amplitude: Array, frequency: Array, scale: Array, unknown: Array, tangent: Array
-    ) -> BranchPoints:
+    ) -> tuple[BranchPoints, Array]:
         here = family.driven(amplitude, frequency)
         return jax.vmap(lambda u, t: branch_point(here, method, scale, u, t))(unknown, tangent)
 
@@ -82,7 +117,7 @@ def branch_points(
 
 def room_for(counts: Int[np.ndarray, " branch"], most: int) -> int:
     """Give how many points of each branch to keep: all, rounded up, so that few shapes are compiled."""
-    return min(-(-max(int(counts.max()), 2) // 128) * 128, most)
+    return min(-(-max(int(counts.max()), 2) // _POINTS_A_BLOCK) * _POINTS_A_BLOCK, most)
 
 
 def lanes_of(
@@ -144,16 +179,19 @@ def assemble(
     counts = np.asarray(followed.found)
     room = room_for(counts, followed.unknowns.shape[1])
     unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
-    points = branch_points(family, method, scale, unknowns, tangents)
-    curves = BranchCurves(scale, unknowns, tangents, counts)
+    points, tests = branch_points(family, method, scale, unknowns, tangents)
+    curves = BranchCurves(scale, unknowns, tangents, counts, tests)
     special = find_special_points(family, method, curves, events, points)
     longest = int(counts.max())
 
     def crop(values: Array) -> Array:
-        used = jnp.asarray(np.arange(longest) < counts[:, None])
+        used = np.arange(longest) < counts[:, None]
         used = used.reshape(used.shape + (1,) * (values.ndim - 2))
-        kept = jnp.where(used, values[:, :longest], jnp.nan)
-        return kept if batched else kept[0]
+        if is_traced(values):
+            kept = jnp.where(used, values[:, :longest], jnp.nan)
+            return kept if batched else kept[0]
+        kept = np.where(used, np.asarray(values)[:, :longest], np.nan)
+        return on_device(kept if batched else kept[0])
 
     def single(values: Array) -> Array:
         return values if batched else values[0]

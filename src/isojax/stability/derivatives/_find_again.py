@@ -1,5 +1,6 @@
 """A known answer found again for another model: what JAX can trace, batch and differentiate."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any, TypeVar, get_args
 
@@ -13,7 +14,6 @@ from ...models import Isolator, Modelled, as_isolator
 from ..branch import (
     BifurcationKind,
     CodimensionTwoPoint,
-    ParameterFamily,
     SpecialPoint,
     find_bifurcation_again,
     find_codimension_two_again,
@@ -130,7 +130,7 @@ def _special_point(point: SpecialPoint, model: Isolator, amplitude: Any, frequen
         known.amplitude if amplitude is None else amplitude,
         known.frequency if frequency is None else frequency,
     )
-    family = ParameterFamily(model, *fixed, known.start, known.stop, known.names)
+    family = dataclasses.replace(known, model=model, amplitude=fixed[0], frequency=fixed[1])
     return find_bifurcation_again(point, kind, family)
 
 
