@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import isojax as ij
 from isojax.reporting import compile_seconds, map_arrays, map_summary
-from isojax.stability.branch import ParameterFamily
+from isojax.stability.branch._parameter_family import family_of
 
 FOLDS = {4.1: (190.62, 194.01), 4.2: (171.89, 178.12), 4.4: (144.52, 150.66)}
 """Lower and upper fold force [N] by frequency [Hz] of the paper's y model, found with another program."""
@@ -182,7 +182,7 @@ def codimension_two(kind, along, amplitude, frequency, multipliers):
     """A special point of a curve that nobody followed."""
     good, nothing = ij.RESULTS.promote(diffrax.RESULTS.successful), jnp.array(jnp.nan)
     pair, window = jnp.zeros(2), (jnp.array([1.0, 1.0]), jnp.array([9.0, 9.0]))
-    family = ParameterFamily(ij.paper.y_direction(), nothing, nothing, *window, ("amplitude", "frequency"))
+    family = family_of(ij.paper.y_direction(), (nothing, nothing), window, ("amplitude", "frequency"))
     place = jnp.asarray(amplitude), jnp.asarray(frequency)
     rest = (1, False, family, ij.Integrator(), jnp.zeros(4), pair, nothing)
     return ij.CodimensionTwoPoint(kind, *place, pair, multipliers, good, along, *rest)

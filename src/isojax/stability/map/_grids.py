@@ -119,6 +119,7 @@ def first_grid(
     rest: float,
     ends: tuple[float, float],
     frequencies: Float[np.ndarray, " frequency"],
+    most: int,
 ) -> FirstGrid:
     """Find orbits that are not split, without their invariants, and the kinks that most of them pass.
 
@@ -129,6 +130,8 @@ def first_grid(
         rest: displacement at rest [m].
         ends: least and largest logarithm of the displacement amplitudes [m].
         frequencies: of the map [Hz].
+        most: steps a period of the starts, of which half are taken: those of the first grid that is made, so
+            that what is compiled for it serves the next.
 
     Returns:
         The orbits.
@@ -136,9 +139,7 @@ def first_grid(
     logarithms, band = axes_of(ends, frequencies, 0)
     usual = integrator_over(model, integrator_for(model, None), np.exp(ends), frequencies)
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(band, np.exp(logarithms), indexing="ij"))
-    # Starts need no more steps where the map takes more, and what is compiled for one grid serves the next.
-    steps = min(integrator.steps_per_period, usual.steps_per_period)
-    coarse = integrator.with_steps(2 * (steps // 4 + 2))
+    coarse = integrator.with_steps(2 * (min(most, usual.steps_per_period) // 4 + 2))
     starts = node_starts(model, coarse, half, rest, amplitude, frequency)
     shape = len(band), len(logarithms)
     if model.slides:

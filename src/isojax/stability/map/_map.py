@@ -209,7 +209,8 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
         integrator = window_integrator(model, usual, window)
         if integrator.steps_per_period > usual.steps_per_period:
             least = integrator.steps_per_period
-    sought = seek(model, integrator, half, window, integrator.map_error, run)
+    start_steps = integrator.steps_per_period
+    sought = seek(model, integrator, half, window, integrator.map_error, run, start_steps)
     goal = _READING_SHARE * integrator.map_error
     # Where friction begins to hold the mass a surface has a kink, near which more steps gain little.
     enough = integrator.map_error if model.slides else goal
@@ -217,7 +218,7 @@ def solve_map(model: Isolator, window: MapWindow, run: MapRun) -> tuple[Stabilit
     asked = run.integrator is None and (sought.reads or model.slides)
     if asked and sought.reading_error > enough:
         integrator = integrator.with_steps(steps_for(integrator.steps_per_period, sought.reading_error, goal))
-        sought = seek(model, integrator, half, window, goal, run)
+        sought = seek(model, integrator, half, window, goal, run, start_steps)
     first = sought.groups[0]
     if run.integrator is None and isinstance(first.solver, CellSolver):
         # Nothing is read off: each orbit is integrated for itself, and steps cost.

@@ -71,8 +71,9 @@ class SlopeTables:
         sizes = np.asarray(smap.start)[..., 0][together] - rest
         ends = math.log(np.nanmin(sizes) / _ROOM), math.log(np.nanmax(sizes) * _ROOM)
         self.smap, self.directions, self.level = smap, directions, 0
+        integrator, frequencies = smap.integrator, np.asarray(smap.frequencies)
         self.first: FirstGrid = first_grid(
-            smap.model, smap.integrator, smap.symmetric, rest, ends, np.asarray(smap.frequencies)
+            smap.model, integrator, smap.symmetric, rest, ends, frequencies, integrator.steps_per_period
         )
         self.grid: Grid = self.first.grid
 

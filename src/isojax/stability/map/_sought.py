@@ -111,6 +111,7 @@ def seek(
     window: MapWindow,
     goal: float,
     run: MapRun,
+    start_steps: int,
 ) -> Sought:
     """Find which orbits a window of force and frequency holds, and by what each is to be found.
 
@@ -124,6 +125,7 @@ def seek(
         window: of the map.
         goal: error of multipliers read off down to which nodes are added.
         run: how the map is made.
+        start_steps: most steps a period of the orbits from which the others start.
 
     Returns:
         What is to be found.
@@ -131,7 +133,7 @@ def seek(
     Raises:
         ValueError: if there is no orbit anywhere.
     """
-    surface = find_surface(model, integrator, half, window, goal)
+    surface = find_surface(model, integrator, half, window, goal, start_steps)
     candidates = find_candidates(surface, window.amplitudes, run.coexisting)
     if not candidates.force.size:
         raise ValueError("No orbit was found anywhere in the window. Widen `amplitudes` or `frequencies`.")

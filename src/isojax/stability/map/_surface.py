@@ -33,6 +33,9 @@ _LARGEST_RESPONSE = 2.0
 """Half the peak-to-peak displacement over the largest from rest, beyond which a motion did not close: it
 starts at its largest displacement."""
 
+_RESPONSE_STEPS = 256
+"""Fewest steps a period of the motions whose size is read off: one compiled count serves most maps."""
+
 _ROWS_BEYOND = 2
 """Nodes of the first grid beyond the largest displacement that is held."""
 
@@ -208,7 +211,7 @@ def displacements(model: Isolator, window: MapWindow) -> Displacements:
 
 
 def find_surface(
-    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, goal: float
+    model: Isolator, integrator: Integrator, half: bool, window: MapWindow, goal: float, start_steps: int
 ) -> Surface:
     """Find the orbits over displacement and frequency that a window of force and frequency can hold.
 
@@ -221,13 +224,14 @@ def find_surface(
         half: whether to use the half-period map.
         window: of the map.
         goal: error down to which multipliers are to be read off.
+        start_steps: most steps a period of the orbits from which the others start.
 
     Returns:
         The surface.
     """
     sizes = displacements(model, window)
     rest, ends = sizes.rest, (math.log(sizes.least), math.log(sizes.largest))
-    first = first_grid(model, integrator, half, rest, ends, window.frequencies)
+    first = first_grid(model, integrator, half, rest, ends, window.frequencies, start_steps)
     start, kinks = first.grid, first.kinks
     first = first._replace(ends=_ends_needed(start, window))
     grid = start
@@ -281,7 +285,8 @@ def _with_responses(
         return grid.tables
     frequency, amplitude = np.meshgrid(grid.frequencies, np.exp(grid.logarithms), indexing="ij")
     unknown = grid.tables[: 2 + model.internal_states].reshape(-1, amplitude.size).T
-    sizes = node_responses(model, integrator, half, rest, amplitude.ravel(), frequency.ravel(), unknown)
+    fine = integrator.with_steps(max(integrator.steps_per_period, _RESPONSE_STEPS))
+    sizes = node_responses(model, fine, half, rest, amplitude.ravel(), frequency.ravel(), unknown)
     sizes = sizes.reshape(1, *amplitude.shape)
     # Of a motion that ran away there is none.
     sizes = filled(np.where(sizes < _LARGEST_RESPONSE, sizes, np.nan))
