@@ -215,7 +215,10 @@ def test_reports_name_what_integrated_the_records(fitted):
 
 @pytest.mark.slow
 def test_a_diagnosis_beside_such_a_fit_finds_what_the_default_finds(fitted):
-    rivals = {"quadratic_stiffness", "maxwell_branch"}  # without and with a state; this solver compiles slowly
+    rivals = {
+        "quadratic_stiffness",
+        "maxwell_branch",
+    }  # without and with a state; this solver compiles slowly
     others = tuple(sorted(set(CATALOGUE) - rivals))
     found, wanted = (diagnose(one, excluded=others).finding for one in (fitted.tight, fitted.default))
     assert found.effect == wanted.effect

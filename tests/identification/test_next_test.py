@@ -211,6 +211,19 @@ def test_the_picture_has_a_bar_for_each_record_that_could_be_simulated(found):
         plot.next_test(found._replace(proposals=tuple(one for one in found.proposals if one.reason)))
 
 
+@pytest.mark.slow
+def test_a_further_record_makes_nothing_less_certain_where_three_show_too_small_a_scatter(tmp_path):
+    laws = rig.base_laws(1.0805e6, -6.974e8, 2.51667e11, 1.027e4, -3.6880e5, 5.3753e6)
+    plan = rig.SteppedSine((60.0, 120.0, 150.0), (4.0, 4.3, 4.6, 4.9, 5.2, 5.6), 10, ("forward",))
+    declared = tuple(law.name for law in laws)
+    bench = rig.Bench(rate=200.0, drift=5e-4)
+    fitted = fit(rig.write_campaign(tmp_path / "c", rig.Plant(laws), plan, 7, "c", bench, declared=declared))
+    assert fitted.stats.stiffness_scatter < 0.1 * bench.drift
+    asked = next_test(fitted, levels=(80.0, 100.0), bands=((4.4, 5.2), (4.0, 4.8)))
+    for proposal in asked.proposals:
+        assert proposal.reason or np.all(proposal.standard_errors < asked.standard_errors)
+
+
 def test_one_level_band_or_number_of_dwells_may_stand_alone():
     assert plan_of(2.0, 60.0, (4.0, 6.0), 3, 1.2) == plan_of(2.0, [60.0], [(4.0, 6.0)], (3,), 1.2)
 
@@ -232,6 +245,10 @@ def test_mistakes_are_refused(fitted, unchecked):
         ({"rivals": ("linear_damping",)}, "`rivals` must be a pair"),
         ({"rivals": ("linear_damping", "linear_damping")}, "`rivals` must be a pair"),
         ({"rivals": ("linear_damping", 3)}, "`rivals` must end with an element .* of type int"),
+        (
+            {"rivals": ("linear_damping", "cubic_stiffness")},
+            "effect that the model lacks, .* has cubic_stiff",
+        ),
     ):
         with pytest.raises(ValueError, match=words):
             next_test(fitted, **given)

@@ -1,5 +1,7 @@
 """The error of a fit carried into quantities, against closed forms and central differences."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -260,6 +262,15 @@ def test_a_probability_next_to_the_confidence_is_said_to_be_undecided(wide, lost
 def test_a_quantity_that_leaves_jax_is_told_how_to_stay(wide):
     with pytest.raises(ValueError, match=r"`quantity` must be differentiable by `jax.jacfwd`, .*`float`"):
         ij.uncertainty(wide, lambda model: float(model[STIFFNESS]))
+
+
+def test_fits_to_campaigns_of_equal_length_are_not_mixed(fit):
+    records = [dataclasses.replace(one, output=1.01 * one.output) for one in fit.campaign.records]
+    other = fit._replace(campaign=dataclasses.replace(fit.campaign, records=tuple(records)))
+    with pytest.raises(
+        ValueError, match=r"must list fits to the same records, but those of campaign '.*' differ"
+    ):
+        ij.uncertainty([fit, other], lambda model: model[STIFFNESS])
 
 
 def test_fits_that_the_data_do_not_separate_are_mixed_by_their_evidence(wide):

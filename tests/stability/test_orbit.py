@@ -2,6 +2,7 @@
 
 import math
 
+import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -220,6 +221,7 @@ def test_a_motion_that_runs_away_is_nan_and_says_why():
             {"model": paper.y_direction().with_elements(ij.InputOffset(1.0)), "symmetric": True},
             "Argument `symmetric` must be False for a model that is not odd, but is True.",
         ),
+        ({"integrator": ij.Integrator(diffrax.Dopri8(), rtol=1e-8)}, "must be an Integrator with RK4"),
     ],
 )
 def test_bad_arguments_are_refused_with_what_was_expected(arguments, words):

@@ -301,6 +301,23 @@ def _why_missing(quantity: Callable[[Isolator], Any], errors: CoefficientErrors)
     return ""
 
 
+def _check_same_records(fits: list[Any]) -> None:
+    """Refuse fits whose records are known and differ; a saved fit holds none."""
+    campaigns = [one.campaign for one in fits if getattr(one, "campaign", None) is not None]
+    measured = [[(record.input, record.output) for record in campaign.fit_records] for campaign in campaigns]
+    for place, other in enumerate(measured[1:], start=1):
+        same = len(other) == len(measured[0]) and all(
+            np.array_equal(one, its)
+            for pair in zip(measured[0], other, strict=True)
+            for one, its in zip(*pair, strict=True)
+        )
+        if not same:
+            raise ValueError(
+                "Argument `fit` must list fits to the same records, but those of campaign "
+                f"{campaigns[place].title!r} differ from those of {campaigns[0].title!r}."
+            )
+
+
 def _evidence(fits: list[Any]) -> Float[np.ndarray, " fit"]:
     """Give the share of the evidence that each fit has, by BIC per max(chi2/dof, 1) of the best."""
     held = [one if isinstance(one, Estimated) else getattr(one, "after", None) for one in fits]
@@ -312,6 +329,7 @@ def _evidence(fits: list[Any]) -> Float[np.ndarray, " fit"]:
             f"{', '.join(str(samples) for samples, _, _ in known) or 'no'} samples in "
             f"{len(known)} of {len(fits)} fits."
         )
+    _check_same_records(held)
     bic = np.array([one for _, one, _ in known])
     inflation = max(1.0, min(misfit for _, _, misfit in known))
     weight = np.exp(-0.5 * (bic - bic.min()) / inflation)

@@ -259,7 +259,19 @@ def _rival(
             "Argument `rivals` must end with an element or a name of the catalogue, but ends with one of "
             f"type {type(given).__name__}."
         )
-    return (absent(given),), fit.free.index(strengths[name])
+    rival = absent(given)
+    if any(type(one) is type(rival) and _shape(one) == _shape(rival) for one in fit.model.elements):
+        raise ValueError(
+            "Argument `rivals` must end with an effect that the model lacks, beside which its records could "
+            f"speak, but the model has {rival.name}."
+        )
+    return (rival,), fit.free.index(strengths[name])
+
+
+def _shape(element: AbstractElement) -> tuple[float, ...]:
+    """Give the numbers of an effect beside its strength."""
+    own = list_parameters(element)
+    return tuple(float(entry.value) for entry in own if entry.name != element.strength)
 
 
 def _largest_motion(columns: Columns, campaign: Campaign, outline: TestOutline) -> float:

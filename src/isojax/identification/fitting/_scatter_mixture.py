@@ -200,7 +200,8 @@ def expect_uncertainty(
 
     What the record will show of its own stiffness is not known. The covariance is the mean over what it may
     show, which the present records predict: a scatter drawn from its posterior, and a deviation drawn from
-    that. Noise changes no covariance of the linearised records.
+    that. The coefficients will be those of the scatter that all records then show, not of the present one,
+    which few records may show by chance. Noise changes no covariance of the linearised records.
 
     Args:
         reduced: equations of the present records at the solution.
@@ -226,9 +227,7 @@ def expect_uncertainty(
     shown = _deviations(_at(records, _SCATTERS).weight, len(records.own)) / STIFFNESS_SCALE_UNIT
     covariance = np.zeros_like(whole)
     for deviation in shown:
-        expected = _uncertainty(
-            known, _together(records, _as_shown(further, deviation)), nuisances.spread.records
-        )
+        expected = _uncertainty(known, _together(records, _as_shown(further, deviation)), None)
         if expected is None:
             return invert_information(whole, inflation)
         covariance += expected.covariance / shown.size
@@ -262,15 +261,19 @@ def _together(one: _Records, other: _Records) -> _Records:
     return _Records(*(np.concatenate(pair) for pair in zip(one, other, strict=True)))
 
 
-def _uncertainty(known: Determined, records: _Records, scatter: float) -> Uncertainty | None:
-    """Sum over all scatters about the coefficients that belong to one; None where equations are singular."""
+def _uncertainty(known: Determined, records: _Records, scatter: float | None) -> Uncertainty | None:
+    """Sum over all scatters about the coefficients that belong to one; None where equations are singular.
+
+    That one is the most probable where it is not given.
+    """
     try:
-        own = _at(records, np.array([scatter]))
         mixture = _at(records, _SCATTERS)
+        most = mixture.step[np.argmax(mixture.weight)]
+        own = most if scatter is None else _at(records, np.array([scatter])).step[0]
     except np.linalg.LinAlgError:
         return None
     # About the fitted value: what keeps it from the minimum, such as a bound, is no scatter.
-    step = (mixture.step - own.step[0]) @ known.vectors.T
+    step = (mixture.step - own) @ known.vectors.T
     covariance = known.vectors @ mixture.covariance @ known.vectors.T
     moment = np.einsum("t,tij->ij", mixture.weight, covariance)
     moment += np.einsum("t,ti,tj->ij", mixture.weight, step, step)

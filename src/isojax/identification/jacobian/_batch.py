@@ -149,6 +149,11 @@ def workers() -> int:
     return usable_cores() if jax.default_backend() == "cpu" else 1
 
 
+def _turned(values: Float[np.ndarray, "lanes ..."]) -> Float[Array, "... lanes"]:
+    """Give a table to the device, lanes last."""
+    return on_device(np.ascontiguousarray(np.moveaxis(values, 0, -1)))
+
+
 _Table = tuple[Float[np.ndarray, "time stage"], Float[np.ndarray, "time stage"]]
 
 
@@ -198,12 +203,8 @@ def prepare(
     # Long ones beside long ones: a batch is done when its longest segment is.
     order = np.append(np.argsort(-sizes, kind="stable"), np.arange(sizes.size, lanes))
     stages = 2 * substeps + 1
-    # Filled lane by lane, then turned: writing across the lanes would touch a cache line a sample.
-    drive, rates = np.zeros((lanes, length, stages)), np.zeros((lanes, length, stages))
-    beside = {name: np.zeros((lanes, length, stages)) for name in channels}
-    measured, weight = np.zeros((lanes, length)), np.zeros((lanes, length))
     starts, spread = np.zeros((2, lanes)), np.ones((2, lanes))
-    owner = np.zeros(lanes, dtype=int)
+    owner, count = np.zeros(lanes, dtype=int), np.zeros(len(records))
 
     def known(place: int) -> tuple[_Table, tuple[np.ndarray, ...], dict[str, np.ndarray]]:
         record = records[place]
@@ -218,35 +219,37 @@ def prepare(
     with ThreadPoolExecutor(workers()) as pool:
         used = sorted({segment.record for segment in segments})
         content = dict(zip(used, pool.map(known, used), strict=True))
-    for row, lane in enumerate(order[: sizes.size]):
-        segment, size = segments[lane], sizes[lane]
-        record = records[segment.record]
-        (table, slopes), motion, extra = content[segment.record]
-        window = slice(segment.start, segment.stop)
-        drive[row, :size], rates[row, :size] = table[window], slopes[window]
-        for name, values in extra.items():
-            beside[name][row, :size] = values[window]
-        measured[row, :size] = record.output[window]
-        weight[row, segment.counted - segment.start : size] = 1.0
-        owner[lane] = segment.record
-        for state in range(2):
-            starts[state, lane] = motion[state][segment.start]
-            # A motion that rings down is largest at its start, far above the rms of its record.
-            extent = np.ptp(motion[state][window]) if record.rings_down else np.std(motion[state][window])
-            spread[state, lane] = max(extent, 1e-300)
 
-    def turned(values: np.ndarray, first: int) -> Array:
-        return on_device(np.ascontiguousarray(np.moveaxis(values[first : first + width], 0, -1)))
-
-    batches = tuple(
-        Batch(
+    def batch(first: int) -> Batch:
+        # Filled lane by lane, then turned: writing across the lanes would touch a cache line a sample.
+        drive, rates = np.zeros((width, length, stages)), np.zeros((width, length, stages))
+        beside = {name: np.zeros((width, length, stages)) for name in channels}
+        measured, weight = np.zeros((width, length)), np.zeros((width, length))
+        for row, lane in enumerate(order[first : min(first + width, sizes.size)]):
+            segment, size = segments[lane], sizes[lane]
+            record = records[segment.record]
+            (table, slopes), motion, extra = content[segment.record]
+            window = slice(segment.start, segment.stop)
+            drive[row, :size], rates[row, :size] = table[window], slopes[window]
+            for name, values in extra.items():
+                beside[name][row, :size] = values[window]
+            measured[row, :size] = record.output[window]
+            weight[row, segment.counted - segment.start : size] = 1.0
+            owner[lane] = segment.record
+            count[segment.record] += weight[row].sum()
+            for state in range(2):
+                starts[state, lane] = motion[state][segment.start]
+                # A motion that rings down is largest at its start, far above the rms of its record.
+                extent = np.ptp(motion[state][window]) if record.rings_down else np.std(motion[state][window])
+                spread[state, lane] = max(extent, 1e-300)
+        return Batch(
             on_device(np.asarray(sizes[order[first]])),
-            *(turned(values, first) for values in (drive, rates, measured, weight)),
-            channels={name: turned(values, first) for name, values in beside.items()},
+            *(_turned(values) for values in (drive, rates, measured, weight)),
+            channels={name: _turned(values) for name, values in beside.items()},
         )
-        for first in range(0, lanes, width)
-    )
-    count = np.bincount(owner[order], weights=weight.sum(axis=1), minlength=len(records))
+
+    # One after the other: the tables are the largest arrays that there are.
+    batches = tuple(batch(first) for first in range(0, lanes, width))
     jumps = hold == "zero_order"
     sampling = Sampling(quantity, 1.0 / records[0].rate, how, jumps, find_whitening(whitening))
     return Prepared(batches, order, segments, owner, starts, spread, count, sampling)

@@ -221,11 +221,18 @@ def integrator_for(model: Isolator, integrator: Integrator | None, steps: int = 
         The integrator.
 
     Raises:
-        ValueError: if the caller's takes too few steps for the highest harmonic.
+        ValueError: if the caller's is no RK4, or takes too few steps for the highest harmonic.
     """
     order, least = highest_order(model), fewest_steps(model)
     if integrator is None:
         return Integrator(steps_per_period=max(steps, _STEPS_A_HARMONIC * order))
+    if not isinstance(integrator, Integrator) or not integrator.is_locked:
+        given = type(integrator.solver).__name__ if isinstance(integrator, Integrator) else repr(integrator)
+        raise ValueError(
+            "Argument `integrator` must be an Integrator with RK4, into whose fixed steps a drive period is "
+            f"divided, but is {given}. Give Integrator(steps_per_period=256), or omit it; `simulate` and "
+            "`fit` take any solver of diffrax."
+        )
     if integrator.steps_a_period(model) < least:
         raise ValueError(
             f"Argument `integrator` must take at least {least} steps a drive period, because the drive has a "
