@@ -260,10 +260,11 @@ def _rival(
             f"type {type(given).__name__}."
         )
     rival = absent(given)
-    if any(type(one) is type(rival) and _shape(one) == _shape(rival) for one in fit.model.elements):
+    known = [one for label, one in zip(labels, fit.model.elements, strict=True) if label in fitted]
+    if any(type(one) is type(rival) and _shape(one) == _shape(rival) for one in known):
         raise ValueError(
-            "Argument `rivals` must end with an effect that the model lacks, beside which its records could "
-            f"speak, but the model has {rival.name}."
+            "Argument `rivals` must end with an effect that the model lacks, because records cannot tell an "
+            f"effect from itself, but the model has {rival.name}."
         )
     return (rival,), fit.free.index(strengths[name])
 

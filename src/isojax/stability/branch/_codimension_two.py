@@ -327,7 +327,7 @@ def _meet(model: Isolator, search: _Search, integrator: Integrator) -> CurveStar
     room = room_for(found, search.stride.most)
     points = followed.unknowns[:, :room], followed.tangents[:, :room]
     tests = critical_values_along(family, method, scale, *points)
-    curves = BranchCurves(scale, *points, found, tests)
+    curves = BranchCurves(scale, points[0], found, tests)
     met = locate(family, method, curves)
     for point in met:
         if point.kind == search.kind:

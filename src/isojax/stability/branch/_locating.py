@@ -49,14 +49,12 @@ class BranchCurves(NamedTuple):
     Attributes:
         scale: size of each state.
         unknowns: points: scaled states and shares.
-        tangents: along the branches.
         counts: points found on each.
         tests: `critical_values` at each point.
     """
 
     scale: Float[Array, "branch state"]
     unknowns: Float[Array, "branch point unknown"]
-    tangents: Float[Array, "branch point unknown"]
     counts: Int[np.ndarray, " branch"]
     tests: Float[Array, "branch point test"]
 
@@ -205,8 +203,8 @@ def locate(
     Returns:
         Where they are, branch after branch.
     """
-    scale, unknowns, _, counts, _ = curves
-    tests = np.asarray(curves.tests)
+    scale, unknowns, counts, tests = curves
+    tests = np.asarray(tests)
     if events:
         tests = np.concatenate([tests, np.asarray(_event_values(events, points))], axis=-1)
     with np.errstate(over="ignore"):

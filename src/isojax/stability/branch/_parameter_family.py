@@ -18,6 +18,7 @@ _ALL_BUT_HELD = 1e-3
 held: it then moves for some hundredths of the period, and its multipliers go to one with the excess."""
 
 _DRIVE = ("amplitude", "frequency")
+"""Names of the parameters of the drive, in the order of `ParameterFamily.of_drive`."""
 
 _STILL = 1e-6
 """Velocity over its size up to which a mass that friction can hold counts as held."""

@@ -180,7 +180,7 @@ def assemble(
     room = room_for(counts, followed.unknowns.shape[1])
     unknowns, tangents = followed.unknowns[:, :room], followed.tangents[:, :room]
     points, tests = branch_points(family, method, scale, unknowns, tangents)
-    curves = BranchCurves(scale, unknowns, tangents, counts, tests)
+    curves = BranchCurves(scale, unknowns, counts, tests)
     special = find_special_points(family, method, curves, events, points)
     longest = int(counts.max())
 
