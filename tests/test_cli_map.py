@@ -199,7 +199,7 @@ def test_a_model_that_follows_the_pressure_is_mapped_at_one(z_map, tmp_path, cap
     )
     command = ["map", str(path), *WINDOW, "--out", str(tmp_path / "out"), "--quiet"]
     assert main(command) == 2
-    assert "`pressure` must be given" in capsys.readouterr().err
+    assert "--pressure must be given" in capsys.readouterr().err
     assert main([*command, "--pressure", "2.5e5"]) == 0
     assert eqx.tree_equal(mapped, [follows.at(pressure=2.5e5)])
 

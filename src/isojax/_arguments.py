@@ -3,15 +3,20 @@
 import argparse
 import contextlib
 import math
+import re
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 
+from ._quantities import CONDITIONS
 from .demo import campaign_folder
 
 Command = Callable[[argparse.Namespace], int]
 
 MAP_STEPS = 200
 """Values along each side of a map, if omitted."""
+
+_PASSED_ON = ("amplitudes", "frequencies", "coexisting", "checkpoint", *CONDITIONS)
+"""Options that go to a function as arguments of the same name."""
 
 _EXIT_CODES = (
     "Exit codes: 0 done; 1 the fit did not converge, or no cell of a map did, which the report says; 2 an "
@@ -98,7 +103,7 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
     plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
     _axis(plane, "amplitudes", "drive amplitudes [N, or m/s^2 for base excitation]")
     _axis(plane, "frequencies", "drive frequencies [Hz]")
-    for condition, unit in (("pressure", "Pa"), ("temperature", "K")):
+    for condition, unit in CONDITIONS.items():
         plane.add_argument(
             f"--{condition}",
             type=float,
@@ -155,6 +160,23 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
     _shown(demo)
     demo.set_defaults(run=commands["close-loop"], campaign=campaign_folder(), anyway=False)
     return parser
+
+
+def in_options(words: str, asked: argparse.Namespace) -> str:
+    """Give a message about arguments of a function as one about the options that set them.
+
+    Args:
+        words: the message.
+        asked: the arguments that were read.
+
+    Returns:
+        The message; what no option sets keeps its name.
+    """
+
+    def option(found: re.Match[str]) -> str:
+        return f"--{found[1]}" if found[1] in _PASSED_ON and hasattr(asked, found[1]) else found[0]
+
+    return re.sub(r"Argument `(\w+)`", option, words)
 
 
 def _share(text: str) -> float:

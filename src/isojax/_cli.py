@@ -10,10 +10,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._arguments import MAP_STEPS, command_line
+from ._arguments import MAP_STEPS, command_line, in_options
 from ._interrupt import INTERRUPTED, prompt_interrupt
 from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
 from ._progress import LOOP_SHARES, Counted, KeyFigure, Notice, Stage, before, silent, watched
+from ._quantities import CONDITIONS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with prompt_interrupt(lambda: f"interrupted; {asked.kept()}"):
             return asked.run(asked)
     except (ValueError, OSError) as error:
-        print(f"isojax: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"isojax: {in_options(' '.join(str(error).split()), asked)}", file=sys.stderr)
         return _WRITTEN_ELSEWHERE if isinstance(error, KeptElsewhereError) else 2
     except KeyboardInterrupt:
         print(f"isojax: interrupted; {asked.kept()}", file=sys.stderr)
@@ -257,7 +258,6 @@ def _map(asked: argparse.Namespace) -> int:
     _start_jax()
 
     from .models import fit_at, load_model
-    from .records import CONDITIONS
 
     model = load_model(asked.model)
     fit, whose = _fit_beside(Path(asked.model), model, asked.next_record) if asked.chances else (None, "")

@@ -14,6 +14,9 @@ INPUT_WORDS = {
 DRIVE_UNITS = {excitation: INPUT_WORDS[excitation][1] for excitation in ("force", "base_acceleration")}
 """SI unit of the drive of an isolator, by its `excitation`."""
 
+CONDITIONS = {"pressure": "Pa", "temperature": "K"}
+"""Operating conditions that a record may state, with their units: fields of `Record`, and of [[record]]."""
+
 _RAISED = str.maketrans("0123456789-.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·")
 _UNKNOWN = "–"
 

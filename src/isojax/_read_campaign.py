@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from .records import CONDITIONS, Campaign, Declaration, read_declaration, read_measurements
+from ._quantities import CONDITIONS
+from .records import Campaign, Declaration, read_declaration, read_measurements
 
 
 def read_campaign(

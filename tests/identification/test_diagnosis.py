@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from isojax import rig
+from isojax._quantities import CONDITIONS
 from isojax._results import RESULTS
 from isojax.elements import (
     CATALOGUE,
@@ -21,7 +22,6 @@ from isojax.identification import close_loop, diagnose, extend, fit, residual, s
 from isojax.identification.diagnosis._score import absent_effects, score_test
 from isojax.identification.fitting import Search
 from isojax.models import Integrator, Isolator
-from isojax.records import CONDITIONS
 
 LINEAR = rig.Plant((rig.LinearStiffness(1.08e6), rig.LinearDamping(1e4)))
 START = Isolator(800.0, (LinearStiffness(1.05e6), LinearDamping(1.1e4)))

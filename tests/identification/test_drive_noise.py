@@ -1,5 +1,6 @@
 """Noise of the drive channel, which the output does not show: an oscillator that SciPy solves exactly."""
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from isojax.elements import LinearDamping, LinearStiffness
 from isojax.identification import Rules, diagnose, fit
 from isojax.identification.fitting import DEFAULT_SOLVER, drive_noise, search_of, weighted_by_output
 from isojax.models import Isolator
-from isojax.records import Dwell, Record
+from isojax.records import Dwell, Record, estimate_noise, residual_noise
 
 RATE, SENSOR, FORCE = 250.0, 0.003, 4.0
 STIFFNESS, DAMPING, MASS = 1.0e6, 4.0e3, 800.0
@@ -68,6 +69,18 @@ def noisy_record(seed, measured, acting, period=None):
 def fitted(campaign_of, records):
     campaign = campaign_of(records, stiffness=("linear",), damping=("linear",), input={"hold": "linear"})
     return fit(Isolator(MASS, (LinearStiffness(0.97e6), LinearDamping(5e3))), campaign)
+
+
+@pytest.mark.parametrize("true", [(SENSOR, SENSOR), (SENSOR, 2.0 * SENSOR)])
+def test_each_record_weighs_with_the_noise_that_its_own_residual_shows(campaign_of, true):
+    """Dwells whose start rings on scatter more than the sensor does, and not all records alike."""
+    records = tuple(noisy_record(place, 0.0, 0.0) for place in range(2))
+    campaign, draw = campaign_of(records), np.random.default_rng(5)
+    seen = dataclasses.replace(estimate_noise(campaign), sigma=1.02 * SENSOR, levels=(SENSOR, 3.0 * SENSOR))
+    windows = [[level * draw.standard_normal(records[0].output.size)] for level in true]
+    found = residual_noise(campaign, seen, windows)
+    assert found.method == "residual"
+    assert found.levels == pytest.approx(true, rel=0.03)
 
 
 @pytest.mark.parametrize("period", [None, 1250])

@@ -8,12 +8,12 @@ from solved_by_scipy import MASS, solved
 
 from isojax import rig
 from isojax._parameters import own_parameters
+from isojax._quantities import CONDITIONS
 from isojax._results import is_successful
 from isojax.elements import CATALOGUE, CoulombFriction, LinearDamping, LinearStiffness
 from isojax.identification import fit, scales
 from isojax.identification.guess._force_balance import with_strength
 from isojax.models import Integrator, Isolator
-from isojax.records import CONDITIONS
 
 PLAN = rig.Multisine((60.0, 110.0), 2.0, 14.0, period=2.0, periods=5, lines="full")
 EXACT = rig.Bench(rate=500.0, noise=2e-3, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-7)

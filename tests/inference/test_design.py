@@ -114,6 +114,11 @@ def test_a_coefficient_whose_bounds_differ_in_sign_moves_evenly():
     assert found.values[0] == pytest.approx(-5e11, rel=1e-5)
 
 
+def test_a_bound_of_zero_is_one_like_any_other():
+    found = ij.design(MODEL, lambda model: (model[C] - 321.0) ** 2, free={C: (0.0, 9e3)}, scan=4)
+    assert found.values[0] == pytest.approx(321.0, rel=1e-5)
+
+
 def test_what_cannot_be_met_is_named_with_by_how_much():
     alone = ij.design(MODEL, stiffness, at_least(stiffness, 3e6), free={K: (1e6, 2.5e6)}, scan=8)
     assert not ij.is_successful(alone.result)

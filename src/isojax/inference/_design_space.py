@@ -56,7 +56,7 @@ class Space(NamedTuple):
     def values(self, at: Any) -> Array:
         """Give the coefficients at a point."""
         logarithmic, safe = jnp.asarray(self.logarithmic), np.where(self.logarithmic, self.lower, 1.0)
-        ratio = np.where(self.logarithmic, self.upper / safe, 1.0)
+        ratio = np.where(self.logarithmic, self.upper, 1.0) / safe
         evenly = self.lower + (self.upper - self.lower) * at
         return jnp.where(logarithmic, safe * ratio**at, evenly)
 
@@ -67,10 +67,9 @@ class Space(NamedTuple):
 
     def coordinates(self, values: Float[np.ndarray, " coordinate"]) -> Float[np.ndarray, " coordinate"]:
         """Give the point of given coefficients."""
-        safe = np.where(self.logarithmic, values / self.lower, 1.0)
-        ratio = np.where(self.logarithmic, self.upper / self.lower, np.e)
-        evenly = (values - self.lower) / (self.upper - self.lower)
-        return np.where(self.logarithmic, np.log(safe) / np.log(ratio), evenly)
+        place, log = (values - self.lower) / (self.upper - self.lower), self.logarithmic
+        place[log] = np.log(values[log] / self.lower[log]) / np.log(self.upper[log] / self.lower[log])
+        return place
 
     def moved(self, at: Any, shaken: Callable[[list[Any]], list[Any]] = list) -> Isolator:
         """Give the isolator at a point.

@@ -13,8 +13,9 @@ from .._progress import silent
 from .._results import RESULTS, cell_results
 from .._show import Row, brief, number, shown
 from .._types import check_float64
-from ..models import Isolator
+from ..models import Isolator, Modelled, as_isolator
 from ._evaluate import NOT_FINITE, evaluate
+from ._named_quantity import NamedQuantity
 
 _UNMOVED = 1e-12
 """Standard deviation of a quantity over its mean, up to which it does not depend on the inputs."""
@@ -49,6 +50,7 @@ class GlobalSensitivity(NamedTuple):
         samples: points at which the quantity was evaluated.
         failed_at: inputs at which it failed; each takes its row of `inputs + 2` samples out of the estimate.
         reason: why it failed there; "" where nothing failed.
+        names: of the numbers, in the order of the last axis, where the quantity gives a dict; else empty.
     """
 
     inputs: tuple[str, ...]
@@ -62,19 +64,22 @@ class GlobalSensitivity(NamedTuple):
     samples: int
     failed_at: Float[np.ndarray, "failed input"]
     reason: str
+    names: tuple[str, ...] = ()
 
     def _headline(self) -> str:
         lost = f", {len(self.failed_at)} failed" if len(self.failed_at) else ""
         return f"first and total index of {len(self.inputs)} inputs, {self.samples} samples{lost}"
 
     def _rows(self) -> list[Row]:
+        parts = [(f"{name}, ", (place,)) for place, name in enumerate(self.names)] or [("", ())]
         return [
             Row(
-                name,
-                _words(self.first[place], self.first_interval[:, place]),
-                f"total {_words(self.total[place], self.total_interval[:, place])}",
+                f"{part}{name}",
+                _words(self.first[at, *own], self.first_interval[:, at, *own]),
+                f"total {_words(self.total[at, *own], self.total_interval[:, at, *own])}",
             )
-            for place, name in enumerate(self.inputs)
+            for part, own in parts
+            for at, name in enumerate(self.inputs)
         ]
 
     def _lines(self) -> list[str]:
@@ -98,7 +103,7 @@ def _words(index: Any, interval: Any) -> str:
 def global_sensitivity(
     quantity: Callable[[Any], Any],
     ranges: Mapping[str, Any],
-    model: Isolator | None = None,
+    model: Isolator | Modelled | None = None,
     *,
     samples: int = 2048,
     confidence: float = 0.95,
@@ -111,15 +116,16 @@ def global_sensitivity(
     the input does together with others. The inputs are independent.
 
     Args:
-        quantity: function that gives real numbers: one, or an array; or a pair of these and a `RESULTS`,
-            which then says why a sample failed. With a `model` it is a function of the isolator, as in
+        quantity: function that gives real numbers: one, an array, or a dict of single ones by their names,
+            which the answer keeps; or a pair of these and a `RESULTS`, which then says why a sample failed.
+            With a `model` it is a function of the isolator, as in
             `sensitivity` and `uncertainty`; without, of a dictionary of numbers by the names in `ranges`.
             Where `jax.vmap` cannot go through it, it is evaluated sample by sample; where it raises, the
             sample has failed.
         ranges: for each input its least and greatest value, between which all are equally likely, or a law
             of `scipy.stats`, such as `stats.norm(value, standard_error)`. With a `model` the names are those
             of its parameters, or their symbols.
-        model: the isolator, if the quantity is a function of one.
+        model: the isolator, or what holds one, such as a fit, if the quantity is a function of one.
         samples: rows of the design, a power of 2; the quantity is evaluated `inputs + 2` times in each.
         confidence: chance that an interval is to hold the index.
         seed: of the samples and of the bootstrap.
@@ -158,26 +164,26 @@ def global_sensitivity(
             "Argument `quantity` must be a function, such as lambda model: model.mass, but is "
             f"{brief(quantity)}."
         )
-    if not (model is None or isinstance(model, Isolator)):
-        raise ValueError(f"Argument `model` must be an Isolator, but is of type {type(model).__name__}.")
+    isolator = None if model is None else as_isolator(model, recorded=True)
     if not isinstance(ranges, Mapping):
         raise ValueError(
             "Argument `ranges` must be a dictionary of the ends of each input by its name, but is of type "
             f"{type(ranges).__name__}."
         )
-    if model is not None:
-        ranges = dict(zip(full_names(model, ranges, "ranges"), ranges.values(), strict=True))
+    if isolator is not None:
+        ranges = dict(zip(full_names(isolator, ranges, "ranges"), ranges.values(), strict=True))
     names = tuple(ranges)
     if not names:
         raise ValueError("Argument `ranges` must name at least one input, but is empty.")
     points = _design([_law(name, ranges[name]) for name in names], samples, seed)
     flat = points.reshape(-1, len(names))
-    if model is not None:
-        _check_bounds(model, names, flat)
+    if isolator is not None:
+        _check_bounds(isolator, names, flat)
+    asked = NamedQuantity(quantity)
 
     def at(numbers: Float[Array, " input"]) -> tuple[Array, RESULTS | None]:
         own = {name: numbers[place] for place, name in enumerate(names)}
-        answer = quantity(own if model is None else _moved(model, own))
+        answer = asked(own if isolator is None else _moved(isolator, own))
         told = isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], RESULTS)
         value, result = answer if told else (answer, None)
         return as_numbers("quantity", value), result
@@ -223,6 +229,7 @@ def global_sensitivity(
         len(flat),
         flat[failed],
         reason,
+        asked.names,
     )
 
 

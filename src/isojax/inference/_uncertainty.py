@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .._given_numbers import as_numbers, asked_numbers, given_chance, given_count
+from .._given_numbers import asked_numbers, given_chance, given_count
 from .._progress import silent
 from .._show import Row, shown
 from .._types import check_float64
@@ -22,6 +22,7 @@ from ..models import (
     credible_set,
 )
 from ._evaluate import NOT_FINITE, evaluate
+from ._named_quantity import NamedQuantity
 
 _UNDECIDED_WITHIN = 2.0
 """Standard errors of a probability within which the confidence asked for counts as reached or missed by
@@ -185,7 +186,7 @@ def uncertainty(
         raise ValueError("Argument `fit` must hold at least one fit, but the list is empty.")
     weights = _evidence(fits) if len(fits) > 1 else np.ones(1)
     counts = np.maximum(np.round(weights * draws), weights == weights.max()).astype(int)
-    asked = _Named(quantity) if callable(quantity) else quantity
+    asked = NamedQuantity(quantity) if callable(quantity) else quantity
     parts = [
         _carried(coefficient_errors(fits[place]), asked, int(counts[place]), seed + int(place), progress)
         for place in np.argsort(-weights, kind="stable")
@@ -214,30 +215,8 @@ def uncertainty(
         tuple(weights.tolist()),
         known.probability,
         known.probability_error,
-        asked.names if isinstance(asked, _Named) else (),
+        asked.names if isinstance(asked, NamedQuantity) else (),
     )
-
-
-class _Named:
-    """A quantity whose dict of numbers, if it gives one, is an array; the names are kept beside."""
-
-    def __init__(self, quantity: Callable[[Isolator], Any]):
-        self.quantity = quantity
-        self.names: tuple[str, ...] = ()
-
-    def __call__(self, model: Isolator) -> Any:
-        """Give the numbers."""
-        given = self.quantity(model)
-        if not isinstance(given, dict):
-            return given
-        odd = [name for name, one in given.items() if np.ndim(one) != 0]
-        if odd or not given:
-            raise ValueError(
-                "Argument `quantity` must give a dict of single numbers, but gives "
-                + (f"an array as {odd[0]!r}." if odd else "an empty one.")
-            )
-        self.names = tuple(map(str, given))
-        return jnp.stack([as_numbers("quantity", one) for one in given.values()])
 
 
 class _Carried(NamedTuple):

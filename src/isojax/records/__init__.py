@@ -12,7 +12,6 @@ from ._campaign import Filter as Filter
 from ._campaign import FloorChannel as FloorChannel
 from ._campaign import InputChannel as InputChannel
 from ._campaign import OutputChannel as OutputChannel
-from ._record import CONDITIONS as CONDITIONS
 from ._record import Direction as Direction
 from ._record import Dwell as Dwell
 from ._record import ExcitationKind as ExcitationKind

@@ -8,15 +8,13 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from jaxtyping import Float
 
+from .._quantities import CONDITIONS
 from .._show import Row, number, shown
 
 _Answer = TypeVar("_Answer")
 
 Direction = Literal["forward", "backward", "none"]
 Role = Literal["fit", "holdout"]
-CONDITIONS = {"pressure": "Pa", "temperature": "K"}
-"""Operating conditions that a record may state, with their units: fields of `Record`, and of [[record]]."""
-
 ExcitationKind = Literal["stepped_sine", "periodic", "swept", "free_decay", "impulse", "broadband"]
 
 

@@ -5,8 +5,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from jaxtyping import Float
 
+from ..._quantities import CONDITIONS
 from ...elements import Scales
-from ...records import CONDITIONS, Campaign, Record
+from ...records import Campaign, Record
 from ..jacobian import workers
 from ._motion import Motion, measured_motion
 

@@ -7,9 +7,10 @@ from jaxtyping import Float
 from scipy.signal import hilbert
 from scipy.signal.windows import blackmanharris
 
+from ..._quantities import CONDITIONS
 from ...elements import CATALOGUE
 from ...excitations import Hold, tabulate
-from ...records import CONDITIONS, Record
+from ...records import Record
 
 
 def effects_without_signal(records: tuple[Record, ...]) -> tuple[str, ...]:

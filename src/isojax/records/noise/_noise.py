@@ -223,14 +223,16 @@ def coloured(
     return law, scatters
 
 
-def output_scatters(campaign: Campaign, law: Colour) -> list[Scatter | None]:
-    """Gives the scatter of each record's output, by its innovations under a law.
+def output_scatters(campaign: Campaign, law: Colour | None) -> list[Scatter | None]:
+    """Gives the scatter of each record's output, by its innovations where the noise has a law.
 
     Args:
         campaign: The campaign.
-        law: Of its noise.
+        law: Of its noise; None of white noise.
     """
     found = _estimate_each(campaign.records, _weighing(campaign), NoiseBand(campaign.rate, None))
+    if law is None:
+        return [one.scatter for one in found]
     return _innovations(_pieces(found, law), law)
 
 

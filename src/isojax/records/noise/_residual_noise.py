@@ -20,7 +20,7 @@ from ._noise import (
     output_scatters,
     words_of_colour,
 )
-from ._scatter import Scatter, piece_scatter
+from ._scatter import Scatter, piece_scatter, pooled_scatter
 
 _AS_SEEN = 1.05
 """Residual noise over that of the output, up to which the note names no other cause."""
@@ -58,7 +58,7 @@ def residual_noise(
     counts, band = [bool(own) for own in pieces], NoiseBand(campaign.rate, None)
     law, scatters = coloured(lambda _: pieces, counts, known.sigma, band)
     if law is None:
-        return _white(known, pieces, counts)
+        return _white(campaign, known, pieces, counts)
     levels = record_levels(law.sigma, _beside(campaign, law, scatters), counts)
     return dataclasses.replace(
         known,
@@ -76,28 +76,35 @@ def _methods(known: NoiseEstimate, counts: list[bool]) -> tuple[NoiseMethod, ...
     return tuple("residual" if own else method for own, method in zip(counts, known.methods, strict=True))
 
 
-def _white(known: NoiseEstimate, pieces: list[list[Piece]], counts: list[bool]) -> NoiseEstimate | None:
-    """Gives white noise where the output shows more: real forces at random move it, and the model follows."""
-    scatters = [piece_scatter(piece) for own in pieces for piece in own]
-    freedom = sum(one.freedom for one in scatters)
-    if not freedom:
+def _white(
+    campaign: Campaign, known: NoiseEstimate, pieces: list[list[Piece]], counts: list[bool]
+) -> NoiseEstimate | None:
+    """Gives white noise where the output shows more: random forces move it, or the start of a short dwell
+    rings on, and the model follows.
+    """
+    scatters = [pooled_scatter([piece_scatter(piece) for piece in own]) for own in pieces]
+    whole = pooled_scatter([one for one in scatters if one is not None])
+    if whole is None:
         return None
-    sigma = float(np.sqrt(sum(one.square * one.freedom for one in scatters) / freedom))
-    if sigma * _AS_SEEN >= known.sigma:
+    sigma = float(np.sqrt(whole.square))
+    seen = float(np.sqrt(np.mean(np.square(known.levels)[counts])))
+    if sigma * _AS_SEEN >= seen:
         return None
     return dataclasses.replace(
         known,
         sigma=sigma,
         method="residual",
         methods=_methods(known, counts),
-        note=f"the response itself scatters by {number(known.sigma)} rms, most of which the model explains",
-        levels=tuple(own / known.sigma * sigma for own in known.levels),
+        note=f"the response itself scatters by {number(seen)} rms, most of which the model explains",
+        levels=record_levels(sigma, _beside(campaign, None, scatters), counts),
         share=1.0,
         colour=None,
     )
 
 
-def _beside(campaign: Campaign, law: Colour, scatters: Sequence[Scatter | None]) -> list[Scatter | None]:
+def _beside(
+    campaign: Campaign, law: Colour | None, scatters: Sequence[Scatter | None]
+) -> list[Scatter | None]:
     """Gives the scatters with those of the other records, as their outputs differ from the first ones'."""
     outputs = output_scatters(campaign, law)
     both = [

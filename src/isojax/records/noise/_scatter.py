@@ -1,5 +1,6 @@
 """What does not repeat in a record: the scatter about the harmonics of dwells, or from period to period."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -148,9 +149,15 @@ def innovation_scatter(pieces: list[Piece], colour: Colour) -> Scatter | None:
         pieces: Windows that hold noise alone.
         colour: The law of the noise.
     """
-    found = [piece_scatter(piece, colour) for piece in pieces]
-    freedom = sum(one.freedom for one in found)
-    return Scatter(sum(one.square * one.freedom for one in found) / freedom, freedom) if found else None
+    return pooled_scatter([piece_scatter(piece, colour) for piece in pieces])
+
+
+def pooled_scatter(scatters: Sequence[Scatter]) -> Scatter | None:
+    """Gives the mean square over several; None without any."""
+    freedom = sum(one.freedom for one in scatters)
+    if not scatters:
+        return None
+    return Scatter(sum(one.square * one.freedom for one in scatters) / freedom, freedom)
 
 
 def _noise_pieces(record: Record, method: str) -> list[Piece]:

@@ -9,9 +9,10 @@ from typing import Any, get_args
 
 import numpy as np
 
+from ..._quantities import CONDITIONS
 from ..._show import shown
 from .._campaign import RELATIVE_ERROR, Hold, InputQuantity, OutputQuantity
-from .._record import CONDITIONS, Direction, ExcitationKind, Role
+from .._record import Direction, ExcitationKind, Role
 from .._wording import listing, nearest
 
 # Why no validation library: this declaration was also written for pydantic 2 and tried with msgspec. pydantic

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..._quantities import CONDITIONS
 from .._campaign import TIME_DERIVATIVES, Campaign, Filter, FloorChannel, InputChannel, OutputChannel
-from .._record import CONDITIONS, Dwell, ExcitationKind, Record
+from .._record import Dwell, ExcitationKind, Record
 from ..spectrum import ringing_frequency
 from ._channel_factor import check_units
 from ._declaration import Declaration

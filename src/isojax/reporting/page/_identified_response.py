@@ -5,10 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..._progress import step
+from ..._quantities import CONDITIONS
 from ..._results import is_successful
 from ...identification import ClassicalGuess, Loop, MeasuredResponse, measured_receptance
 from ...models import HALF_WIDTH, Estimated, fit_at
-from ...records import CONDITIONS, Campaign, excited_band
+from ...records import Campaign, excited_band
 from ...stability import ResponseBands, response_bands
 from ..plots import drive_unit, median_drive, quantity
 from ..words import typeset_number, typeset_with_error
