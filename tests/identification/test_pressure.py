@@ -1,6 +1,7 @@
 """Coefficients that follow the chamber pressure of a record, on the simulated bench."""
 
 import dataclasses
+import tomllib
 
 import numpy as np
 import pytest
@@ -9,7 +10,10 @@ from scipy import stats
 from isojax import rig
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.health import DwellStability, dwell_stability
-from isojax.identification import diagnose, extend, fit, scales
+from isojax.identification import diagnose, extend, fit, next_test, scales
+from isojax.identification.experiment._candidate_experiments import repeated_campaign
+from isojax.identification.experiment._simulated_records import blank_records
+from isojax.identification.experiment._test_outline import find_test_outline
 from isojax.identification.fitting._estimate import stiffness_scatter
 from isojax.identification.jacobian import STIFFNESS_SCALE_UNIT
 from isojax.identification.jacobian._channels import channel_table, effects_without_signal
@@ -132,3 +136,45 @@ def test_dwells_are_compared_with_orbits_at_their_own_pressure(simulated, monkey
     seen = [one.spectral_radius for one in dwell_stability(follows, campaign)]
     np.testing.assert_allclose(seen, [high] * 2 + [low] * 2 + [high] * 2)
     assert {one.spectral_radius for one in dwell_stability(START, campaign)} == {1.05e6}
+
+
+def test_the_next_record_is_planned_at_a_pressure_and_shrinks_the_error_as_predicted(simulated):
+    """On the rig: a multisine at a pressure beyond the others', measured and fitted beside them."""
+    pressure, seconds, level = 2.8e5, 4.0, 600.0
+    campaign = campaign_of_pressures(simulated, "pressure_stiffness")
+    change = CATALOGUE["pressure_stiffness"].guess(dataclasses.replace(scales(campaign), pressure=REFERENCE))
+    found = fit(START.with_elements(change), campaign)
+    plan = next_test(
+        found,
+        lambda model: model["pressure_stiffness.change"],
+        seconds=seconds,
+        levels=level,
+        bands=(2.0, 14.0),
+        conditions=[{"pressure": REFERENCE}, {"pressure": pressure}],
+        farthest=3.0,
+    )
+    # The farther from the others, the more a record tells of a slope.
+    assert [one.experiment.conditions for one in plan.proposals[:3]] == [((("pressure", pressure),),)] * 3
+    best = next(one for one in plan.proposals if one.experiment.waveform == "multisine")
+    record = tomllib.loads(best.declaration)["record"][0]
+    assert record["pressure"] == pressure
+    errors = []
+    for seed in range(3):
+        further = rig.AtPressure(
+            rig.Multisine((level,), 2.0, 14.0, period=2.0, periods=2, lines="full"), pressure
+        )
+        plant = PLANT.plus(rig.PressureStiffness(TRUTH["pressure_stiffness"], REFERENCE))
+        own = simulated(plant, further, 30 + seed, BENCH, **DECLARED)
+        records = (*campaign.records, *own.records)
+        refit = fit(found.model, dataclasses.replace(campaign, records=records))
+        errors.append(refit.parameters["pressure_stiffness.change"].standard_error)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(float(best.quantity_errors[0]), rel=0.2)
+    assert best.shrinkage < 0.9
+
+
+def test_a_repetition_of_the_campaign_has_all_its_levels_at_each_of_its_pressures(simulated):
+    campaign = campaign_of_pressures(simulated)
+    outline = find_test_outline(campaign, 1, every_sample=True)
+    records = blank_records(repeated_campaign(campaign, outline))
+    pairs = [(round(record.level), record.pressure) for record in records]
+    assert pairs == [(level, pressure) for pressure in (1.7e5, 2e5, 2.4e5) for level in (150, 600)]

@@ -161,7 +161,7 @@ def test_what_makes_no_sense_is_refused(unchecked):
         ij.global_sensitivity(lambda m: m.mass, model)
     with pytest.raises(ValueError, match="`quantity` must be a function"):
         ij.global_sensitivity("mass", {"mass": (700.0, 900.0)}, model)
-    with pytest.raises(ValueError, match="`model` must be an isolator, .* but is of type str"):
+    with pytest.raises(ValueError, match=r"`model` must be an isolator, .* but is of type str"):
         ij.global_sensitivity(lambda m: m.mass, {"mass": (700.0, 900.0)}, "model.json")
     with pytest.raises(ValueError, match="`ranges` must be one of mass"):
         ij.global_sensitivity(lambda m: m.mass, {"mess": (1.0, 2.0)}, model)

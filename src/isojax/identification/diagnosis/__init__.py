@@ -24,6 +24,7 @@ from ._refit import least_difference as least_difference
 from ._refit import refit_from as refit_from
 from ._separation import AGAIN as AGAIN
 from ._separation import DWELLS as DWELLS
+from ._separation import Conditions as Conditions
 from ._separation import Experiment as Experiment
 from ._separation import Prospect as Prospect
 from ._separation import Separation as Separation

@@ -19,6 +19,10 @@ AGAIN = "again"
 """Name of the yardstick: the campaign once more."""
 
 
+Conditions = tuple[tuple[str, float], ...]
+"""Operating conditions by name [SI], such as (("pressure", 2e5),)."""
+
+
 @shown
 class Experiment(NamedTuple):
     """A test that could be made.
@@ -35,6 +39,7 @@ class Experiment(NamedTuple):
         lacking: why the campaign's test rig cannot make it; empty if it can.
         backward: whether the frequency falls in the first record; the next goes the other way.
         dwells: of a stepped sine, in each record.
+        conditions: operating conditions of each record, by name [SI]; none where the campaign states none.
     """
 
     name: str
@@ -48,6 +53,7 @@ class Experiment(NamedTuple):
     lacking: str = ""
     backward: bool = False
     dwells: int = DWELLS
+    conditions: tuple[Conditions, ...] = ()
 
     @property
     def seconds(self) -> float:

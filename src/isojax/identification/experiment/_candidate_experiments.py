@@ -26,10 +26,21 @@ WAVEFORM_WORDS: dict[Waveform, str] = {
 
 def repeated_campaign(campaign: Campaign, outline: TestOutline) -> Experiment:
     """Give the test that the campaign was."""
-    drive = drive_of(outline, outline.levels, outline.lowest, outline.highest, outline.waveform)
+    levels = _levels(outline)
     return Experiment(
-        AGAIN, "repeat the same test", drive, outline.rate, campaign.output.quantity, outline.waveform
+        AGAIN,
+        "repeat the same test",
+        drive_of(outline, levels, outline.lowest, outline.highest, outline.waveform),
+        outline.rate,
+        campaign.output.quantity,
+        outline.waveform,
+        conditions=tuple(one for one in outline.conditions for _ in outline.levels),
     )
+
+
+def _levels(outline: TestOutline) -> tuple[float, ...]:
+    """Give the level of each record: all of them at each operating condition."""
+    return outline.levels * max(len(outline.conditions), 1)
 
 
 def candidate_experiments(campaign: Campaign, outline: TestOutline, load: float) -> tuple[Experiment, ...]:
@@ -44,7 +55,7 @@ def candidate_experiments(campaign: Campaign, outline: TestOutline, load: float)
         The experiments.
     """
     again = repeated_campaign(campaign, outline)
-    levels, low, high = outline.levels, outline.lowest, outline.highest
+    levels, low, high = _levels(outline), outline.lowest, outline.highest
     unit = "m/s^2" if campaign.input.quantity == "base_acceleration" else "N"
 
     def driven(name: str, words: str, *how: Any, lacking: str = "") -> Experiment:
@@ -52,11 +63,11 @@ def candidate_experiments(campaign: Campaign, outline: TestOutline, load: float)
             name=name, words=words, drive=drive_of(outline, *how), waveform=how[-1], lacking=lacking
         )
 
-    below, above = levels[0] / 3.0, 1.5 * levels[-1]
+    below, above = outline.levels[0] / 3.0, 1.5 * outline.levels[-1]
     limit = HIGHEST * outline.rate
     upper = min(2.0 * high, limit)
     narrow = "" if upper > 1.2 * high else "the sampling rate leaves no room above the band"
-    middle = levels[len(levels) // 2]
+    middle = outline.levels[len(outline.levels) // 2]
     span = f"from {low:.3g} to {high:.3g} Hz"
     other: Waveform = "stepped sine" if outline.waveform == "multisine" else "multisine"
     mass = EXTRA_MASS * campaign.mass

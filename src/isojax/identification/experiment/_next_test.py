@@ -1,7 +1,7 @@
 """Which record to measure next, found by simulation with the fitted model."""
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,6 +88,7 @@ def next_test(
     bands: Sequence[tuple[float, float]] | tuple[float, float] | None = None,
     dwells: Sequence[int] | int = USUAL_DWELLS,
     farthest: float = 1.2,
+    conditions: Sequence[Mapping[str, float]] | Mapping[str, float] | None = None,
 ) -> NextTest:
     """Find the record that shrinks the intervals most, or that separates two effects best.
 
@@ -99,7 +100,8 @@ def next_test(
     the largest expected chi2 between the two, over the present records and the new one.
 
     Args:
-        fit: a fit, or what ends with one; a saved one has no records to add to.
+        fit: a fit, or what ends with one; a saved one, or one at an operating condition, has no records to
+            add to.
         quantity: function of an isolator that gives real numbers, as in `uncertainty`; of several numbers,
             the geometric mean of their standard errors counts.
         rivals: catalogue name of an effect of the model with a fitted strength, and name or element of the
@@ -114,6 +116,8 @@ def next_test(
             of dwells may stand alone.
         farthest: largest displacement over that of the campaign; records that go beyond it are left out,
             because neither the model nor the room for motion was tested there.
+        conditions: operating conditions of the record, such as {"pressure": 2e5} [Pa]; those of the campaign,
+            the lowest, the middle and the highest, if omitted.
 
     Returns:
         The candidates, best first: stepped and swept sines upwards and downwards, and multisines.
@@ -121,8 +125,8 @@ def next_test(
     Raises:
         ValueError: if the fit failed or nothing drove its records on and on; if the data do not determine a
             coefficient and a quantity is asked for; if the quantity is not finite or depends on no fitted
-            coefficient, `rivals` are not such effects, or levels, bands, dwells, length or reach are not what
-            they must be.
+            coefficient, `rivals` are not such effects, or levels, bands, dwells, length, reach or conditions
+            are not what they must be.
         RuntimeError: if JAX is not in 64-bit mode.
 
     Source: Fedorov 1972, Theory of Optimal Experiments, ch. 2 (D- and c-optimality); Hunter & Reiner 1965,
@@ -141,8 +145,11 @@ def next_test(
     fit = as_fit(fit)
     if not is_successful(fit.result):
         raise ValueError(f"Argument `fit` must have succeeded, but it did not. {RESULTS[fit.result]}")
-    plan = plan_of(seconds, levels, bands, dwells, farthest)
+    plan = plan_of(seconds, levels, bands, dwells, farthest, conditions)
     asked = _ask(fit, quantity, rivals)
+    whole = Isolator(fit.model.mass, (*fit.model.elements, *asked.columns.probes), fit.model.excitation)
+    for one in plan.conditions or ():
+        whole.at(**dict(one))  # which refuses those that nothing follows, and asks for those that are
     campaign, problem = fit.campaign, fit.estimate.problem
     steps = problem.integrator.record_steps(fit.model)
     outline = find_test_outline(campaign, steps, every_sample=needs_every_sample(asked.columns))
@@ -157,6 +164,7 @@ def next_test(
         plan.levels or usual_levels(outline),
         plan.bands or usual_bands(outline),
         plan.dwells,
+        plan.conditions or outline.conditions,
     )
     largest = _largest_motion(asked.columns, campaign, outline)
     proposals = []
@@ -317,10 +325,14 @@ def _simulated(asked: _Asked, some: list[Experiment], seconds: float) -> TrialRu
     """Simulate records side by side, filled up by repeating them."""
     if not some:
         return ""
-    drive = np.concatenate([some[place % len(some)].drive for place in range(_SIDE_BY_SIDE)])
+    alike = [some[place % len(some)] for place in range(_SIDE_BY_SIDE)]
+    together = some[0]._replace(
+        drive=np.concatenate([one.drive for one in alike]),
+        conditions=tuple(at for one in alike for at in one.conditions),
+    )
     lasted = sum(one.input.size / one.rate for one in asked.fit.campaign.fit_records)
     after = (1.0, 1.0 + seconds / lasted)
-    return carry_out(asked.columns, some[0]._replace(drive=drive), 0.0, after)
+    return carry_out(asked.columns, together, 0.0, after)
 
 
 def _level(outline: TestOutline, experiment: Experiment) -> float:

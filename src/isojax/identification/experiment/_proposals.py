@@ -58,6 +58,7 @@ class Proposal(NamedTuple):
             lines.append(f'schedule = "{name}_schedule.csv"')
         (record,) = blank_records(self.experiment)
         lines += [f"level = {self.level:.4g}", f'direction = "{record.direction}"', 'role = "fit"']
+        lines += [f"{name} = {value:.6g}" for name, value in record.conditions]
         return "\n".join(lines) + "\n"
 
     def _headline(self) -> str:

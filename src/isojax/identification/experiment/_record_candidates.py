@@ -5,8 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..._quantities import CONDITIONS
+from ..._show import number
 from ...records import Campaign
-from ..diagnosis import DWELLS, Experiment, Waveform
+from ..diagnosis import DWELLS, Conditions, Experiment, Waveform
 from ._candidate_experiments import HIGHEST, WAVEFORM_WORDS
 from ._test_outline import MOST_STEPS, TestOutline
 from ._trial_drive import drive_of
@@ -65,6 +67,7 @@ def record_candidates(
     levels: Sequence[float],
     bands: Sequence[tuple[float, float]],
     dwells: Sequence[int],
+    conditions: Sequence[Conditions],
 ) -> tuple[Experiment, ...]:
     """Give the records, in the order of their waveforms and numbers of dwells.
 
@@ -74,6 +77,7 @@ def record_candidates(
         levels: rms of the drive [its SI unit].
         bands: lowest and highest frequency of each [Hz].
         dwells: of a stepped sine.
+        conditions: operating conditions; none where the campaign states none.
 
     Returns:
         Experiments of one record each.
@@ -86,13 +90,17 @@ def record_candidates(
         for count in (dwells if waveform == "stepped sine" else (DWELLS,))
         for backward in directions
     ]
-    for (waveform, count, backward), level, (low, high) in itertools.product(hows, levels, bands):
+    asked = itertools.product(hows, levels, bands, conditions or [()])
+    for (waveform, count, backward), level, (low, high), at in asked:
         steps = f" in {count} dwells" if waveform == "stepped sine" else ""
         way = "" if waveform == "multisine" else ", downwards" if backward else ", upwards"
+        there = "".join(f" at {number(value)} {CONDITIONS[name]}" for name, value in at)
         words = (
             f"{WAVEFORM_WORDS[waveform]} of {level:.3g} {unit} rms, {low:.3g} to {high:.3g} Hz{way}{steps}"
+            f"{there}"
         )
-        name = f"{waveform}_{level:.3g}_{low:.3g}_{high:.3g}{way}{steps}".replace(", ", "_").replace(" ", "_")
+        name = f"{waveform}_{level:.3g}_{low:.3g}_{high:.3g}{way}{steps}{there}"
+        name = name.replace(", ", "_").replace(" ", "_")
         drive = drive_of(outline, (level,), low, high, waveform, backward, count)
         found.append(
             Experiment(
@@ -105,6 +113,7 @@ def record_candidates(
                 lacking=_lacking(outline, waveform, low, high),
                 backward=backward,
                 dwells=count,
+                conditions=(at,) if at else (),
             )
         )
     return tuple(found)

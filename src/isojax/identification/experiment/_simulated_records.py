@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -71,6 +71,7 @@ def blank_records(experiment: Experiment, clock: tuple[float, float] | None = No
     }
     sines = experiment.waveform != "multisine"
     nothing = np.zeros(total)
+    conditions: list[dict[str, Any]] = [dict(one) for one in experiment.conditions or [()] * rows]
     return tuple(
         Record(
             f"{experiment.name}_{row}",
@@ -93,6 +94,7 @@ def blank_records(experiment: Experiment, clock: tuple[float, float] | None = No
             else (),
             kind=kinds[experiment.waveform],
             clock=(row / rows, (row + 1) / rows) if clock is None else clock,
+            **conditions[row],
         )
         for row, drive in enumerate(experiment.drive)
     )

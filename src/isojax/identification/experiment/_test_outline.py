@@ -5,9 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...records import Campaign, Record, power_spectrum
-from ..diagnosis import Waveform
-
-MOST_LEVELS = 3
+from ..diagnosis import Conditions, Waveform
 
 MIDDLE_CYCLES = 10.0
 """Cycles of the middle frequency in a segment."""
@@ -35,6 +33,8 @@ class TestOutline(NamedTuple):
         rate: samples a second of a simulation [Hz].
         samples: samples per segment.
         nominal: nominal level of a record over its rms; 1 where the campaign declares none.
+        conditions: operating conditions of its records: the lowest, the middle and the highest; none where
+            some record states none.
     """
 
     levels: tuple[float, ...]
@@ -44,6 +44,7 @@ class TestOutline(NamedTuple):
     rate: float
     samples: int
     nominal: float
+    conditions: tuple[Conditions, ...] = ()
 
 
 def find_test_outline(campaign: Campaign, substeps: int, every_sample: bool) -> TestOutline | None:
@@ -67,7 +68,6 @@ def find_test_outline(campaign: Campaign, substeps: int, every_sample: bool) -> 
         level = float(f"{size:.1e}") if record.level is None else record.level
         groups.setdefault(level, []).append(size)
     sizes = sorted(float(np.mean(group)) for group in groups.values())
-    chosen = sorted({0, len(sizes) // 2, len(sizes) - 1}) if len(sizes) > 1 else [0]
     bands = np.array([_driven_band(record) for record in driven])
     lowest, highest = float(bands[:, 0].min()), float(bands[:, 1].max())
     fewer = 1 if every_sample else max(1, int(campaign.rate / (SAMPLES_A_CYCLE * highest)))
@@ -76,11 +76,18 @@ def find_test_outline(campaign: Campaign, substeps: int, every_sample: bool) -> 
     longest = max(MOST_STEPS / substeps, FEWEST_CYCLES * rate / middle)
     samples = min(rate * max(MIDDLE_CYCLES / middle, SLOW_CYCLES / lowest), longest)
     sines = any(one.dwells or one.kind == "swept" for one in driven)
-    levels = tuple(sizes[place] for place in chosen)[:MOST_LEVELS]
+    levels = tuple(sizes[place] for place in _spread(len(sizes)))
+    stated = sorted({record.conditions for record in driven})
+    conditions = tuple(stated[place] for place in _spread(len(stated))) if all(stated) else ()
     ratios = [one.level / np.std(one.input) for one in driven if one.level is not None]
     nominal = float(np.mean(ratios)) if ratios else 1.0
     waveform: Waveform = "stepped sine" if sines else "multisine"
-    return TestOutline(levels, lowest, highest, waveform, rate, int(np.ceil(samples)), nominal)
+    return TestOutline(levels, lowest, highest, waveform, rate, int(np.ceil(samples)), nominal, conditions)
+
+
+def _spread(count: int) -> list[int]:
+    """Give the places of the first, the middle and the last of so many."""
+    return sorted({0, count // 2, count - 1})
 
 
 def _driven_band(record: Record) -> tuple[float, float]:
