@@ -263,6 +263,7 @@ def _map(asked: argparse.Namespace) -> int:
     fit, whose = _fit_beside(Path(asked.model), model, asked.next_record) if asked.chances else (None, "")
     stated = {name: getattr(asked, name) for name in CONDITIONS if getattr(asked, name) is not None}
     model, fit = model.at(**stated), None if fit is None else fit_at(fit, **stated)
+    whose = "; ".join(filter(None, (whose, fit.untested if fit else "")))
 
     import numpy as np
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from isojax import rig
+from isojax import inference, rig
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.health import DwellStability, dwell_stability
 from isojax.identification import diagnose, extend, fit, next_test, scales
@@ -17,7 +17,8 @@ from isojax.identification.experiment._test_outline import find_test_outline
 from isojax.identification.fitting._estimate import stiffness_scatter
 from isojax.identification.jacobian import STIFFNESS_SCALE_UNIT
 from isojax.identification.jacobian._channels import channel_table, effects_without_signal
-from isojax.models import Isolator
+from isojax.inference import design, next_record
+from isojax.models import Isolator, fit_at
 from isojax.records.noise._repeats import repeat_groups
 
 REFERENCE = 2e5
@@ -153,6 +154,15 @@ def test_the_next_record_is_planned_at_a_pressure_and_shrinks_the_error_as_predi
         conditions=[{"pressure": REFERENCE}, {"pressure": pressure}],
         farthest=3.0,
     )
+    # What is asked at a pressure says where that lies beyond those of the records, also of a saved fit.
+    for known in (found, found.saved, next_record(found)):
+        assert fit_at(known, pressure=2.4e5).untested == ""
+        assert "pressure 2.8e+05 Pa lies beyond the 1.7e+05 to 2.4e+05 Pa" in str(
+            fit_at(known, pressure=2.8e5)
+        )
+    stiff = inference.at_least(lambda model: model["linear_stiffness.coefficient"], 1.25e6)
+    stiffer = design(found, None, stiff, free={"pressure": (1.7e5, 4e5)}, scan=2)
+    assert "lies beyond the 1.7e+05 to 2.4e+05 Pa" in str(stiffer)
     # The farther from the others, the more a record tells of a slope.
     assert [one.experiment.conditions for one in plan.proposals[:3]] == [((("pressure", pressure),),)] * 3
     best = next(one for one in plan.proposals if one.experiment.waveform == "multisine")

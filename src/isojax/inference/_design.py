@@ -9,12 +9,20 @@ import numpy as np
 from .._given_numbers import given_count
 from .._results import result_named
 from .._types import check_float64
-from ..models import EndsEstimated, Estimated, Isolator, Modelled, as_isolator, coefficient_errors
+from ..models import (
+    EndsEstimated,
+    Estimated,
+    Isolator,
+    Modelled,
+    as_isolator,
+    coefficient_errors,
+    untested_words,
+)
 from ._constraint import Constraint
 from ._design_result import Design, Outcome
 from ._design_scan import Scan, scan_design
 from ._design_search import FoundDesign, Task, search, stand
-from ._design_space import NotFinite, Quantity, given_bounds, space_of
+from ._design_space import NotFinite, Quantity, Space, given_bounds, space_of
 
 _RESTARTS = 3
 """Times that the search starts again from a better point of the scan."""
@@ -87,6 +95,7 @@ def design(
         1e+06 N/m, 0 better
     """
     check_float64()
+    known = model if fit is None else fit
     model = as_isolator(model, recorded=True)
     bounds = given_bounds(model, free)
     as_isolator(model, recorded=set(model.conditions) <= set(bounds))
@@ -130,7 +139,14 @@ def design(
         sum(one.evaluations for one in (wanted, *limits)),
         found.retreats,
         found.stopped,
+        untested_words(getattr(known, "after", known), _conditions_of(model, space, found.at)),
     )
+
+
+def _conditions_of(model: Isolator, space: Space, at: np.ndarray) -> dict[str, float]:
+    """Give the operating conditions among what was chosen."""
+    chosen = zip(space.names, np.asarray(space.values(at)).tolist(), strict=True)
+    return {name: value for name, value in chosen if name in model.conditions}
 
 
 def _constraints(subject_to: Any) -> tuple[Constraint, ...]:

@@ -86,6 +86,8 @@ class Design(NamedTuple):
         retreats: how often a quantity failed on the way and the search went back.
         stopped: which quantity fails next to the best point, and where, if no point keeps the limits and the
             search ended at the failure; "" otherwise.
+        untested: that an operating condition lies beyond those of the fitted records, as far as `fit` or the
+            fit given as `model` knows them; "" otherwise.
     """
 
     model: Isolator
@@ -104,6 +106,7 @@ class Design(NamedTuple):
     evaluations: int
     retreats: int
     stopped: str
+    untested: str = ""
 
     @property
     def changes(self) -> Float[np.ndarray, " coefficient"]:
@@ -143,6 +146,7 @@ class Design(NamedTuple):
     def _lines(self) -> list[str]:
         back = f", {self.retreats} times back from where a quantity failed" if self.retreats else ""
         end = [f"  the search went no further because {self.stopped}"] if self.stopped else []
+        end += [f"  {self.untested}"] if self.untested else []
         return [*end, f"  {self.scan.words}", f"  {self.evaluations} evaluations{back}"]
 
 

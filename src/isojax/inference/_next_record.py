@@ -1,5 +1,7 @@
 """The errors of a fit, enlarged by what is peculiar to each test: for answers about the next one."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +28,7 @@ class NextRecord(NamedTuple):
         scatter: standard deviation of the linear stiffness of a record [relative]; 0 without a linear spring.
         calibration: of the force of the next test [relative].
         mixture: law of the coefficients' deviations where its tails are longer than normal ones.
+        tested_conditions: of the fit.
     """
 
     model: Isolator
@@ -35,6 +38,7 @@ class NextRecord(NamedTuple):
     scatter: float
     calibration: float
     mixture: NormalMixture | None = None
+    tested_conditions: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
     @property
     def words(self) -> str:
@@ -127,4 +131,4 @@ def next_record(fit: Fit | SavedFit | Fitted, *, calibration: float = 0.0) -> Ne
         changes = np.stack([alone, np.broadcast_to(common, alone.shape)], axis=1)
         law = law.propagated(np.eye(len(listed))[uncertain][:, fitted]).widened(changes[..., uncertain])
     errors = covariance[np.ix_(uncertain, uncertain)]
-    return NextRecord(model, free, errors, held.result, scatter, calibration, law)
+    return NextRecord(model, free, errors, held.result, scatter, calibration, law, held.tested_conditions)

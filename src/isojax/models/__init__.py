@@ -23,6 +23,7 @@ from ._coefficient_errors import CoefficientErrors as CoefficientErrors
 from ._coefficient_errors import EndsEstimated as EndsEstimated
 from ._coefficient_errors import Estimated as Estimated
 from ._coefficient_errors import coefficient_errors as coefficient_errors
+from ._conditions import untested_words as untested_words
 from ._credible_set import CredibleSet as CredibleSet
 from ._credible_set import credible_set as credible_set
 from ._credible_set import existence as existence

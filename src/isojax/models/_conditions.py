@@ -11,6 +11,8 @@ from jax.core import Tracer
 
 from .._given_numbers import given_scalar
 from .._parameters import refuse_shapes_outside
+from .._quantities import CONDITIONS
+from .._show import number
 from .._types import Scalar
 from ..elements import AbstractElement, Dependence
 
@@ -51,6 +53,27 @@ def _refuse_turned(
                 f"Argument `{next(iter(conditions))}` must lie where the fitted laws hold, but at {at} they "
                 f"turn {one.name} from {float(was):.4g} to {float(is_now):.4g}."
             )
+
+
+def untested_words(fit: object, conditions: Mapping[str, Scalar | float]) -> str:
+    """Say which conditions lie beyond those of the records that were fitted.
+
+    Args:
+        fit: what knows the `tested_conditions`; of any other, nothing is known.
+        conditions: the value of each [SI].
+
+    Returns:
+        A sentence; "" where all were tested, or nothing is known.
+    """
+    tested: Mapping[str, tuple[float, float]] = getattr(fit, "tested_conditions", {})
+    beyond = [
+        f"{name} {number(float(value))} {CONDITIONS[name]} lies beyond the {number(tested[name][0])} to "
+        f"{number(tested[name][1])} {CONDITIONS[name]} of the fitted records"
+        for name, value in conditions.items()
+        if name in tested and not isinstance(value, Tracer)
+        if not tested[name][0] <= float(value) <= tested[name][1]
+    ]
+    return f"{' and '.join(beyond)}: the laws are carried on untested" if beyond else ""
 
 
 def plain_elements(

@@ -12,6 +12,7 @@ from .._results import RESULTS
 from .._show import shown
 from .._types import Scalar
 from ._coefficient_errors import EndsEstimated, Estimated
+from ._conditions import untested_words
 from ._isolator import Isolator
 from ._normal_mixture import NormalMixture
 
@@ -28,6 +29,8 @@ class FitAt(NamedTuple):
         covariance: of these [product of their units].
         result: how the search of the fit ended.
         mixture: law of the coefficients' deviations where its tails are longer than normal ones.
+        untested: that a condition lies beyond those of the fitted records, whose errors the laws' own
+            deviation there may exceed; "" where it does not.
     """
 
     model: Isolator
@@ -35,6 +38,10 @@ class FitAt(NamedTuple):
     covariance: Float[np.ndarray, "coefficient coefficient"]
     result: RESULTS
     mixture: NormalMixture | None = None
+    untested: str = ""
+
+    def _lines(self) -> list[str]:
+        return [self.untested] if self.untested else []
 
 
 def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitAt:
@@ -92,4 +99,4 @@ def fit_at(fit: Estimated | EndsEstimated, **conditions: Scalar | float) -> FitA
         adds = (np.count_nonzero(slopes, axis=1) > 1) & (size > 0.0)
         scale = np.where(adds, law.standard_errors / np.where(adds, size, 1.0), 1.0)
         covariance *= np.outer(scale, scale)
-    return FitAt(model, names, covariance, held.result, law)
+    return FitAt(model, names, covariance, held.result, law, untested_words(held, conditions))

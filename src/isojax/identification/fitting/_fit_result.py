@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._parameters import Parameter, list_parameters
+from ..._quantities import CONDITIONS
 from ..._results import RESULTS, is_successful, name_of_result
 from ..._show import LINES, Row, shown
 from ...models import Isolator, NormalMixture
@@ -115,6 +116,13 @@ class Fit(NamedTuple):
         )
 
     @property
+    def tested_conditions(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest value of each operating condition that every fitted record states [SI]."""
+        stated = [dict(record.conditions) for record in self.campaign.fit_records]
+        common = [name for name in CONDITIONS if stated and all(name in one for one in stated)]
+        return {name: (min(one[name] for one in stated), max(one[name] for one in stated)) for name in common}
+
+    @property
     def saved(self) -> SavedFit:
         """The numbers of the fit, without the measurements."""
         return SavedFit(
@@ -129,6 +137,7 @@ class Fit(NamedTuple):
             self.errors,
             self.result,
             self.mixture,
+            self.tested_conditions,
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -2,7 +2,9 @@
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -72,6 +74,8 @@ class SavedFit(NamedTuple):
         result: how the search ended.
         mixture: law of the coefficients' deviations where its tails are longer than normal ones; None also in
             a file of before it was saved.
+        tested_conditions: lowest and highest value of each operating condition that every fitted record
+            states [SI].
     """
 
     title: str
@@ -85,6 +89,7 @@ class SavedFit(NamedTuple):
     errors: dict[str, Errors | None]
     result: RESULTS
     mixture: NormalMixture | None = None
+    tested_conditions: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
     def to_dict(self) -> dict[str, Any]:
         """Give the fit as plain numbers, words, lists and dictionaries; None where a number is not finite."""
@@ -100,6 +105,7 @@ class SavedFit(NamedTuple):
                 "parameters": self.parameters.to_dict(),
                 "covariance": self.covariance.tolist(),
                 "mixture": None if self.mixture is None else self.mixture.to_dict(),
+                "tested_conditions": dict(self.tested_conditions),
                 "statistics": self.stats._asdict(),
                 "noise": {name: getattr(self.noise, name) for name in self.noise.__dataclass_fields__},
                 "errors": {
@@ -216,6 +222,7 @@ def load_fit(path: str | Path) -> SavedFit:
             },
             result_named(content["result"]),
             _mixture(content.get("mixture")),
+            {name: (low, high) for name, (low, high) in content.get("tested_conditions", {}).items()},
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{path}: is no fit as isojax saves it ({error!r}).") from None
