@@ -292,7 +292,7 @@ def _map(asked: argparse.Namespace) -> int:
         folds = None
         if several and asked.folds:
             progress(Stage("folds around the cells with several orbits", to_come=(0.0,)))
-            folds = folds_around(smap)
+            folds = folds_around(smap, fit)
             seconds["folds"] = watch()
         progress(Stage("pictures"))
         written = write_map(smap, folder, folds=folds)

@@ -10,7 +10,7 @@ from scipy import stats
 from isojax import inference, rig
 from isojax.elements import CATALOGUE, CubicStiffness, LinearDamping, LinearStiffness
 from isojax.health import DwellStability, dwell_stability
-from isojax.identification import diagnose, extend, fit, next_test, scales
+from isojax.identification import diagnose, extend, fit, load_fit, next_test, scales
 from isojax.identification.experiment._candidate_experiments import repeated_campaign
 from isojax.identification.experiment._simulated_records import blank_records
 from isojax.identification.experiment._test_outline import find_test_outline
@@ -139,7 +139,7 @@ def test_dwells_are_compared_with_orbits_at_their_own_pressure(simulated, monkey
     assert {one.spectral_radius for one in dwell_stability(START, campaign)} == {1.05e6}
 
 
-def test_the_next_record_is_planned_at_a_pressure_and_shrinks_the_error_as_predicted(simulated):
+def test_the_next_record_is_planned_at_a_pressure_and_shrinks_the_error_as_predicted(simulated, tmp_path):
     """On the rig: a multisine at a pressure beyond the others', measured and fitted beside them."""
     pressure, seconds, level = 2.8e5, 4.0, 600.0
     campaign = campaign_of_pressures(simulated, "pressure_stiffness")
@@ -155,11 +155,11 @@ def test_the_next_record_is_planned_at_a_pressure_and_shrinks_the_error_as_predi
         farthest=3.0,
     )
     # What is asked at a pressure says where that lies beyond those of the records, also of a saved fit.
-    for known in (found, found.saved, next_record(found)):
+    found.save(tmp_path / "fit.json")
+    for known in (found, load_fit(tmp_path / "fit.json"), next_record(found)):
         assert fit_at(known, pressure=2.4e5).untested == ""
-        assert "pressure 2.8e+05 Pa lies beyond the 1.7e+05 to 2.4e+05 Pa" in str(
-            fit_at(known, pressure=2.8e5)
-        )
+        words = str(fit_at(known, pressure=2.8e5))
+        assert "pressure 2.8e+05 Pa lies beyond the 1.7e+05 to 2.4e+05 Pa" in words
     stiff = inference.at_least(lambda model: model["linear_stiffness.coefficient"], 1.25e6)
     stiffer = design(found, None, stiff, free={"pressure": (1.7e5, 4e5)}, scan=2)
     assert "lies beyond the 1.7e+05 to 2.4e+05 Pa" in str(stiffer)

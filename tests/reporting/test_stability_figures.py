@@ -171,6 +171,27 @@ def test_curves_of_a_map_are_dashed_where_the_middle_orbit_of_a_fold_is(lens):
         ij.plot.response_curves(lens, curves=0)
 
 
+@pytest.mark.slow
+def test_curves_of_a_map_of_a_fit_have_the_band_of_its_cells(lens):
+    """As wide as the standard errors say; none where a map of other coefficients has other orbits."""
+
+    def drawn(error):
+        errors = {"response": error, "spectral_radius": error}
+        known = eqx.tree_at(lambda one: one.standard_errors, lens, errors, is_leaf=lambda one: one is None)
+        return ij.plot.response_curves(known, curves=1)
+
+    figure = drawn(0.03 * lens.response)
+    assert "95 % band" in entries(figure)
+    corners = np.concatenate([patch.get_path().vertices for patch in figure.axes[0].patches])
+    row = int(np.argmax(np.sum(np.asarray(lens.count) > 1, axis=1)))
+    for column, frequency in enumerate(FOLDS):
+        sizes = np.asarray(lens.response)[:, row, column]
+        ends = np.outer(sizes[np.isfinite(sizes)], [1.0 - 1.959964 * 0.03, 1.0 + 1.959964 * 0.03]).ravel()
+        found = np.unique(corners[corners[:, 0] == frequency, 1].round(9))
+        np.testing.assert_allclose(found, 1e3 * np.sort(ends), rtol=1e-5)
+    assert "95 % band" not in entries(drawn(jnp.full_like(lens.response, jnp.nan)))
+
+
 def test_every_kind_of_bifurcation_has_a_mark_of_its_own():
     from isojax.reporting.plots._stability_style import MARKS
 

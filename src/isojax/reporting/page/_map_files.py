@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._output_folder import check_folder, publish
 from ..._results import RESULTS, is_successful
-from ...models import model_to_dict
+from ...models import EndsEstimated, Estimated, model_to_dict
 from ...stability import FoldCurve, StabilityMap, continue_branch, fold_curve
 from ..plots import plot_fold_curve, plot_response_curves, plot_response_map, plot_stability_map
 from ._png import png_bytes
@@ -78,11 +78,12 @@ def result_codes(smap: StabilityMap) -> np.ndarray:
     return codes
 
 
-def folds_around(smap: StabilityMap) -> FoldCurve | None:
+def folds_around(smap: StabilityMap, fit: Estimated | EndsEstimated | None = None) -> FoldCurve | None:
     """Follow the folds around cells with several orbits, from the frequency with the most of them.
 
     Args:
         smap: the map, with coexisting orbits.
+        fit: with whose errors the curve is given its band; the model of the map is its model.
 
     Returns:
         The curve, also where it could be followed in part only; None where no cell holds several orbits or no
@@ -107,7 +108,7 @@ def folds_around(smap: StabilityMap) -> FoldCurve | None:
     folds = [point for point in branch.special_points if point.kind == "fold" and is_successful(point.result)]
     if not folds:
         return None
-    return fold_curve(smap.model, amplitude_range=window, frequency_range=band, start=folds[0])
+    return fold_curve(smap.model, amplitude_range=window, frequency_range=band, start=folds[0], fit=fit)
 
 
 def write_map(smap: StabilityMap, folder: str | Path, *, folds: FoldCurve | None = None) -> tuple[str, ...]:

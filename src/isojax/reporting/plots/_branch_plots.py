@@ -163,7 +163,8 @@ def plot_transmissibility(transmissibility: Transmissibility, *, ax: Axes | None
     ratio = np.atleast_2d(np.asarray(transmissibility.magnitude))
     stable = np.atleast_2d(np.asarray(transmissibility.stable))
     unstable = False
-    for x, y, held in threads(frequency, ratio, stable):
+    for thread in threads(ratio, stable):
+        x, y, held = frequency[thread[1]], ratio[thread], stable[thread]
         unstable |= _any_unstable(y, held)
         draw_curve(ax, x, y, held, level_colours(1)[0])
     if transmissibility.band is not None:
@@ -186,26 +187,24 @@ def plot_transmissibility(transmissibility: Transmissibility, *, ax: Axes | None
 
 
 def threads(
-    frequency: Float[np.ndarray, " frequency"],
     values: Float[np.ndarray, "orbit frequency"],
     stable: Bool[np.ndarray, "orbit frequency"],
-) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Give coexisting orbits as curves; where their number changes, one goes on into the nearest.
 
     Args:
-        frequency: ascending [Hz].
         values: of each orbit, by rising size; NaN where there is none.
         stable: whether it is stable.
 
     Returns:
-        Frequency, value and stability along each curve.
+        Places of the orbit and of the frequency along each curve.
     """
     count = np.sum(np.isfinite(values), axis=0)
     breaks = np.flatnonzero(np.diff(count)) + 1
     curves = []
-    for columns in np.split(np.arange(frequency.size), breaks):
+    for columns in np.split(np.arange(count.size), breaks):
         for orbit in range(int(count[columns[0]])):
-            curves.append((frequency[columns], values[orbit, columns], stable[orbit, columns]))
+            curves.append((np.full_like(columns, orbit), columns))
     for place in breaks:
         few, many = (place - 1, place) if count[place - 1] < count[place] else (place, place - 1)
         left = list(range(int(count[many])))
@@ -218,13 +217,10 @@ def threads(
             if near is None:
                 continue
             left.remove(near)
-            ends = np.array([frequency[few], frequency[many]])
-            sizes = np.array([values[orbit, few], values[near, many]])
-            curves.append((ends, sizes, np.array([stable[orbit, few], stable[near, many]])))
+            curves.append((np.array([orbit, near]), np.array([few, many])))
         # Orbits without a partner meet in a fold between the two frequencies.
         for one, other in zip(left[::2], left[1::2], strict=False):
-            pair = [one, other]
-            curves.append((frequency[[many, many]], values[pair, many], stable[pair, many]))
+            curves.append((np.array([one, other]), np.array([many, many])))
     return curves
 
 

@@ -6,9 +6,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..._given_numbers import given_count
-from ...models import EndsEstimated, Estimated
+from ...models import HALF_WIDTH, EndsEstimated, Estimated
 from ...stability import StabilityMap, frequency_response
 from ._branch_plots import draw_branch_band, threads
+from ._draw_band import draw_band
 from ._stability_style import MILLIMETRES, draw_curve, drive_unit, level_colours, quantity, stability_handles
 from ._style import axes_for, entitle
 
@@ -31,7 +32,8 @@ def plot_response_curves(
         smap: the map.
         curves: how many rows, if the map has as many.
         fit: with whose errors each curve is given its band, which takes some seconds: the response is
-            followed for it from the lowest frequency on. The model of the map is its model. None for no band.
+            followed for it from the lowest frequency on. The model of the map is its model. If omitted, a map
+            that was made with a fit has a band where all that the errors allow have the same orbits.
         ax: axes to draw on.
 
     Returns:
@@ -47,13 +49,19 @@ def plot_response_curves(
     shape = (-1, amplitudes.size, frequency.size)
     response = MILLIMETRES * np.asarray(smap.response).reshape(shape)
     stable = np.asarray(smap.stable).reshape(shape)
+    half = np.full_like(response, np.nan)
+    if fit is None and smap.standard_errors is not None:
+        half = HALF_WIDTH * MILLIMETRES * np.asarray(smap.standard_errors["response"]).reshape(shape)
     unit, unstable = drive_unit(smap.model.excitation), False
     rows = _rows(np.asarray(smap.count), curves)
     colours = level_colours(len(rows))
     for row, colour in zip(rows, colours, strict=True):
         label = quantity(amplitudes[row], unit)
-        for x, y, held in threads(frequency, response[:, row], stable[:, row]):
+        for thread in threads(response[:, row], stable[:, row]):
+            x, y, off = frequency[thread[1]], response[:, row][thread], half[:, row][thread]
+            held = stable[:, row][thread]
             draw_curve(ax, x, y, held, colour, label)
+            draw_band(ax, (x, y - off), (x, y + off), colour)
             unstable |= bool(np.any(np.isfinite(y) & ~held))
             label = ""
     if fit is not None:
