@@ -96,8 +96,8 @@ def command_line(commands: Mapping[str, Command]) -> argparse.ArgumentParser:
         help="find the periodic orbits over drive amplitude and frequency, and whether they are stable",
         description="Find the periodic orbits of a model over a grid of drive amplitude and frequency, and "
         "their Floquet multipliers. Writes map.npz (all arrays, SI units), curves.png (response over "
-        "frequency, dashed where unstable, with its 95 % band where chances are given), map.png (largest multiplier), response.png and, with --folds "
-        "where orbits coexist, folds.png; prints a summary.",
+        "frequency, dashed where unstable, with its 95 % band where chances are given), map.png (largest "
+        "multiplier), response.png and, with --folds where orbits coexist, folds.png; prints a summary.",
         epilog=_EXIT_CODES,
     )
     plane.add_argument("model", metavar="MODEL.json", help="as close-loop, fit and save_model write it")
