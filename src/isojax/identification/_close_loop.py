@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import scipy.stats
 
-from .._cores import blas_in_one_thread
+from .._cores import in_own_threads
 from .._kept import digest, kept_answers, package_digest
 from .._progress import LOOP_SHARES, REPLACE_SHARE, KeyFigure, Stage, silent
 from .._results import RESULTS, is_successful
@@ -157,7 +157,7 @@ def extend(before: Fit | Fitted, verdict: Verdict) -> Extension:
     return Extension(as_fit(before, "before"), verdict.after, verdict)
 
 
-@blas_in_one_thread
+@in_own_threads
 def close_loop(
     campaign: Campaign | str | Path,
     *,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from ..._cores import blas_in_one_thread
+from ..._cores import in_own_threads
 from ..._progress import silent
 from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE, AbstractElement
@@ -55,7 +55,7 @@ def is_locked(fit: Fit, rules: Rules) -> bool:
     return lack_of_fit(fit).p_value < rules.significance
 
 
-@blas_in_one_thread
+@in_own_threads
 def diagnose(
     fit: Fit | Fitted,
     *,

@@ -12,9 +12,8 @@ from ._score import Score, ScoreTest
 def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
     """List the refits that nothing speaks against, best first.
 
-    Of those that these data do not distinguish, the one with the fewest coefficients goes first. Internal
-    states do not count: their initial values count in the criterion, and of a fractional derivative they are
-    nodes of an integral.
+    Of those that these data do not distinguish, the one with the fewest coefficients goes first; of as many,
+    the one with the fewest internal states, and then the one that the criterion puts first.
     """
     usable = [refit for refit in refits if refit.violation is None]
     if not usable:
@@ -23,7 +22,7 @@ def by_evidence(refits: list[Refit], rules: Rules) -> list[Refit]:
     usable = sorted(usable, key=lambda refit: bic(refit.estimate, inflation))
     most = bic(usable[0].estimate, inflation) + least_difference(usable[0].estimate, rules)
     tied = (one for one in usable if bic(one.estimate, inflation) <= most)
-    first = min(tied, key=lambda refit: len(refit.estimate.places))
+    first = min(tied, key=lambda refit: (len(refit.estimate.places), refit.estimate.model.internal_states))
     return [first, *(one for one in usable if one is not first)]
 
 

@@ -5,7 +5,7 @@ from typing import Protocol, runtime_checkable
 import jax.numpy as jnp
 import numpy as np
 
-from ..._cores import blas_in_one_thread
+from ..._cores import in_own_threads
 from ..._parameters import own_parameters
 from ...elements import CATALOGUE, Scales
 from .._rules import Rules
@@ -38,7 +38,7 @@ class Extended(Protocol):
         ...
 
 
-@blas_in_one_thread
+@in_own_threads
 def find_separating_experiment(
     extension: Extension | Extended, *, seconds: float | None = None, rules: Rules = Rules()
 ) -> Separation:

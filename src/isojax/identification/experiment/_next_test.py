@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from ..._cores import blas_in_one_thread
+from ..._cores import in_own_threads
 from ..._parameters import element_names, list_parameters
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
@@ -77,7 +77,7 @@ class _Asked(NamedTuple):
         return expected_chi2(information, known, self.effect, count, strength) / self.inflation
 
 
-@blas_in_one_thread
+@in_own_threads
 def next_test(
     fit: Fit | Fitted,
     quantity: Callable[[Isolator], Any] | None = None,

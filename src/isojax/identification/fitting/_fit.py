@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._cores import blas_in_one_thread
+from ..._cores import in_own_threads
 from ..._parameters import element_names, list_parameters, replace_parameters
 from ..._progress import silent
 from ..._results import RESULTS, is_successful
@@ -31,7 +31,7 @@ _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", 
 """Statistics that a search which failed does not have."""
 
 
-@blas_in_one_thread
+@in_own_threads
 def fit(
     model: Isolator | Modelled | Campaign | str | Path,
     campaign: Campaign | str | Path | None = None,

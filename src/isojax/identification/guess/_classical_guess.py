@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Literal
 
-from ..._cores import blas_in_one_thread
+from ..._cores import in_own_threads
 from ..._parameters import list_parameters
 from ..._show import Row, amount, shown
 from ..._types import check_float64
@@ -117,7 +117,7 @@ def _cautions(
     return tuple(notes)
 
 
-@blas_in_one_thread
+@in_own_threads
 def classical_guess(
     campaign: Campaign | str | Path,
     *,

@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from isojax import _cores, rig
-from isojax._cores import blas_in_one_thread
+from isojax._cores import in_own_threads
 from isojax.identification import classical_guess, diagnose, fit
 
 
@@ -17,7 +17,7 @@ def _threads() -> set[int]:
 
 
 def test_blas_has_one_thread_inside_and_as_many_as_before_afterwards():
-    @blas_in_one_thread
+    @in_own_threads
     def work(number, *, fails=False):
         if fails:
             raise ArithmeticError(number)
@@ -45,12 +45,12 @@ def test_the_last_of_several_threads_gives_blas_its_threads_back(monkeypatch):
     monkeypatch.setattr(_cores, "ThreadpoolController", Controller)
     first_is_inside, second_is_inside, first_is_done = (threading.Event() for _ in range(3))
 
-    @blas_in_one_thread
+    @in_own_threads
     def first():
         first_is_inside.set()
         assert second_is_inside.wait(60.0)
 
-    @blas_in_one_thread
+    @in_own_threads
     def second():
         second_is_inside.set()
         assert first_is_done.wait(60.0)
