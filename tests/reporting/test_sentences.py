@@ -77,6 +77,17 @@ def test_headline_without_findings_names_nothing(found):
         assert "→" not in sentence
 
 
+def test_where_nothing_left_comes_back_with_the_drive_no_effect_is_said_to_be_missing(found):
+    louder = found.after._replace(noise=dataclasses.replace(found.after.noise, excess=2.55))
+    alone = dataclasses.replace(found, extensions=(), before=louder, after=louder, verdict="unexplained")
+    sentence = verdict_sentence(alone)
+    assert sentence.startswith(
+        "The model explains what comes back with the drive, but the records hold more noise"
+    )
+    assert "χ²/dof 2.550 by that noise" in sentence
+    assert "missing" not in sentence
+
+
 def test_a_finding_that_a_later_one_contains_is_told_by_that(found):
     (step,) = found.extensions
     finding = step.verdict.finding._replace(effect="stribeck_friction")

@@ -36,6 +36,7 @@ from .noise import brief_blows as brief_blows
 from .noise import data_health as data_health
 from .noise import estimate_noise as estimate_noise
 from .noise import noise_peak as noise_peak
+from .noise import quieter_noise as quieter_noise
 from .noise import residual_noise as residual_noise
 from .reading import READERS as READERS
 from .reading import Declaration as Declaration

@@ -10,6 +10,7 @@ and `_bounds`. `_findings` and `_separation` hold the results.
 from ._diagnose import diagnose as diagnose
 from ._diagnose import diagnose_with as diagnose_with
 from ._diagnose import is_good as is_good
+from ._diagnose import leaves_noise as leaves_noise
 from ._findings import Candidate as Candidate
 from ._findings import Extension as Extension
 from ._findings import Finding as Finding

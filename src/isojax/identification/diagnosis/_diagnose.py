@@ -55,6 +55,11 @@ def is_locked(fit: Fit, rules: Rules) -> bool:
     return lack_of_fit(fit).p_value < rules.significance
 
 
+def leaves_noise(fit: Fit, rules: Rules) -> bool:
+    """Say whether nothing that a fit leaves comes back with the drive; False where no drive repeats."""
+    return lack_of_fit(fit).p_value >= rules.significance
+
+
 @in_own_threads
 def diagnose(
     fit: Fit | Fitted,
@@ -173,7 +178,7 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     words = "The fit is good and " if good else "The fit is not good, but "
     if tone is not None:
         words = tone.words(plain_unit("SI unit of the output", case.fit.campaign)) + "; "
-    elif not good and not is_locked(case.fit, rules):
+    elif not good and leaves_noise(case.fit, rules):
         words = _words_of_noise(case.fit, rules)
     return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".", tone)
 

@@ -22,13 +22,17 @@ from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
 from ._fit_result import Fit
 from ._integration_steps import find_integrator
-from ._noise_left import noise_left
+from ._noise_left import less_noise, noise_left
 from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
 from ._simulator import Simulator
 
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
+
+
+_ROUNDS = 4
+"""Times that a fit is weighted anew by less noise."""
 
 
 @in_own_threads
@@ -112,7 +116,7 @@ def fit_by_output(
     places: tuple[int, ...] | None = None,
     integrator: Integrator | None = None,
 ) -> Fit:
-    """Fit a model, weighted by the noise that the output shows.
+    """Fit a model, weighted by the noise that the output shows, or that the fit leaves where that is less.
 
     Args:
         model: start.
@@ -144,7 +148,25 @@ def fit_by_output(
         search.progress("the simulation from the start values diverges: again from their linear part")
         again = fit_from(_linear_part(model, places))
         found = found if again.result == RESULTS.not_finite else again
-    return complete(found, model, campaign, noise)
+    return _with_less_noise(complete(found, model, campaign, noise), search)
+
+
+def _with_less_noise(found: Fit, search: Search) -> Fit:
+    """Fit again by the noise that a fit leaves, as long as that is less than what it was weighted by.
+
+    Noise that is taken for far too loud lets a fit end far from its best, so that one round may not do.
+    """
+    shown = found.noise
+    for _ in range(_ROUNDS):
+        less = less_noise(found.estimate, found.campaign, shown)
+        if less is None:
+            return found
+        search.progress("the fit leaves less than the noise that the output shows: again, weighted by that")
+        again = _weighted_by(found, less, search)
+        if again is found:
+            return found
+        found = again
+    return found
 
 
 def weighted_by_residual(found: Fit, search: Search) -> Fit:
@@ -172,11 +194,11 @@ def weighted_by_output(found: Fit, search: Search) -> Fit:
         search: how to search.
 
     Returns:
-        The fit, weighted by the noise that the output shows.
+        The fit, as `fit_by_output` weighs it.
     """
     if found.noise.method != "residual":
         return found
-    return _weighted_by(found, estimate_noise(found.campaign), search)
+    return _with_less_noise(_weighted_by(found, estimate_noise(found.campaign), search), search)
 
 
 def _weighted_by(found: Fit, noise: NoiseEstimate, search: Search) -> Fit:

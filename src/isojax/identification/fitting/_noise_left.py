@@ -1,16 +1,37 @@
-"""The noise that a good fit leaves: the output's over whole records, and what the drive channel adds."""
+"""The noise that a fit leaves: the output's over whole records, and what the drive channel adds."""
 
 import dataclasses
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from ..._results import is_successful
-from ...records import Campaign, NoiseEstimate, residual_noise
+from ...records import Campaign, NoiseEstimate, Record, quieter_noise, residual_noise
 from .._rules import Rules
-from ._errors import restarted_runs
+from ._errors import Run, restarted_runs
 from ._estimate import Estimate
 from ._lack_of_fit import locked_power, shows_noise
+
+_TOO_LOUD = 0.9
+"""chi2/dof below which noise was estimated too loud."""
+
+
+def less_noise(found: Estimate, campaign: Campaign, noise: NoiseEstimate) -> NoiseEstimate | None:
+    """Give the noise that a fit leaves, where it leaves less than the output shows.
+
+    Args:
+        found: the estimate.
+        campaign: the measurements.
+        noise: what the output shows.
+
+    Returns:
+        The noise; None where the fit leaves no less than it was weighted by.
+    """
+    if not is_successful(found.result) or found.problem.heads or found.chi2 >= _TOO_LOUD * found.dof:
+        return None
+    runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
+    return quieter_noise(campaign, noise, _windows(found, campaign, runs, lambda record: True))
 
 
 def noise_left(
@@ -36,10 +57,17 @@ def noise_left(
     locked = locked_power(runs, len(found.places), campaign.output.relative_error).p_value
     if not locked >= rules.significance:
         return None
+    left = residual_noise(campaign, noise, _windows(found, campaign, runs, shows_noise))
+    return None if left is None else dataclasses.replace(left, excess=found.chi2 / found.dof)
+
+
+def _windows(
+    found: Estimate, campaign: Campaign, runs: Sequence[Run], counts: Callable[[Record], bool]
+) -> list[list[Float[np.ndarray, " _"]]]:
+    """Give the residual of each record segment by segment; none of records that do not count."""
     windows: dict[str, list[Float[np.ndarray, " _"]]] = {record.name: [] for record in campaign.records}
     for part in found.problem.segments:
         run = runs[part.record]
-        if shows_noise(run.record):
+        if counts(run.record):
             windows[run.record.name].append(run.residual[part.counted : part.stop])
-    left = residual_noise(campaign, noise, [windows[record.name] for record in campaign.records])
-    return None if left is None else dataclasses.replace(left, excess=found.chi2 / found.dof)
+    return [windows[record.name] for record in campaign.records]

@@ -16,6 +16,7 @@ from ._noise import NoiseEstimate as NoiseEstimate
 from ._noise import estimate_noise as estimate_noise
 from ._noise_peak import NoisePeak as NoisePeak
 from ._noise_peak import noise_peak as noise_peak
+from ._residual_noise import quieter_noise as quieter_noise
 from ._residual_noise import residual_noise as residual_noise
 from ._spike_counts import Spikes as Spikes
 from ._spike_counts import spikes as spikes

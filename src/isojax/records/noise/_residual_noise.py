@@ -43,22 +43,16 @@ def residual_noise(
             as a held-out one.
 
     Returns:
-        The estimate; None where the residual shows white noise that is no quieter than the output's, and
-        where the noise is declared, filtered or beside a recorded motion of the floor.
+        The estimate; None where the residual is white, and where the noise is declared, filtered or beside a
+        recorded motion of the floor.
 
     Source: Pintelon & Schoukens 2012, System Identification: A Frequency Domain Approach, secs. 9.2 and 10.
     """
-    declared = campaign.output.noise is not None or campaign.filter is not None
-    if declared or any(record.floor is not None for record in campaign.records):
-        return None
-    pieces = [
-        [_piece(window, record) for window in own]
-        for record, own in zip(campaign.records, windows, strict=True)
-    ]
+    pieces = _pieces(campaign, windows)
     counts, band = [bool(own) for own in pieces], NoiseBand(campaign.rate, None)
     law, scatters = coloured(lambda _: pieces, counts, known.sigma, band)
     if law is None:
-        return _white(campaign, known, pieces, counts)
+        return None
     levels = record_levels(law.sigma, _beside(campaign, law, scatters), counts)
     return dataclasses.replace(
         known,
@@ -72,24 +66,30 @@ def residual_noise(
     )
 
 
-def _methods(known: NoiseEstimate, counts: list[bool]) -> tuple[NoiseMethod, ...]:
-    return tuple("residual" if own else method for own, method in zip(counts, known.methods, strict=True))
-
-
-def _white(
-    campaign: Campaign, known: NoiseEstimate, pieces: list[list[Piece]], counts: list[bool]
+def quieter_noise(
+    campaign: Campaign, known: NoiseEstimate, windows: Sequence[Sequence[Float[np.ndarray, " _"]]]
 ) -> NoiseEstimate | None:
-    """Gives white noise where the output shows more: random forces move it, or the start of a short dwell
-    rings on, and the model follows.
+    """Gives white noise of the rms that a model leaves, for an estimate that is louder than this.
+
+    Noise is at most what a model leaves, whatever that lacks. The output shows more where random forces move
+    it, or where the start of a dwell rings on to its end: the model follows both.
+
+    Args:
+        campaign: The campaign.
+        known: The louder estimate.
+        windows: As in `residual_noise`.
+
+    Returns:
+        The estimate, each record with a level of its own where they differ significantly; None without a
+        window, and where the noise is declared, filtered or beside a recorded motion of the floor.
     """
+    pieces = _pieces(campaign, windows)
     scatters = [pooled_scatter([piece_scatter(piece) for piece in own]) for own in pieces]
     whole = pooled_scatter([one for one in scatters if one is not None])
     if whole is None:
         return None
-    sigma = float(np.sqrt(whole.square))
+    counts, sigma = [bool(own) for own in pieces], float(np.sqrt(whole.square))
     seen = float(np.sqrt(np.mean(np.square(known.levels)[counts])))
-    if sigma * _AS_SEEN >= seen:
-        return None
     return dataclasses.replace(
         known,
         sigma=sigma,
@@ -100,6 +100,21 @@ def _white(
         share=1.0,
         colour=None,
     )
+
+
+def _pieces(campaign: Campaign, windows: Sequence[Sequence[Float[np.ndarray, " _"]]]) -> list[list[Piece]]:
+    """Gives the windows of each record; none where the noise is not to be taken from them."""
+    declared = campaign.output.noise is not None or campaign.filter is not None
+    if declared or any(record.floor is not None for record in campaign.records):
+        return [[] for _ in windows]
+    return [
+        [_piece(window, record) for window in own]
+        for record, own in zip(campaign.records, windows, strict=True)
+    ]
+
+
+def _methods(known: NoiseEstimate, counts: list[bool]) -> tuple[NoiseMethod, ...]:
+    return tuple("residual" if own else method for own, method in zip(counts, known.methods, strict=True))
 
 
 def _beside(

@@ -15,7 +15,7 @@ from ..._quantities import (
 from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE
 from ...identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
-from ...identification.diagnosis import is_good
+from ...identification.diagnosis import is_good, leaves_noise
 from ...identification.fitting import bent_words
 from ...records import DataHealth
 
@@ -153,6 +153,13 @@ def _verdict_words(loop: Loop) -> str:
         good = is_good(loop.after, loop.rules)
         rest = "Otherwise the model explains the records" if good else "More than noise is left beside it"
         return f"{tone.words(unit)}. {rest}; {error}."
+    if not found and leaves_noise(loop.after, loop.rules):
+        goodness = max(loop.after.stats.chi2 / loop.after.stats.dof, loop.after.noise.excess)
+        return (
+            "The model explains what comes back with the drive, but the records hold more noise than the "
+            f"output shows by itself, or a disturbance (χ²/dof {typeset_goodness(goodness)} by that noise); "
+            f"{error}."
+        )
     known = f" even with {effects}" if found else ""
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
 
