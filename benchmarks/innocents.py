@@ -2,7 +2,7 @@
 
 Run `python benchmarks/innocents.py --seeds 8100:8200 --out innocents.jsonl`, then `... --report
 innocents.jsonl`. A run can be stopped at any time and goes on where it stopped, as that of `blind_trial.py`.
-About 15 s a campaign and core once the code is compiled. Seeds 8000:8010 are there to tune on, 8100:8200 to
+About 5 s a campaign and core once the code is compiled. Seeds 8000:8010 are there to tune on, 8100:8200 to
 judge on, and no others.
 
 The campaigns are those of the blind trial that hide nothing, simulated by the rig, each with one flaw:

@@ -158,7 +158,7 @@ def _with_less_noise(found: Fit, search: Search) -> Fit:
     """
     shown = found.noise
     for _ in range(_ROUNDS):
-        less = less_noise(found.estimate, found.campaign, shown)
+        less = less_noise(found.estimate, found.campaign, shown, found.noise)
         if less is None:
             return found
         search.progress("the fit leaves less than the noise that the output shows: again, weighted by that")

@@ -14,24 +14,34 @@ from ._estimate import Estimate
 from ._lack_of_fit import locked_power, shows_noise
 
 _TOO_LOUD = 0.9
-"""chi2/dof below which noise was estimated too loud."""
+"""Mean square of what a fit leaves, over that of the noise, below which the noise was estimated too loud."""
 
 
-def less_noise(found: Estimate, campaign: Campaign, noise: NoiseEstimate) -> NoiseEstimate | None:
-    """Give the noise that a fit leaves, where it leaves less than the output shows.
+def less_noise(
+    found: Estimate, campaign: Campaign, shown: NoiseEstimate, taken: NoiseEstimate
+) -> NoiseEstimate | None:
+    """Give the noise that a fit leaves, where it leaves less than it was weighted by.
 
     Args:
         found: the estimate.
         campaign: the measurements.
-        noise: what the output shows.
+        shown: noise that the output shows.
+        taken: noise that weighted the fit.
 
     Returns:
-        The noise; None where the fit leaves no less than it was weighted by.
+        The noise; None where the fit leaves no less.
     """
-    if not is_successful(found.result) or found.problem.heads or found.chi2 >= _TOO_LOUD * found.dof:
+    if not is_successful(found.result) or found.problem.heads:
+        return None
+    # Of white noise chi2 says it; under a colour it counts what the whitening leaves.
+    if taken.colour is None and found.chi2 >= _TOO_LOUD * found.dof:
         return None
     runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
-    return quieter_noise(campaign, noise, _windows(found, campaign, runs, lambda record: True))
+    left = quieter_noise(campaign, shown, _windows(found, campaign, runs, lambda record: True))
+    loud = np.mean(
+        [own**2 for own, one in zip(taken.levels, campaign.records, strict=True) if one.role == "fit"]
+    )
+    return left if left is not None and left.sigma**2 < _TOO_LOUD * loud else None
 
 
 def noise_left(

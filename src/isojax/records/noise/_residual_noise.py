@@ -50,7 +50,7 @@ def residual_noise(
     """
     pieces = _pieces(campaign, windows)
     counts, band = [bool(own) for own in pieces], NoiseBand(campaign.rate, None)
-    law, scatters = coloured(lambda _: pieces, counts, known.sigma, band)
+    law, scatters = coloured(lambda _: pieces, counts, band)
     if law is None:
         return None
     levels = record_levels(law.sigma, _beside(campaign, law, scatters), counts)
