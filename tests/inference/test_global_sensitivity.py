@@ -138,7 +138,7 @@ def test_a_function_that_gives_no_numbers_is_refused_at_once():
 
         def names(x, plain=plain):
             asked.append(plain(x["a"]))
-            return "a"
+            return "nothing"
 
         with pytest.raises(ValueError, match=r"gave one of type str"):
             ij.global_sensitivity(names, CIRCLE, samples=64)

@@ -10,9 +10,6 @@ from made_campaign import campaign_of
 from scipy.signal import butter, lfilter, sosfilt
 
 from isojax.records import Dwell, Filter, Record, estimate_noise
-from isojax.records.noise._colour import Piece
-from isojax.records.noise._noise import coloured
-from isojax.records.spectrum import NoiseBand, Rest
 
 RATE, SIGMA = 250.0, 0.01
 FREQUENCIES = (4.0, 4.4, 4.9, 5.3, 5.7, 6.2)
@@ -151,23 +148,6 @@ def test_short_windows_whose_fundamentals_lie_side_by_side_show_no_peak_there() 
         noise = estimate_noise(replace(campaign_of(*records), rate=500.0))
         assert noise.colour is None
         assert noise.sigma == pytest.approx(SIGMA, rel=0.05)
-
-
-def test_a_law_that_leaves_windows_louder_than_it_states_is_none_of_theirs() -> None:
-    """Motions that ring down look like coloured noise, which lets louder windows in that do not fit it."""
-    draw, time = np.random.default_rng(4), np.arange(200) / RATE
-
-    def window(size: float) -> Piece:
-        ring = size * np.exp(-3.0 * time) * np.cos(2.0 * np.pi * 5.6 * time)
-        signal = ring + 0.3 * SIGMA * draw.standard_normal(time.size)
-        return Piece(Rest(signal, np.zeros(0), np.zeros(time.size // 2 + 1)))
-
-    quiet, loud = [window(SIGMA) for _ in range(4)], [window(50.0 * SIGMA) for _ in range(4)]
-    band = NoiseBand(RATE, None)
-    law, _ = coloured(lambda _: [quiet], [True], band)
-    assert law is not None
-    law, scatters = coloured(lambda law: [quiet if law is None else loud], [True], band)
-    assert (law, scatters) == (None, [])
 
 
 def test_declared_and_filtered_noise_count_as_white() -> None:

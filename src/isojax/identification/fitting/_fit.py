@@ -30,8 +30,7 @@ from ._simulator import Simulator
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
 
-
-_ROUNDS = 4
+_WEIGHINGS = 4
 """Times that a fit is weighted anew by less noise."""
 
 
@@ -157,7 +156,7 @@ def _with_less_noise(found: Fit, search: Search) -> Fit:
     Noise that is taken for far too loud lets a fit end far from its best, so that one round may not do.
     """
     shown = found.noise
-    for _ in range(_ROUNDS):
+    for _ in range(_WEIGHINGS):
         less = less_noise(found.estimate, found.campaign, shown, found.noise)
         if less is None:
             return found

@@ -13,9 +13,6 @@ from ._errors import Run, restarted_runs
 from ._estimate import Estimate
 from ._lack_of_fit import locked_power, shows_noise
 
-_TOO_LOUD = 0.9
-"""Mean square of what a fit leaves, over that of the noise, below which the noise was estimated too loud."""
-
 
 def less_noise(
     found: Estimate, campaign: Campaign, shown: NoiseEstimate, taken: NoiseEstimate
@@ -34,14 +31,10 @@ def less_noise(
     if not is_successful(found.result) or found.problem.heads:
         return None
     # Of white noise chi2 says it; under a colour it counts what the whitening leaves.
-    if taken.colour is None and found.chi2 >= _TOO_LOUD * found.dof:
+    if taken.colour is None and found.chi2 >= found.dof:
         return None
     runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
-    left = quieter_noise(campaign, shown, _windows(found, campaign, runs, lambda record: True))
-    loud = np.mean(
-        [own**2 for own, one in zip(taken.levels, campaign.records, strict=True) if one.role == "fit"]
-    )
-    return left if left is not None and left.sigma**2 < _TOO_LOUD * loud else None
+    return quieter_noise(campaign, shown, taken, _windows(found, campaign, runs, lambda record: True))
 
 
 def noise_left(

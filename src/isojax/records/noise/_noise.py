@@ -19,7 +19,6 @@ from ._scatter import (
     cycle_scatter,
     innovation_scatter,
     period_scatter,
-    pooled_scatter,
     settled_pieces,
 )
 from ._spectral_noise import high_frequency_floor, repeat_scatter
@@ -28,10 +27,6 @@ NoiseMethod = Literal["declared", "repeats", "periods", "cycle_scatter", "high_f
 
 _BETTER: tuple[NoiseMethod, ...] = ("cycle_scatter", "periods", "repeats")
 """Methods that show the noise itself. The floor of a spectrum may be response."""
-
-_NO_LAW = 1.5
-"""Mean square of the innovations, over that which a law states, from which it is none of these windows: in
-some of them a motion rings down. 1/f noise, which has no finite order, reaches 1.08."""
 
 _SELECTIONS = 3
 """Times that the settled dwells are chosen anew with the colour that the last choice showed."""
@@ -181,7 +176,7 @@ def _estimate(campaign: Campaign) -> NoiseEstimate:
     colour, scatters = None, [one.scatter for one in found]
     if campaign.filter is None:
         shown = [one.counts and one.shows(common) for one in found]
-        colour, innovations = coloured(lambda law: _pieces(found, law), shown, band)
+        colour, innovations = coloured(lambda law: _pieces(found, law), shown, sigma, band)
         scatters = innovations or scatters
     if colour is not None:
         sigma, note = colour.sigma, words_of_colour(colour)
@@ -208,7 +203,7 @@ def _pieces(found: list[_Seen], law: Colour | None) -> list[list[Piece]]:
 
 
 def coloured(
-    pieces_of: Callable[[Colour | None], list[list[Piece]]], counts: list[bool], band: NoiseBand
+    pieces_of: Callable[[Colour | None], list[list[Piece]]], counts: list[bool], sigma: float, band: NoiseBand
 ) -> tuple[Colour | None, list[Scatter | None]]:
     """Gives the law of coloured noise, one for all records, and the scatter of each record by it.
 
@@ -216,6 +211,7 @@ def coloured(
         pieces_of: The windows of each record that hold noise alone, as a law shows them; which windows these
             are may depend on it.
         counts: Which records set the law.
+        sigma: Pooled rms.
         band: The band that the noise fills.
 
     Returns:
@@ -225,12 +221,9 @@ def coloured(
     if law is None:
         return None, []
     scatters = _innovations(pieces_of(law), law)
-    whole = pooled_scatter([own for own, counted in zip(scatters, counts, strict=True) if counted and own])
-    if whole is not None and whole.square > _NO_LAW * law.sigma**2:
-        return None, []
     if differ([own for own, counted in zip(scatters, counts, strict=True) if counted and own]):
         # The loudest record must not set the law.
-        scales = np.array([law.sigma / np.sqrt(own.square) if own else 1.0 for own in scatters])
+        scales = np.array([sigma / np.sqrt(own.square) if own else 1.0 for own in scatters])
         law = _common_colour(pieces_of, counts, scales, band)
         scatters = [] if law is None else _innovations(pieces_of(law), law)
     return law, scatters

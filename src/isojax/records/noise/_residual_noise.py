@@ -23,7 +23,7 @@ from ._noise import (
 from ._scatter import Scatter, piece_scatter, pooled_scatter
 
 _AS_SEEN = 1.05
-"""Residual noise over that of the output, up to which the note names no other cause."""
+"""Factor within which the noise of the residual and that of the output count as one."""
 
 
 def residual_noise(
@@ -50,7 +50,7 @@ def residual_noise(
     """
     pieces = _pieces(campaign, windows)
     counts, band = [bool(own) for own in pieces], NoiseBand(campaign.rate, None)
-    law, scatters = coloured(lambda _: pieces, counts, band)
+    law, scatters = coloured(lambda _: pieces, counts, known.sigma, band)
     if law is None:
         return None
     levels = record_levels(law.sigma, _beside(campaign, law, scatters), counts)
@@ -67,21 +67,25 @@ def residual_noise(
 
 
 def quieter_noise(
-    campaign: Campaign, known: NoiseEstimate, windows: Sequence[Sequence[Float[np.ndarray, " _"]]]
+    campaign: Campaign,
+    known: NoiseEstimate,
+    taken: NoiseEstimate,
+    windows: Sequence[Sequence[Float[np.ndarray, " _"]]],
 ) -> NoiseEstimate | None:
-    """Gives white noise of the rms that a model leaves, for an estimate that is louder than this.
+    """Gives white noise of the rms that a model leaves, where that is less than what it was weighted by.
 
     Noise is at most what a model leaves, whatever that lacks. The output shows more where random forces move
     it, or where the start of a dwell rings on to its end: the model follows both.
 
     Args:
         campaign: The campaign.
-        known: The louder estimate.
+        known: The noise that the output shows.
+        taken: The noise that weighted the fit.
         windows: As in `residual_noise`.
 
     Returns:
-        The estimate, each record with a level of its own where they differ significantly; None without a
-        window, and where the noise is declared, filtered or beside a recorded motion of the floor.
+        The estimate, each record with a level of its own where they differ significantly; None where it is
+        not less, and where the noise is declared, filtered or beside a recorded motion of the floor.
     """
     pieces = _pieces(campaign, windows)
     scatters = [pooled_scatter([piece_scatter(piece) for piece in own]) for own in pieces]
@@ -89,7 +93,9 @@ def quieter_noise(
     if whole is None:
         return None
     counts, sigma = [bool(own) for own in pieces], float(np.sqrt(whole.square))
-    seen = float(np.sqrt(np.mean(np.square(known.levels)[counts])))
+    seen, weighed = (float(np.sqrt(np.mean(np.square(one.levels)[counts]))) for one in (known, taken))
+    if sigma * _AS_SEEN >= weighed:
+        return None
     return dataclasses.replace(
         known,
         sigma=sigma,
