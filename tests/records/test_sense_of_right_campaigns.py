@@ -76,3 +76,17 @@ def test_no_hidden_effect_is_taken_for_a_mistake(tmp_path, seed, name):
     found = find_suspicions(read_campaign(tmp_path))
     assert not any(one.contradicts for one in found)
     assert {one.check for one in found} <= ({"flat tops"} if name == "clipping" else set())
+
+
+def test_light_damping_that_gives_power_back_at_the_ends_of_short_dwells_is_a_doubt(tmp_path):
+    """The dwells ring on: at their ends the drive may take out what it fed in before."""
+    frequencies = (4.23, 4.85, 5.44, 6.3, 6.44, 6.48, 7.05, 7.07, 7.55, 8.99)
+    plant = rig.Plant((rig.LinearStiffness(1e6), rig.CubicStiffness(1.8e10), rig.LinearDamping(640.0)))
+    plan = rig.SteppedSine((44.9, 50.2), frequencies, 8, ("forward",))
+    bench = rig.Bench(noise=1e-4, drift=0.0, rate=250.0)
+    plans = tuple(rig.AtPressure(plan, pressure) for pressure in (2e5, 2.3e5, 1.75e5))
+    path = rig.write_campaign(tmp_path / "short", plant, plans, 113, "short dwells", bench)
+    found = find_suspicions(read_campaign(path))
+    assert [one.check for one in found] == ["power"]
+    assert not found[0].contradicts
+    assert "No single mistake explains it" in str(found[0])

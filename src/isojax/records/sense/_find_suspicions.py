@@ -131,7 +131,9 @@ def _balance_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
         check = "balance"  # noise in the response makes the apparent mass too small
     if not causes and check == "balance" and balance.unexplained < _UNRELATED:
         return []
-    certain = bool(causes) or check == "power" or (check == "inertia" and balance.unexplained < _UNBALANCED)
+    # Where the forces balance and no mistake explains it, motions that ring on give back power at times.
+    balanced = balance.unexplained < _UNBALANCED
+    certain = bool(causes) or (check == "inertia" if balanced else check == "power")
     trusted = campaign.input.quantity != "command" or check == "balance"
     figure, expected = _figure(campaign, check, balance)
     free = check == "inertia" and balance.inertia > 0.0 and not _has_scale(campaign)
