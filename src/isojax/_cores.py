@@ -26,7 +26,7 @@ def in_own_threads(work: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]
 
     While it runs, NumPy and SciPy multiply matrices in the caller's own thread: the matrices are small, and
     threads that BLAS adds only wait for each other. Beside another process a product takes 30 times as long
-    with them. What one thread frees the others may use, from then on: see `share_freed_memory`.
+    with them. From then on, threads may use the memory that others freed.
 
     Args:
         work: the function.
@@ -37,7 +37,7 @@ def in_own_threads(work: Callable[_Given, _Answer]) -> Callable[_Given, _Answer]
 
     @functools.wraps(work)
     def alone(*args: _Given.args, **kwargs: _Given.kwargs) -> _Answer:
-        share_freed_memory()
+        _share_freed_memory()
         with _one_thread:
             return work(*args, **kwargs)
 
@@ -72,13 +72,15 @@ _ARENA_MAX = -8
 """`M_ARENA_MAX` of glibc's malloc.h."""
 
 _ARENAS = 2
-"""Pools of memory of the process: one less takes hardly less memory, and threads wait for each other."""
+"""Pools of memory of the process; a single one would take two per cent less."""
 
 
 @functools.cache
-def share_freed_memory() -> None:
-    """Have threads share the memory that they free: of glibc each core's have eight pools of their own, and
-    what lies free in one no other finds. A loop over long records takes a sixth less so.
+def _share_freed_memory() -> None:
+    """Have the threads of the process take memory from few pools.
+
+    The allocator of glibc keeps up to eight pools a core, and what is free in one serves no other. With few a
+    loop over long records takes a sixth less memory.
 
     Where `MALLOC_ARENA_MAX` is set, or there is another C library, nothing is done.
     """

@@ -31,6 +31,26 @@ def test_blas_has_one_thread_inside_and_as_many_as_before_afterwards():
         assert _threads() == {3}
 
 
+@pytest.mark.parametrize("given", [None, "4"])
+def test_threads_share_what_they_free_unless_the_user_has_set_how(monkeypatch, given):
+    asked = []
+
+    class Library:
+        def mallopt(self, option, value):
+            asked.append((option, value))
+
+    monkeypatch.setattr(_cores, "_glibc", Library)
+    monkeypatch.delenv("MALLOC_ARENA_MAX", raising=False)
+    if given is not None:
+        monkeypatch.setenv("MALLOC_ARENA_MAX", given)
+    _cores._share_freed_memory.cache_clear()
+    in_own_threads(lambda: None)()
+    in_own_threads(lambda: None)()
+    # M_ARENA_MAX of malloc.h, once for the process.
+    assert asked == ([(-8, 2)] if given is None else [])
+    _cores._share_freed_memory.cache_clear()
+
+
 def test_the_last_of_several_threads_gives_blas_its_threads_back(monkeypatch):
     # Some builds of BLAS hide from one thread what another has set, so that the calls themselves are counted.
     calls: list[str] = []

@@ -22,7 +22,7 @@ from ._constraint import Constraint
 from ._design_result import Design, Outcome
 from ._design_scan import Scan, scan_design
 from ._design_search import FoundDesign, Task, search, stand
-from ._design_space import NotFinite, Quantity, Space, given_bounds, space_of
+from ._design_space import NotFinite, Quantity, given_bounds, space_of
 
 _RESTARTS = 3
 """Times that the search starts again from a better point of the scan."""
@@ -139,14 +139,8 @@ def design(
         sum(one.evaluations for one in (wanted, *limits)),
         found.retreats,
         found.stopped,
-        untested_words(getattr(known, "after", known), _conditions_of(model, space, found.at)),
+        untested_words(known, space.conditions(np.asarray(space.values(found.at)))),
     )
-
-
-def _conditions_of(model: Isolator, space: Space, at: np.ndarray) -> dict[str, float]:
-    """Give the operating conditions among what was chosen."""
-    chosen = zip(space.names, np.asarray(space.values(at)).tolist(), strict=True)
-    return {name: value for name, value in chosen if name in model.conditions}
 
 
 def _constraints(subject_to: Any) -> tuple[Constraint, ...]:

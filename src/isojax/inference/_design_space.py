@@ -84,11 +84,13 @@ class Space(NamedTuple):
         numbers, values = [entry.value for entry in list_parameters(self.model)], self.values(at)
         for place, value in zip(self.places, values, strict=False):
             numbers[place] = value
-        model = replace_parameters(self.model, shaken(numbers))
-        conditions = self.names[len(self.places) :]
-        if not conditions:
-            return model
-        return model.at(**dict(zip(conditions, values[len(self.places) :], strict=True)))
+        model, conditions = replace_parameters(self.model, shaken(numbers)), self.conditions(values)
+        return model.at(**conditions) if conditions else model
+
+    def conditions(self, values: Any) -> dict[str, Any]:
+        """Give the operating conditions among the values of a point, by name."""
+        count = len(self.places)
+        return dict(zip(self.names[count:], values[count:], strict=True))
 
     def words(self, at: Float[np.ndarray, " coordinate"]) -> str:
         """Give the coefficients at a point in words."""

@@ -59,13 +59,14 @@ def untested_words(fit: object, conditions: Mapping[str, Scalar | float]) -> str
     """Say which conditions lie beyond those of the records that were fitted.
 
     Args:
-        fit: what knows the `tested_conditions`; of any other, nothing is known.
+        fit: what knows the `tested_conditions`, or ends with it, as a closed loop does; of any other, nothing
+            is known.
         conditions: the value of each [SI].
 
     Returns:
         A sentence; "" where all were tested, or nothing is known.
     """
-    tested: Mapping[str, tuple[float, float]] = getattr(fit, "tested_conditions", {})
+    tested: Mapping[str, tuple[float, float]] = getattr(getattr(fit, "after", fit), "tested_conditions", {})
     beyond = [
         f"{name} {number(float(value))} {CONDITIONS[name]} lies beyond the {number(tested[name][0])} to "
         f"{number(tested[name][1])} {CONDITIONS[name]} of the fitted records"
