@@ -32,7 +32,7 @@ from isojax.identification import Rules, classical_guess, fit, read_campaign, sc
 from isojax.identification._close_loop import find_alternatives, overall_verdict, search_effects
 from isojax.identification.diagnosis import _candidate_refits, _diagnose, _imitations, findings_in
 from isojax.identification.fitting import Search
-from isojax.identification.remainder._matching_pursuit import matching_pursuit
+from isojax.identification.traces import matching_pursuit
 from isojax.models import Isolator
 from isojax.records import Campaign
 
@@ -180,7 +180,7 @@ class Trial:
             verdict = overall_verdict(before, after, len(names), last, rules, others)
             words = [" or ".join(sorted((one.effect, *one.indistinguishable))) for one in found]
             if verdict in ("unexplained", "partly_explained"):
-                left = remembered(matching_pursuit, self.known)(after.estimate, search, refit=False)
+                left = remembered(matching_pursuit, self.known)(after.estimate, search)
                 words += [f"remainder {law.formula}" for law in left.laws]
             return verdict, words
         finally:

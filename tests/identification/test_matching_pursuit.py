@@ -7,7 +7,7 @@ from strange_laws import BASE, Governor, Grip
 from isojax import rig
 from isojax.elements import CATALOGUE
 from isojax.identification import classical_guess, explain_remainder, fit, scales
-from isojax.identification.remainder._free_laws import free_laws
+from isojax.identification.traces import free_laws
 
 PLAN = rig.SteppedSine(
     (40.0, 80.0, 130.0), tuple(np.arange(4.0, 6.6, 0.25)), directions=("forward",), holdout_levels=(100.0,)

@@ -55,23 +55,27 @@ def test_a_step_moves_the_coefficients_that_it_is_of_where_an_element_makes_room
 def test_the_trace_of_an_effect_is_as_sure_however_the_effect_is_written():
     draw = np.random.default_rng(5)
     columns = draw.normal(size=(40, 3))  # of the strength and two shapes
+    others = draw.normal(size=(40, 2))  # of the rest of the model
     strength, shapes = 3.0, np.array([0.5, 2.0])
-    information = columns.T @ columns
-    error = trace_error(information[0], np.linalg.inv(information), 0)
+
+    def covariance(own: np.ndarray) -> np.ndarray:
+        whole = np.hstack([own, others])
+        return np.linalg.inv(whole.T @ whole)[:3, :3]
+
+    error = trace_error(covariance(columns), 0)
     # Another strength = s exp(-w shapes), with w of any numbers: the derivatives follow from the chain rule.
     rates = np.array([3.7, -1.2])
     factor = float(np.exp(rates @ shapes))
     other = columns.copy()
     other[:, 0] *= factor
     other[:, 1:] += strength * columns[:, :1] * rates
-    changed = other.T @ other
-    other_error = trace_error(changed[0], np.linalg.inv(changed), 0)
-    assert (strength / factor) / other_error == pytest.approx(strength / error, rel=1e-12)
-    # The closed form: |T| of T = s J_s, differentiated numerically.
+    assert (strength / factor) / trace_error(covariance(other), 0) == pytest.approx(
+        strength / error, rel=1e-12
+    )
+    # The size of what least squares on the other columns leave of the trace, in units of the noise.
     trace = strength * columns[:, 0]
-    towards = trace @ columns / np.linalg.norm(trace)
-    variance = towards @ np.linalg.inv(information) @ towards
-    assert np.linalg.norm(trace) / np.sqrt(variance) == pytest.approx(strength / error, rel=1e-12)
+    left = trace - others @ np.linalg.lstsq(others, trace, rcond=None)[0]
+    assert strength / error == pytest.approx(float(np.linalg.norm(left)), rel=1e-12)
 
 
 @pytest.mark.parametrize(("strength", "said"), [(2e4, True), (2e3, False)])

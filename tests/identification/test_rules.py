@@ -111,7 +111,7 @@ def _compared(file):
 
 
 def test_what_decides_a_verdict_is_compared_with_a_rule():
-    rooms = ("diagnosis", "fitting", "jacobian", "remainder")
+    rooms = ("diagnosis", "fitting", "jacobian", "remainder", "traces")
     files = [ROOMS / "_close_loop.py", *(file for room in rooms for file in (ROOMS / room).glob("*.py"))]
     found = {(file.stem, one) for file in files for one in _compared(file) if one not in NEUTRAL}
     assert found == {(file, name) for file, names in ACCURACY.items() for name in names}

@@ -8,7 +8,7 @@ import isojax as ij
 from isojax import rig
 from isojax.elements import EndStop, Freeplay, SecondMode
 from isojax.identification import scales
-from isojax.identification.diagnosis._projection import project
+from isojax.identification.traces import project
 
 SHAPES = 12
 """Shapes drawn of each kind."""

@@ -3,8 +3,9 @@
 In: a `Campaign`. Out: a `Loop`, with the fitted models, the findings, the verdict and the next test.
 Read the rooms in the order of an analysis: `guess` (start values), `fitting` (coefficients and errors),
 `diagnosis` (which effect is missing), `experiment` (the next test) and `remainder`
-(what stays unexplained). `_close_loop.py` joins them. `jacobian` lies below all of them: simulated records
-and their exact derivatives. `_rules.py` holds the numbers by which fit and diagnosis decide.
+(what stays unexplained). `_close_loop.py` joins them. `traces` lies below the diagnosis: what absent forces
+would leave in the records. `jacobian` lies below all: simulated records and their exact derivatives.
+`_rules.py` holds the numbers by which fit and diagnosis decide.
 """
 
 from .._progress import silent as silent
@@ -66,7 +67,7 @@ from .remainder import AlternativeLaw as AlternativeLaw
 from .remainder import Alternatives as Alternatives
 from .remainder import DwellRemainder as DwellRemainder
 from .remainder import ForceMap as ForceMap
-from .remainder import MatchingPursuit as MatchingPursuit
 from .remainder import Remainder as Remainder
-from .remainder import SelectedLaw as SelectedLaw
 from .remainder import explain_remainder as explain_remainder
+from .traces import MatchingPursuit as MatchingPursuit
+from .traces import SelectedLaw as SelectedLaw

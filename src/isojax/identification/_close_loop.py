@@ -51,7 +51,7 @@ from .remainder import Alternatives, Remainder, explain_remainder, find_alternat
 _GUESS, _FIT, _DIAGNOSIS, _NEXT, *_LAST = LOOP_SHARES
 _EXPERIMENT, _LAWS, _RUNS = _LAST
 
-Doubt = Literal["", "diverges", "worse", "not down to noise", "another law", "a tone"]
+Doubt = Literal["", "diverges", "worse", "not down to noise", "another law", "a further law", "a tone"]
 
 
 @shown
@@ -101,7 +101,7 @@ class Loop:
         """What held-out records, or other force laws, say against the findings; "" where there is nothing."""
         if not self.findings or not is_successful(self.after.result):
             return ""
-        return doubt_of(self.before, self.after, self.alternatives, self.rules)
+        return doubt_of(self.before, self.after, self.last, self.rules, self.alternatives)
 
     @cached_property
     def remainder(self) -> Remainder | None:
@@ -340,33 +340,39 @@ def _diagnosis(added: int, most: int) -> Stage:
     return Stage(f"diagnosis {added + 1}: which effect is missing", _NEXT if added else _DIAGNOSIS, later)
 
 
-def doubt_of(before: Fit, final: Fit, alternatives: tuple[Alternatives, ...], rules: Rules) -> Doubt:
+def doubt_of(
+    before: Fit, final: Fit, last: Verdict, rules: Rules, alternatives: tuple[Alternatives, ...]
+) -> Doubt:
     """Say what speaks against the findings, although the fit is good.
 
     Args:
         before: the declared model, fitted.
         final: the model with the findings, fitted.
-        alternatives: laws that explain the fitted records as well.
+        last: the diagnosis of the final fit.
         rules: when a fit is good, and what chance does not explain.
+        alternatives: laws that explain the fitted records as well.
 
     Returns:
         Whether the final model diverges on held-out records, predicts them worse than without the findings,
-        or not down to their noise; whether another law explains the fitted ones better, or they hold a tone
-        that is not locked to the drive; "" where nothing speaks against it.
+        or not down to their noise; whether another law explains the fitted ones better, or a further one
+        stands out of them; whether they hold a tone that is not locked to the drive; "" where nothing speaks
+        against it.
     """
     tone: Doubt = "" if unlocked_tone(final, rules) is None else "a tone"
-    other: Doubt = "another law" if any(one.better is not None for one in alternatives) else tone
-    first, last = before.errors["holdout"], final.errors["holdout"]
-    if first is None or last is None:
+    other: Doubt = tone if last.law is None else "a further law"
+    if any(one.better is not None for one in alternatives):
+        other = "another law"
+    old, new = before.errors["holdout"], final.errors["holdout"]
+    if old is None or new is None:
         return other
-    if not math.isfinite(last.chi2_per_dof):
+    if not math.isfinite(new.chi2_per_dof):
         return "diverges"
-    chance = scipy.stats.chi2.sf(last.chi2_per_dof * last.dof, last.dof)
-    if last.chi2_per_dof <= rules.good or chance > rules.significance:
+    chance = scipy.stats.chi2.sf(new.chi2_per_dof * new.dof, new.dof)
+    if new.chi2_per_dof <= rules.good or chance > rules.significance:
         return other
     # The noise is common to both figures, so that their difference scatters by 2 sqrt(rise / dof) only.
-    rise = last.chi2_per_dof - first.chi2_per_dof
-    scatter = 2.0 * math.sqrt(max(rise, 0.0) / last.dof)
+    rise = new.chi2_per_dof - old.chi2_per_dof
+    scatter = 2.0 * math.sqrt(max(rise, 0.0) / new.dof)
     worse = rise > scipy.stats.norm.isf(rules.significance) * scatter
     return "worse" if worse else tone or "not down to noise"
 
@@ -384,6 +390,6 @@ def overall_verdict(
     if not findings or not is_successful(final.result):
         return last.verdict
     if findings <= rules.most_at_once and is_good(final, rules):
-        return "partly_explained" if doubt_of(before, final, alternatives, rules) else "found"
+        return "partly_explained" if doubt_of(before, final, last, rules, alternatives) else "found"
     explained = 1.0 - found.excess / max(first.excess, 1.0)
     return "partly_explained" if explained >= 1.0 - rules.smallest_share else "unexplained"

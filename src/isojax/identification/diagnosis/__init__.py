@@ -1,10 +1,10 @@
 """What a fitted model lacks: absent effects scored, refitted, and named or rejected.
 
 In: a `Fit`. Out: a `Verdict`, with a `Finding` where an effect is missing.
-Read `_diagnose` (the door, and the verdict), then in the order in which it asks them `_score` and
-`_projection` (traces of all absent effects), `_candidate_refits` and `_refit` (the strongest, everything
-free), `_imitations`, `_admissibility` and `_passivity` (what speaks against them), `_evidence`, `_transfer`
-and `_bounds`. `_findings` and `_separation` hold the results.
+Read `_diagnose` (the door, and the verdict), then in the order in which it asks them `_score` (all absent
+effects), `_candidate_refits` and `_refit` (the strongest, everything free), `_imitations`, `_admissibility`
+and `_passivity` (what speaks against them), `_evidence`, `_transfer` and `_bounds`. `_findings` and
+`_separation` hold the results.
 """
 
 from ._diagnose import diagnose as diagnose
@@ -18,8 +18,6 @@ from ._findings import Verdict as Verdict
 from ._findings import VerdictWord as VerdictWord
 from ._findings import findings_in as findings_in
 from ._imitations import find_superfluous as find_superfluous
-from ._projection import Projection as Projection
-from ._projection import project as project
 from ._refit import bic as bic
 from ._refit import least_difference as least_difference
 from ._refit import refit_from as refit_from

@@ -21,6 +21,7 @@ class Case(NamedTuple):
     Attributes:
         fit: the fit.
         fitted: its estimate, on as many samples as the candidates are tried on.
+        seen: the same, weighted by the noise that the residual shows.
         test: scores of the absent effects.
         significance: family-wise level of the score test.
         search: how to search among the candidates.
@@ -30,6 +31,7 @@ class Case(NamedTuple):
 
     fit: Fit
     fitted: Estimate
+    seen: Estimate
     test: ScoreTest
     significance: float
     search: Search

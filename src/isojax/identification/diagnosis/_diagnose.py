@@ -26,6 +26,7 @@ from ..fitting import (
     weighted_by_output,
     weighted_by_residual,
 )
+from ..traces import SelectedLaw, matching_pursuit
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, ranked_first, smallest_inflation
@@ -130,6 +131,7 @@ def diagnose_with(
     case = Case(
         fit,
         fitted,
+        seen,
         score_test(seen, coarser, probes)._replace(fitted=fitted),
         search.rules.significance if significance is None else significance,
         coarser,
@@ -174,13 +176,27 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     ranking = rank_candidates(case.fit.estimate, test, refits, by_evidence(refits, rules), inflation)
     bounds = upper_bounds(test, None) if good else {}
     tone = unlocked_tone(case.fit, rules)
-    verdict = "none" if good and tone is None else "unexplained"
+    law = _law_outside(case) if good and tone is None else None
+    verdict = "none" if good and tone is None and law is None else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if tone is not None:
         words = tone.words(plain_unit("SI unit of the output", case.fit.campaign)) + "; "
+    elif law is not None:
+        words = f"The fit is good, but a force {law.formula} stands out of what it leaves, z = {law.z:.3g}; "
     elif not good and leaves_noise(case.fit, rules):
         words = _words_of_noise(case.fit, rules)
-    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words + reason + ".", tone)
+    words = f"{words}{reason}."
+    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words, tone, law)
+
+
+def _law_outside(case: Case) -> SelectedLaw | None:
+    """Give the force law that stands out most of what a good fit leaves, although no known effect does.
+
+    A test of so many samples as a whole overlooks a law that the catalogue does not hold until it is many
+    standard errors large. A free law like it does not.
+    """
+    laws = matching_pursuit(case.seen, case.search).laws
+    return laws[0] if laws else None
 
 
 def _words_of_noise(fit: Fit, rules: Rules) -> str:

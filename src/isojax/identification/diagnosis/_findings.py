@@ -7,6 +7,7 @@ from ..._show import Row, amount, shown
 from ...elements import AbstractElement
 from ...models import Isolator
 from ..fitting import Estimate, Fit, Tone
+from ..traces import SelectedLaw
 from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
@@ -113,6 +114,8 @@ class Verdict(NamedTuple):
         after: the fit with the effect; None where nothing was found.
         reason: one sentence.
         tone: a tone that is left where nothing was found, and does not belong to the drive; or None.
+        law: the force law outside the catalogue that stands out most where the fit is good and nothing was
+            found; or None.
     """
 
     verdict: VerdictWord
@@ -125,6 +128,7 @@ class Verdict(NamedTuple):
     after: Fit | None
     reason: str
     tone: Tone | None = None
+    law: SelectedLaw | None = None
 
     @property
     def refit(self) -> Estimate | None:

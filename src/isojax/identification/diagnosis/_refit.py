@@ -230,31 +230,27 @@ def is_determined(found: Estimate, score: Score, rules: Rules) -> bool:
         if known and found.names[one].startswith(f"{name}.")
     ]
     strength = float(list_parameters(found.model)[found.places[place]].value)
-    information = found.point.reduced.matrix[place, own]
-    error = trace_error(information, found.uncertainty.covariance[np.ix_(own, own)], own.index(place))
+    error = trace_error(found.uncertainty.covariance[np.ix_(own, own)], own.index(place))
     return abs(strength) > float(stats.norm.isf(0.5 * rules.significance)) * error
 
 
-def trace_error(
-    information: Float[np.ndarray, " own"], covariance: Float[np.ndarray, "own own"], place: int
-) -> float:
+def trace_error(covariance: Float[np.ndarray, "own own"], place: int) -> float:
     """Give the standard error of the size of an effect's trace, in units of its strength.
 
-    The trace is T = s J_s, with s the strength and J the whitened derivatives; its size |T| changes by
-    T'J/|T| with the effect's own coefficients. |T| over its error is the same however the effect is written.
-    A strength over its own error is not: that of a fractional derivative is in N s^alpha/m, and changes with
-    alpha although the force does not.
+    The trace is T = s P J_s, with s the strength, J the whitened derivatives and P J what the other
+    coefficients of the model cannot imitate of them: J'PJ is the inverse of the covariance. The size |T|
+    changes by T'PJ/|T| with the effect's own coefficients, so that its error is 1/|P J_s|. |T| over its error
+    is the same however the effect is written. A strength over its own error is not: that of a fractional
+    derivative is in N s^alpha/m, and changes with alpha although the force does not.
 
     Args:
-        information: J_s'J of the effect's own coefficients, J_s being that of the strength.
-        covariance: of these coefficients.
+        covariance: of the effect's own coefficients.
         place: the strength among them.
 
     Returns:
         Standard error [unit of the strength].
     """
-    weights = information / information[place]
-    return float(np.sqrt(weights @ covariance @ weights))
+    return float(1.0 / np.sqrt(np.linalg.inv(covariance)[place, place]))
 
 
 def strength_place(found: Estimate, score: Score) -> int:

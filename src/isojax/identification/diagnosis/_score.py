@@ -19,7 +19,7 @@ from ..fitting import (
     step_nuisances,
 )
 from ..jacobian import effects_without_signal, line_coherence
-from ._projection import Projection, project
+from ..traces import Projection, project
 
 NULL_DRAWS = 20_000
 """Draws for a family-wise p-value."""

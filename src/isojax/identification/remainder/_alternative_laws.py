@@ -10,9 +10,9 @@ from jaxtyping import Float, Int
 from ..._parameters import list_parameters, replace_parameters
 from ..._show import Row, amount, shown
 from ...models import Isolator
-from ..diagnosis import Projection, least_difference, project
+from ..diagnosis import least_difference
 from ..fitting import Estimate, Search
-from ._free_laws import AbstractFreeForce, free_laws
+from ..traces import AbstractFreeForce, Projection, free_laws, project
 
 SAME_TRACE = 1e-6
 """Distance of a correlation from one that rounding explains."""

@@ -10,10 +10,21 @@ from ..._progress import silent
 from ..._results import is_successful
 from ..._show import Row, shown
 from .._rules import Rules
-from ..fitting import DEFAULT_SOLVER, Fit, Fitted, as_fit, chi2_per_dof_of_all, search_of, thinned
+from ..diagnosis import is_good, leaves_noise, refit_from
+from ..fitting import (
+    DEFAULT_SOLVER,
+    Estimate,
+    Fit,
+    Fitted,
+    Search,
+    as_fit,
+    chi2_per_dof_of_all,
+    search_of,
+    thinned,
+)
+from ..traces import MatchingPursuit, matching_pursuit, no_laws
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
-from ._matching_pursuit import MatchingPursuit, matching_pursuit
 
 _SURFACE_CELLS = 20
 """Cells of the force map along each axis."""
@@ -42,7 +53,8 @@ class Remainder(NamedTuple):
     """What a fitted model leaves unexplained.
 
     Attributes:
-        pursuit: force laws outside the catalogue that would explain it.
+        pursuit: force laws outside the catalogue that would explain it; none is tried where more than the
+            noise is left but nothing of it comes back with the drive.
         dwells: force residual of each dwell; empty without dwells.
         force_map: mean force residual over displacement and velocity.
     """
@@ -96,15 +108,25 @@ def explain_remainder(
     search = search_of(fit.campaign, rules, solver, progress)
     whole = fit.estimate
     thin, coarser = thinned(whole, search)
-    found = matching_pursuit(thin, coarser, refit=refit)
+    # Of noise that is not as it was measured no law's significance is known.
+    forced = is_good(fit, rules) or not leaves_noise(fit, rules)
+    found = matching_pursuit(thin, coarser) if forced else no_laws(thin)
+    refitted = _refitted_goodness(thin, found, coarser) if refit and found.laws else float("nan")
     pursuit = found._replace(
         chi2_per_dof=chi2_per_dof_of_all(found.chi2_per_dof, thin, whole),
         linear=chi2_per_dof_of_all(found.linear, thin, whole),
-        refitted=chi2_per_dof_of_all(found.refitted, thin, whole),
+        refitted=chi2_per_dof_of_all(refitted, thin, whole),
     )
     progress("force residual")
     residuals = force_residuals(fit)
     return Remainder(pursuit, dwell_remainders(fit, residuals), _force_map(residuals))
+
+
+def _refitted_goodness(fitted: Estimate, pursuit: MatchingPursuit, search: Search) -> float:
+    """Give chi2/dof of a refit with the laws, started from the linear step of the coefficients."""
+    search.progress("refit with " + ", ".join(law.formula for law in pursuit.laws))
+    found = refit_from(fitted, pursuit.model, search._replace(progress=silent))
+    return found.chi2 / found.dof if is_successful(found.result) and np.isfinite(found.chi2) else float("nan")
 
 
 def _force_map(residuals: tuple[ForceResidual, ...]) -> ForceMap:

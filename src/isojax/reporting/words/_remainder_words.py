@@ -37,6 +37,8 @@ def selected_laws_words(pursuit: MatchingPursuit) -> str:
     Returns:
         The laws with their coefficients, and what they would explain.
     """
+    if not pursuit.tried:
+        return "Nothing of it comes back with the drive, so that no force law is sought in it."
     if not pursuit.laws:
         return f"None of {pursuit.tried} free force laws explains a significant share of it."
     names = ["c"] if len(pursuit.laws) == 1 else [f"c{place + 1}" for place in range(len(pursuit.laws))]

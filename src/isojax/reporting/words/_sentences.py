@@ -89,7 +89,8 @@ _DOUBTS = {
     "not down to noise": (
         "The model does not explain the held-out records down to their noise: another law may act there."
     ),
-    "another law": "",  # the verdict itself says it
+    "another law": "",  # the verdict itself says these two
+    "a further law": "",
     "a tone": (
         "A tone that is not locked to the drive is left: something that no channel records shakes the mass "
         "or its sensor."
@@ -137,8 +138,10 @@ def _verdict_words(loop: Loop) -> str:
             f"{effects}; {error}."
         )
     if loop.verdict == "partly_explained" and found:
+        law = loop.last.law
+        too = "" if law is None else f": a force c {typeset_formula(law.formula)} stands out"
         return (
-            f"{_capital(effects)}, {verb} missing, and something else is missing too; {error} "
+            f"{_capital(effects)}, {verb} missing, and something else is missing too{too}; {error} "
             "(noise alone: 1)."
         )
     pending = loop.last.finding
@@ -153,6 +156,12 @@ def _verdict_words(loop: Loop) -> str:
         good = is_good(loop.after, loop.rules)
         rest = "Otherwise the model explains the records" if good else "More than noise is left beside it"
         return f"{tone.words(unit)}. {rest}; {error}."
+    if loop.last.law is not None and not found:
+        law = loop.last.law
+        return (
+            f"The fit is good, but a force c {typeset_formula(law.formula)} stands out of what it leaves "
+            f"(z = {typeset_number(law.z, 2)}), and no known effect explains it; {error}."
+        )
     if not found and leaves_noise(loop.after, loop.rules):
         goodness = max(loop.after.stats.chi2 / loop.after.stats.dof, loop.after.noise.excess)
         return (

@@ -9,14 +9,12 @@ from jaxtyping import Float
 from scipy import stats
 
 from ..._parameters import list_parameters, replace_parameters
-from ..._progress import silent
-from ..._results import is_successful
 from ..._show import Row, amount, shown
 from ...models import Isolator
 from .._rules import Rules
-from ..diagnosis import Projection, project, refit_from
 from ..fitting import Estimate, Search
-from ._free_laws import AbstractFreeForce, free_laws
+from ._free_laws import free_laws
+from ._projection import Projection, project
 
 
 @shown
@@ -55,10 +53,11 @@ class MatchingPursuit(NamedTuple):
 
     Attributes:
         laws: in the order of their selection; empty where none is significant.
-        tried: how many laws were tested.
+        tried: how many laws were tested; 0 where what is left is no force.
         chi2_per_dof: of the fit.
         linear: the same with the laws, by the linear step.
         refitted: the same after a refit of all coefficients; NaN where none was asked for or it failed.
+        model: the isolator with the laws, coefficients by the linear step.
     """
 
     laws: tuple[SelectedLaw, ...]
@@ -66,6 +65,7 @@ class MatchingPursuit(NamedTuple):
     chi2_per_dof: float
     linear: float
     refitted: float
+    model: Isolator
 
     def _headline(self) -> str:
         found = f"{len(self.laws)} of {self.tried} force laws stand out of the noise"
@@ -127,7 +127,13 @@ def _select(
     return tuple(selected)
 
 
-def matching_pursuit(fitted: Estimate, search: Search, *, refit: bool) -> MatchingPursuit:
+def no_laws(fitted: Estimate, tried: int = 0) -> MatchingPursuit:
+    """Give the pursuit of an estimate of which no law was selected."""
+    chi2_per_dof = fitted.chi2 / fitted.dof
+    return MatchingPursuit((), tried, chi2_per_dof, chi2_per_dof, float("nan"), fitted.model)
+
+
+def matching_pursuit(fitted: Estimate, search: Search) -> MatchingPursuit:
     """Select free force laws that explain what a fit leaves: orthogonal matching pursuit on exact columns.
 
     The law of the largest score is selected and projected out of the residual and of all other laws, as the
@@ -137,10 +143,9 @@ def matching_pursuit(fitted: Estimate, search: Search, *, refit: bool) -> Matchi
     Args:
         fitted: the estimate.
         search: how to search.
-        refit: whether to refit all coefficients with the laws, which checks the linear step.
 
     Returns:
-        The laws.
+        The laws, not refitted.
 
     Source: Pati, Rezaiifar & Krishnaprasad 1993 (orthogonal matching pursuit).
     """
@@ -150,9 +155,9 @@ def matching_pursuit(fitted: Estimate, search: Search, *, refit: bool) -> Matchi
     traces = project(fitted, laws, units)
     wordings = [law.wording() for law in laws]
     selected = _select(traces, np.array([one.rank for one in wordings]), fitted, search.rules)
-    chi2_per_dof = fitted.chi2 / fitted.dof
     if not selected:
-        return MatchingPursuit((), len(laws), chi2_per_dof, chi2_per_dof, float("nan"))
+        return no_laws(fitted, len(laws))
+    chi2_per_dof = fitted.chi2 / fitted.dof
     places = [one.place for one in selected]
     inverse = np.linalg.inv(traces.information[np.ix_(places, places)])
     amount = inverse @ traces.score[places]
@@ -175,29 +180,17 @@ def matching_pursuit(fitted: Estimate, search: Search, *, refit: bool) -> Matchi
                 tuple(wordings[place].formula for place in one.alike),
             )
         )
-    refitted = float("nan")
-    if refit:
-        search.progress("refit with " + ", ".join(law.formula for law in described))
-        chosen = [
-            eqx.tree_at(lambda e: getattr(e, e.strength), laws[place], jnp.asarray(float(strength)))
-            for place, strength in zip(places, amount * units[places], strict=True)
-        ]
-        step = traces.step[:, -1] - traces.step[:, places] @ amount
-        refitted = _refitted_goodness(fitted, chosen, step, search)
-    return MatchingPursuit(tuple(described), len(laws), chi2_per_dof, float(linear), refitted)
-
-
-def _refitted_goodness(
-    fitted: Estimate, laws: list[AbstractFreeForce], step: Float[np.ndarray, " coefficient"], search: Search
-) -> float:
-    """Give chi2/dof of a refit with the laws, started from the linear step of the coefficients."""
-    model = Isolator(fitted.model.mass, (*fitted.model.elements, *laws), fitted.model.excitation)
+    chosen = [
+        eqx.tree_at(lambda e: getattr(e, e.strength), laws[place], jnp.asarray(float(strength)))
+        for place, strength in zip(places, amount * units[places], strict=True)
+    ]
+    step = traces.step[:, -1] - traces.step[:, places] @ amount
+    model = Isolator(fitted.model.mass, (*fitted.model.elements, *chosen), fitted.model.excitation)
     listed = list_parameters(model)
     numbers = [entry.value for entry in listed]
     for place, change in zip(fitted.places, step, strict=True):
         moved = float(numbers[place]) + float(change)
         if listed[place].spec.lower < moved < listed[place].spec.upper:
             numbers[place] = numbers[place] + float(change)
-    search = search._replace(progress=silent)
-    found = refit_from(fitted, replace_parameters(model, numbers), search)
-    return found.chi2 / found.dof if is_successful(found.result) and np.isfinite(found.chi2) else float("nan")
+    model = replace_parameters(model, numbers)
+    return MatchingPursuit(tuple(described), len(laws), chi2_per_dof, float(linear), float("nan"), model)
