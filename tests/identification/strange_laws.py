@@ -115,3 +115,17 @@ class RestlessSpring(rig.Law):
             return self.stiffness * self.deviations[max(bisect.bisect_right(self.starts, t) - 1, 0)] * x
         place = np.clip(np.searchsorted(self.starts, t, side="right") - 1, 0, len(self.starts) - 1)
         return self.stiffness * np.asarray(self.deviations)[place] * x
+
+
+@dataclass(frozen=True)
+class Detent(rig.Law):
+    """Magnets along the path: f = A sin(x / l)."""
+
+    name: ClassVar[str] = "detent"
+    force_level: float
+    length: float
+
+    @no_type_check
+    def force(self, t, x, v, z, s):
+        """Force in N; see `Law.force`."""
+        return self.force_level * np.sin(x / self.length)

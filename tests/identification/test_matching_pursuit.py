@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from strange_laws import BASE, Governor, Grip
+from strange_laws import BASE, Detent, Governor, Grip
 
 from isojax import rig
 from isojax.elements import CATALOGUE
-from isojax.identification import classical_guess, explain_remainder, fit, scales
+from isojax.identification import classical_guess, diagnose, explain_remainder, fit, scales
 from isojax.identification.traces import free_laws
 
 PLAN = rig.SteppedSine(
@@ -52,6 +52,21 @@ def test_nothing_is_selected_in_noise(left_by):
     pursuit = left_by()
     assert pursuit.laws == ()
     assert pursuit.linear == pursuit.chi2_per_dof
+
+
+@pytest.mark.slow
+def test_a_law_outside_the_catalogue_is_owned_up_to_beside_a_good_fit(simulated):
+    """A detent of 0.5 N hides in chi2/dof; what could imitate it is no candidate here."""
+    campaign = simulated(rig.Plant(BASE).plus(Detent(0.5, 5e-5)), PLAN)
+    fitted = fit(classical_guess(campaign).model, campaign)
+    assert fitted.stats.chi2 / fitted.stats.dof < 1.0
+    verdict = diagnose(fitted, excluded=("freeplay", "end_stop"))
+    assert verdict.verdict == "unexplained"
+    assert verdict.law is not None
+    assert verdict.law.formula.startswith("sin(x / 0.0")
+    assert verdict.law.z > 6.0
+    assert abs(verdict.law.coefficient - 0.5) < 3.0 * verdict.law.error
+    assert f"a force {verdict.law.formula} stands out" in verdict.reason
 
 
 def test_free_laws_are_no_effects(simulated):

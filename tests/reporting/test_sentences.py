@@ -4,7 +4,7 @@ import math
 import pytest
 
 from isojax.elements import StribeckFriction
-from isojax.identification import AlternativeLaw, Alternatives, DriftBudget, Errors, Fit
+from isojax.identification import AlternativeLaw, Alternatives, DriftBudget, Errors, Fit, SelectedLaw
 from isojax.identification._close_loop import overall_verdict
 from isojax.records import NoisePeak, Spikes, data_health
 from isojax.records.noise._health import UnsettledDwell
@@ -86,6 +86,25 @@ def test_where_nothing_left_comes_back_with_the_drive_no_effect_is_said_to_be_mi
     )
     assert "χ²/dof 2.550 by that noise" in sentence
     assert "missing" not in sentence
+
+
+def test_a_force_law_that_stands_out_beside_a_good_fit_is_told_and_forbids_the_word_found(found):
+    law = SelectedLaw("|x| v", "damping-like", 2e5, 1e4, "N s/m^2", 3.0, 20.3, 1.0, ())
+    last = found.last._replace(law=law)
+    doubted = dataclasses.replace(found, last=last)
+    assert doubted.doubt == "a further law"
+    assert overall_verdict(found.before, found.after, 1, last, found.rules) == "partly_explained"
+    sentence = verdict_sentence(dataclasses.replace(doubted, verdict="partly_explained"))
+    assert "something else is missing too: a force c |x| v stands out" in sentence
+    alone = dataclasses.replace(
+        found, extensions=(), before=found.after, verdict="unexplained", last=last, bounds={}
+    )
+    assert overall_verdict(
+        alone.before, alone.after, 0, last._replace(verdict="unexplained"), found.rules
+    ) == ("unexplained")
+    assert verdict_sentence(alone).startswith(
+        "The fit is good, but a force c |x| v stands out of what it leaves (z = 20)"
+    )
 
 
 def test_a_finding_that_a_later_one_contains_is_told_by_that(found):
