@@ -31,8 +31,8 @@ from isojax.elements import Scales
 from isojax.identification import Rules, classical_guess, fit, read_campaign, scales
 from isojax.identification._close_loop import find_alternatives, overall_verdict, search_effects
 from isojax.identification.diagnosis import _candidate_refits, _diagnose, _imitations, findings_in
-from isojax.identification.fitting import Search
-from isojax.identification.traces import matching_pursuit
+from isojax.identification.fitting import Search, thinned
+from isojax.identification.traces import matching_pursuit, trace_free_laws
 from isojax.models import Isolator
 from isojax.records import Campaign
 
@@ -42,6 +42,7 @@ VALUES = ("half", "twice", "without")
 DEFAULTS = {field.name: field.default for field in dataclasses.fields(Rules)}
 REPEATED = (
     (_diagnose, "score_test"),
+    (_diagnose, "trace_free_laws"),
     (_diagnose, "transferred_share"),
     (_diagnose, "refit_to_convergence"),
     (_candidate_refits, "find_balance_start"),
@@ -176,11 +177,12 @@ class Trial:
             after = extensions[-1].after if extensions else before
             found = findings_in(after.model, extensions)
             names = tuple(finding.effect for finding in found)
-            others = remembered(find_alternatives, self.known)(after.estimate, names, search) if names else ()
+            beside = last.beside or remembered(trace_free_laws, self.known)(*thinned(after.estimate, search))
+            others = find_alternatives(beside, names, rules) if names else ()
             verdict = overall_verdict(before, after, len(names), last, rules, others)
             words = [" or ".join(sorted((one.effect, *one.indistinguishable))) for one in found]
             if verdict in ("unexplained", "partly_explained"):
-                left = remembered(matching_pursuit, self.known)(after.estimate, search)
+                left = matching_pursuit(beside, rules)
                 words += [f"remainder {law.formula}" for law in left.laws]
             return verdict, words
         finally:

@@ -8,6 +8,7 @@ from isojax import Rules, elements, rig
 from isojax.identification import DEFAULT_SOLVER, Alternatives, classical_guess, fit, scales
 from isojax.identification.fitting import search_of
 from isojax.identification.remainder import find_alternatives
+from isojax.identification.traces import trace_free_laws
 
 PLAN = rig.SteppedSine((40.0, 80.0, 130.0), tuple(np.arange(4.0, 6.6, 0.25)), directions=("forward",))
 
@@ -22,9 +23,8 @@ def range_of(simulated):
             elements.PositionDamping.guess(scales(campaign))
         )
         found = fit(guess, campaign)
-        (alternatives,) = find_alternatives(
-            found.estimate, ("position_damping",), search_of(campaign, Rules(), DEFAULT_SOLVER, print)
-        )
+        beside = trace_free_laws(found.estimate, search_of(campaign, Rules(), DEFAULT_SOLVER, print))
+        (alternatives,) = find_alternatives(beside, ("position_damping",), Rules())
         return found, alternatives
 
     return run

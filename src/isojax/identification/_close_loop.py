@@ -47,6 +47,7 @@ from .fitting import (
 )
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Alternatives, Remainder, explain_remainder, find_alternatives
+from .traces import trace_free_laws
 
 _GUESS, _FIT, _DIAGNOSIS, _NEXT, *_LAST = LOOP_SHARES
 _EXPERIMENT, _LAWS, _RUNS = _LAST
@@ -242,8 +243,8 @@ def _loop(
     alternatives: tuple[Alternatives, ...] = ()
     if names and is_successful(after.result):
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
-        thin, coarser = thinned(after.estimate, search)
-        alternatives = find_alternatives(thin, names, coarser)
+        beside = verdict.beside or trace_free_laws(*thinned(after.estimate, search))
+        alternatives = find_alternatives(beside, names, rules)
     judged = overall_verdict(before, after, len(names), verdict, rules, alternatives)
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.

@@ -26,7 +26,7 @@ from ..fitting import (
     weighted_by_output,
     weighted_by_residual,
 )
-from ..traces import SelectedLaw, matching_pursuit
+from ..traces import matching_pursuit, trace_free_laws
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, ranked_first, smallest_inflation
@@ -176,7 +176,10 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     ranking = rank_candidates(case.fit.estimate, test, refits, by_evidence(refits, rules), inflation)
     bounds = upper_bounds(test, None) if good else {}
     tone = unlocked_tone(case.fit, rules)
-    law = _law_outside(case) if good and tone is None else None
+    # Tests of all samples together overlook a law that the catalogue lacks until it is many standard errors
+    # large. A free law like it does not.
+    beside = trace_free_laws(case.seen, case.search) if good and tone is None else None
+    law = next(iter(matching_pursuit(beside, rules).laws), None) if beside is not None else None
     verdict = "none" if good and tone is None and law is None else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if tone is not None:
@@ -186,17 +189,7 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     elif not good and leaves_noise(case.fit, rules):
         words = _words_of_noise(case.fit, rules)
     words = f"{words}{reason}."
-    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words, tone, law)
-
-
-def _law_outside(case: Case) -> SelectedLaw | None:
-    """Give the force law that stands out most of what a good fit leaves, although no known effect does.
-
-    A test of so many samples as a whole overlooks a law that the catalogue does not hold until it is many
-    standard errors large. A free law like it does not.
-    """
-    laws = matching_pursuit(case.seen, case.search).laws
-    return laws[0] if laws else None
+    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words, tone, law, beside)
 
 
 def _words_of_noise(fit: Fit, rules: Rules) -> str:

@@ -7,7 +7,7 @@ from ..._show import Row, amount, shown
 from ...elements import AbstractElement
 from ...models import Isolator
 from ..fitting import Estimate, Fit, Tone
-from ..traces import SelectedLaw
+from ..traces import FreeTraces, SelectedLaw
 from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
@@ -116,6 +116,7 @@ class Verdict(NamedTuple):
         tone: a tone that is left where nothing was found, and does not belong to the drive; or None.
         law: the force law outside the catalogue that stands out most where the fit is good and nothing was
             found; or None.
+        beside: traces of the force laws outside the catalogue; None where they were not asked for.
     """
 
     verdict: VerdictWord
@@ -129,6 +130,7 @@ class Verdict(NamedTuple):
     reason: str
     tone: Tone | None = None
     law: SelectedLaw | None = None
+    beside: FreeTraces | None = None
 
     @property
     def refit(self) -> Estimate | None:

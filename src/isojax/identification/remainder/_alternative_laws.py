@@ -10,9 +10,10 @@ from jaxtyping import Float, Int
 from ..._parameters import list_parameters, replace_parameters
 from ..._show import Row, amount, shown
 from ...models import Isolator
+from .._rules import Rules
 from ..diagnosis import least_difference
-from ..fitting import Estimate, Search
-from ..traces import AbstractFreeForce, Projection, free_laws, project
+from ..fitting import Estimate
+from ..traces import AbstractFreeForce, FreeTraces
 
 SAME_TRACE = 1e-6
 """Distance of a correlation from one that rounding explains."""
@@ -84,7 +85,7 @@ class Alternatives(NamedTuple):
         ]
 
 
-def find_alternatives(fitted: Estimate, effects: tuple[str, ...], search: Search) -> tuple[Alternatives, ...]:
+def find_alternatives(beside: FreeTraces, effects: tuple[str, ...], rules: Rules) -> tuple[Alternatives, ...]:
     """List the force laws that would do in the place of each finding, and of all findings together.
 
     A name says one law. Others leave the same trace in the records: another power, or a law that the
@@ -92,9 +93,9 @@ def find_alternatives(fitted: Estimate, effects: tuple[str, ...], search: Search
     in, with the other coefficients and the nuisances free: one linear step from a motion that both explain.
 
     Args:
-        fitted: the fit with the findings.
+        beside: the free laws beside the fit with the findings.
         effects: their catalogue names.
-        search: how to search.
+        rules: which laws do as well.
 
     Returns:
         The laws for each finding, then, of several, for all together.
@@ -102,22 +103,12 @@ def find_alternatives(fitted: Estimate, effects: tuple[str, ...], search: Search
     Source: Rao 1948, for the linear step; Davies 1977, for laws compared with what is absent under each.
     """
     groups = [(one,) for one in effects] + ([effects] if len(effects) > 1 else [])
-    laws = free_laws(search.scales)
-    search.progress(f"{len(laws)} free force laws in the place of {' and '.join(effects)}")
-    units = np.array([1e-3 * law.typical_strength(search.scales) for law in laws])
-    traces = project(fitted, laws, units)
-    return tuple(_alternatives(fitted, group, laws, units, traces, search) for group in groups)
+    return tuple(_alternatives(beside, group, rules) for group in groups)
 
 
-def _alternatives(
-    fitted: Estimate,
-    effects: tuple[str, ...],
-    laws: tuple[AbstractFreeForce, ...],
-    units: Float[np.ndarray, " law"],
-    traces: Projection,
-    search: Search,
-) -> Alternatives:
+def _alternatives(beside: FreeTraces, effects: tuple[str, ...], rules: Rules) -> Alternatives:
     """List the laws that would do in the place of some findings."""
+    fitted, laws, units, traces = beside
     matrix, count = traces.point.reduced.matrix, len(fitted.places)
     own = np.array([name.partition(".")[0] in effects for name in fitted.names])
     kept, found = np.flatnonzero(~own), np.flatnonzero(own)
@@ -135,14 +126,14 @@ def _alternatives(
     with_findings = left[-1, -1] - left[-1, found] @ own_inverse @ left[found, -1]
     columns = slice(count, -1)
     size, score = np.diag(left)[columns], (left @ done)[columns]
-    seen = size > search.rules.smallest_visibility**2 * traces.point.reduced.raw[count:]
+    seen = size > rules.smallest_visibility**2 * traces.point.reduced.raw[count:]
     gain = np.where(seen, score**2 / np.where(seen, size, 1.0), 0.0)
     force = done.copy()
     force[-1] = 0.0
     trace = (left @ force)[columns] / np.sqrt(max(force @ left @ force, 1e-300))
     inflation = fitted.inflation
     delta_chi2 = (done @ left @ done - gain - with_findings) / inflation
-    margin = least_difference(fitted, search.rules)
+    margin = least_difference(fitted, rules)
     alternatives = []
     for place in np.argsort(delta_chi2):
         if not (seen[place] and delta_chi2[place] <= margin):

@@ -22,7 +22,7 @@ from ..fitting import (
     search_of,
     thinned,
 )
-from ..traces import MatchingPursuit, matching_pursuit, no_laws
+from ..traces import MatchingPursuit, matching_pursuit, no_laws, trace_free_laws
 from ._dwell_remainder import DwellRemainder, dwell_remainders
 from ._force_residual import ForceResidual, force_residuals
 
@@ -110,7 +110,7 @@ def explain_remainder(
     thin, coarser = thinned(whole, search)
     # Of noise that is not as it was measured no law's significance is known.
     forced = is_good(fit, rules) or not leaves_noise(fit, rules)
-    found = matching_pursuit(thin, coarser) if forced else no_laws(thin)
+    found = matching_pursuit(trace_free_laws(thin, coarser), rules) if forced else no_laws(thin)
     refitted = _refitted_goodness(thin, found, coarser) if refit and found.laws else float("nan")
     pursuit = found._replace(
         chi2_per_dof=chi2_per_dof_of_all(found.chi2_per_dof, thin, whole),

@@ -12,9 +12,9 @@ from ..._parameters import list_parameters, replace_parameters
 from ..._show import Row, amount, shown
 from ...models import Isolator
 from .._rules import Rules
-from ..fitting import Estimate, Search
-from ._free_laws import free_laws
-from ._projection import Projection, project
+from ..fitting import Estimate
+from ._free_traces import FreeTraces
+from ._projection import Projection
 
 
 @shown
@@ -133,7 +133,7 @@ def no_laws(fitted: Estimate, tried: int = 0) -> MatchingPursuit:
     return MatchingPursuit((), tried, chi2_per_dof, chi2_per_dof, float("nan"), fitted.model)
 
 
-def matching_pursuit(fitted: Estimate, search: Search) -> MatchingPursuit:
+def matching_pursuit(beside: FreeTraces, rules: Rules) -> MatchingPursuit:
     """Select free force laws that explain what a fit leaves: orthogonal matching pursuit on exact columns.
 
     The law of the largest score is selected and projected out of the residual and of all other laws, as the
@@ -141,20 +141,17 @@ def matching_pursuit(fitted: Estimate, search: Search) -> MatchingPursuit:
     is selected.
 
     Args:
-        fitted: the estimate.
-        search: how to search.
+        beside: the laws beside the fit.
+        rules: which laws stand out of the noise.
 
     Returns:
         The laws, not refitted.
 
     Source: Pati, Rezaiifar & Krishnaprasad 1993 (orthogonal matching pursuit).
     """
-    laws = free_laws(search.scales)
-    search.progress(f"matching pursuit among {len(laws)} free force laws")
-    units = np.array([1e-3 * law.typical_strength(search.scales) for law in laws])
-    traces = project(fitted, laws, units)
+    fitted, laws, units, traces = beside
     wordings = [law.wording() for law in laws]
-    selected = _select(traces, np.array([one.rank for one in wordings]), fitted, search.rules)
+    selected = _select(traces, np.array([one.rank for one in wordings]), fitted, rules)
     if not selected:
         return no_laws(fitted, len(laws))
     chi2_per_dof = fitted.chi2 / fitted.dof
