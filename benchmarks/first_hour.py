@@ -149,7 +149,7 @@ def play(folder: Path, python: str) -> tuple[str, list[str]]:
 
     result = json.loads((folder / "results" / "result.json").read_text(encoding="utf-8"))
     friction = result["after"]["parameters"].get("coulomb_friction.force_level")
-    total, used = (sum(step[place] for step in shell.steps) for place in (1, 2))
+    total, used = sum(step[1] for step in shell.steps), sum(step[2] for step in shell.steps)
     faults = [
         f"{name} is missing"
         for name in ("results/report.html", "stability/map.png", "stability/curves.png")

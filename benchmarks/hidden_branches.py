@@ -106,7 +106,7 @@ def judge_isola(response: ij.FrequencyResponse) -> None:
     def damper(speed):
         return 0.25 * speed - 0.2 * 8.0 / (3.0 * math.pi) * speed**2 + 0.75 * 0.045 * speed**3
 
-    inner, outer = (brentq(lambda v: damper(v) - 0.105, *ends) for ends in ((1.09, 2.26), (2.26, 4.0)))
+    inner, outer = (float(brentq(lambda v: damper(v) - 0.105, *ends)) for ends in ((1.09, 2.26), (2.26, 4.0)))
     # Largest: at the lower frequency, where w a is the speed; by a fine search over the curve.
     speeds = np.linspace(inner, outer, 20001)[1:-1]
     pull = np.sqrt(np.maximum(0.105**2 - damper(speeds) ** 2, 0.0))

@@ -280,9 +280,10 @@ def boucwen() -> bool:
     print(f"  {'FAIL' if static else 'PASS'}  no static polynomial among the findings: {names}")
     # All of them at once, or one by one, must not come near: a score says little so far from the truth.
     plain = loop.before
+    sizes = ij.identification.scales(plain.campaign)
     absent = [name for name in STATIC if name not in {one.name for one in plain.model.elements}]
     for added in (*((name,) for name in absent), tuple(absent)):
-        model = plain.model.with_elements(*(CATALOGUE[name](0.0) for name in added))
+        model = plain.model.with_elements(*(CATALOGUE[name].guess(sizes) for name in added))
         left = ij.fit(model, plain.campaign).stats
         print(f"    with {' + '.join(added)}: chi2/dof {left.chi2 / left.dof:.4g}")
     far = left.chi2 / left.dof > 100.0

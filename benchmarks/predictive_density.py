@@ -40,11 +40,10 @@ from blind_trial import commit, read
 from innocents import filed
 from isojax._progress import silent
 from isojax.identification import Rules, read_campaign
-from isojax.identification.diagnosis._candidate_refits import Case, refit_candidates
-from isojax.identification.diagnosis._diagnose import is_good, weigh_refits
+from isojax.identification.diagnosis._candidate_refits import refit_candidates
+from isojax.identification.diagnosis._diagnose import case_of, weigh_refits
 from isojax.identification.diagnosis._evidence import by_evidence, smallest_inflation
 from isojax.identification.diagnosis._refit import bic, least_difference
-from isojax.identification.diagnosis._score import absent_effects, score_test
 from isojax.identification.fitting import (
     DEFAULT_SOLVER,
     Estimate,
@@ -52,7 +51,6 @@ from isojax.identification.fitting import (
     one_hot,
     search_of,
     weighted_by_output,
-    weighted_by_residual,
 )
 from isojax.identification.fitting._elimination import _without_states
 from isojax.identification.guess import classical_guess
@@ -94,7 +92,8 @@ def predicted(found: Estimate, inflation: float, by_record: bool) -> Float[np.nd
     products = products / np.array([found.problem.noise[place] ** 2 for place in owner])[:, None, None]
     count, size = len(known), old.states.shape[1]
     scaled = products.shape[1] - count - size - 1
-    parts = _without_states(products, None, count + scaled, old.states[: owner.size])[0] / inflation
+    held = np.zeros(owner.size, dtype=bool)
+    parts = _without_states(products, None, count + scaled, old.states[: owner.size], held)[0] / inflation
     # The stiffness of each record stays as it was found.
     parts = np.delete(np.delete(parts, range(count, count + scaled), 1), range(count, count + scaled), 2)
     if by_record:
@@ -139,10 +138,7 @@ def run_one(seed: int, flaw: str) -> Row:
     search = search_of(campaign, rules, DEFAULT_SOLVER, silent)
     model = as_isolator(classical_guess(campaign).model, recorded=True)
     fit = weighted_by_output(fit_by_output(model, campaign, search), search)
-    probes = absent_effects(fit.estimate.model, search.scales, ())
-    seen = weighted_by_residual(fit, search).estimate
-    test = score_test(seen, search, probes)._replace(fitted=fit.estimate)
-    case = Case(fit, test, rules.significance, search, is_good(fit, rules))
+    case = case_of(search, fit)
     refits = refit_candidates(case)
     usable = by_evidence(refits, rules)
     finding = weigh_refits(case, refits).finding

@@ -120,6 +120,14 @@ def diagnose_with(
     if not fit.estimate.point.is_finite:
         reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[fit.result]}"
         return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
+    case = case_of(search, fit, significance, excluded)
+    return weigh_refits(case, refit_candidates(case))
+
+
+def case_of(
+    search: Search, fit: Fit, significance: float | None = None, excluded: tuple[str, ...] = ()
+) -> Case:
+    """Score the absent effects beside a fit; the arguments are those of `diagnose_with`."""
     # Noise that only the residual shows imitates effects: slow noise an offset, that of a shaken base a mode.
     by_residual = weighted_by_residual(fit, search).estimate
     fitted, coarser = thinned(fit.estimate, search)
@@ -128,7 +136,7 @@ def diagnose_with(
         seen, fitted, coarser = by_residual, fit.estimate, search
     probes = absent_effects(fitted.model, coarser.scales, excluded)
     search.progress(f"score test of {len({probe.name for probe in probes})} absent effects")
-    case = Case(
+    return Case(
         fit,
         fitted,
         seen,
@@ -138,7 +146,6 @@ def diagnose_with(
         search,
         is_good(fit, search.rules),
     )
-    return weigh_refits(case, refit_candidates(case))
 
 
 def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
