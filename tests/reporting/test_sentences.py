@@ -103,7 +103,7 @@ def test_a_force_law_that_stands_out_beside_a_good_fit_is_told_and_forbids_the_w
         alone.before, alone.after, 0, last._replace(verdict="unexplained"), found.rules
     ) == ("unexplained")
     assert verdict_sentence(alone).startswith(
-        "The fit is good, but a force c |x| v stands out of what it leaves (z = 20)"
+        "Something small is missing that no known effect explains: a force c |x| v stands out of the noise"
     )
 
 

@@ -48,10 +48,14 @@ def selected_laws_words(pursuit: MatchingPursuit) -> str:
         f"{name} = {with_error(law.coefficient, law.error, typeset_formula(law.unit))}" for name, law in named
     )
     refit = f" ({typeset_goodness(pursuit.refitted)} refitted)" if math.isfinite(pursuit.refitted) else ""
+    # Of an excess that is none there is no share.
+    share = (
+        f"explain {typeset_share(pursuit.laws[-1].share)} of it: " if pursuit.chi2_per_dof > 1.0 else "give "
+    )
     return (
-        f"A force {terms}, {strengths}, selected from {pursuit.tried} free laws, would explain "
-        f"{typeset_share(pursuit.laws[-1].share)} of it: χ²/dof {typeset_goodness(pursuit.chi2_per_dof)} → "
-        f"{typeset_goodness(pursuit.linear)} by a linear step{refit}. It is a description and no finding."
+        f"A force {terms}, {strengths}, selected from {pursuit.tried} free laws, would {share}"
+        f"χ²/dof {typeset_goodness(pursuit.chi2_per_dof)} → {typeset_goodness(pursuit.linear)} by a linear "
+        f"step{refit}. It is a description and no finding."
     )
 
 

@@ -159,8 +159,9 @@ def _verdict_words(loop: Loop) -> str:
     if loop.last.law is not None and not found:
         law = loop.last.law
         return (
-            f"The fit is good, but a force c {typeset_formula(law.formula)} stands out of what it leaves "
-            f"(z = {typeset_number(law.z, 2)}), and no known effect explains it; {error}."
+            "Something small is missing that no known effect explains: a force "
+            f"c {typeset_formula(law.formula)} stands out of the noise (z = {typeset_number(law.z, 2)}); "
+            f"{error}."
         )
     if not found and leaves_noise(loop.after, loop.rules):
         goodness = max(loop.after.stats.chi2 / loop.after.stats.dof, loop.after.noise.excess)
