@@ -8,6 +8,7 @@ from isojax import rig
 from isojax.elements import CATALOGUE
 from isojax.identification import classical_guess, diagnose, explain_remainder, fit, scales
 from isojax.identification.traces import free_laws
+from isojax.reporting.words._remainder_words import selected_laws_words
 
 PLAN = rig.SteppedSine(
     (40.0, 80.0, 130.0), tuple(np.arange(4.0, 6.6, 0.25)), directions=("forward",), holdout_levels=(100.0,)
@@ -67,6 +68,18 @@ def test_a_law_outside_the_catalogue_is_owned_up_to_beside_a_good_fit(simulated)
     assert verdict.law.z > 6.0
     assert abs(verdict.law.coefficient - 0.5) < 3.0 * verdict.law.error
     assert f"a force {verdict.law.formula} stands out" in verdict.reason
+
+
+def test_of_noise_that_was_declared_too_small_no_law_is_sought(simulated):
+    plan = rig.SteppedSine((60.0, 120.0), (4.0, 4.8, 5.6), directions=("forward",))
+    bench = rig.Bench(rate=250.0, drift=0.0, force_noise=0.0, anti_alias=False, noise=5e-3)
+    campaign = simulated(rig.Plant(BASE), plan, bench=bench, output={"noise": 2e-3})
+    fitted = fit(classical_guess(campaign).model, campaign)
+    assert fitted.stats.chi2 / fitted.stats.dof > 4.0
+    pursuit = explain_remainder(fitted, refit=False).pursuit
+    assert pursuit.tried == 0
+    assert pursuit.laws == ()
+    assert "Nothing of it comes back with the drive" in selected_laws_words(pursuit)
 
 
 def test_free_laws_are_no_effects(simulated):
