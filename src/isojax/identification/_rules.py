@@ -31,8 +31,9 @@ class Rules:
     anything."""
 
     smallest_law: float = 0.03
-    """Share of the excess from which a force law describes a remainder; and share of the best law's gain by
-    which a plainer one may fall short and still be chosen. See `benchmarks/remainder.py`."""
+    """Share of the excess from which a force law describes a remainder or stands out beside a good fit; and
+    share of the best law's gain by which a plainer one may fall short and still be chosen. See
+    `benchmarks/remainder.py`."""
 
     most_at_once: int = 2
     """Effects that explain all a campaign lacks. More imitate together a law that the catalogue does not
@@ -41,10 +42,10 @@ class Rules:
     # Significance and evidence.
 
     significance: float = 0.01
-    """Family-wise level of the score test (Westfall & Young 1993), of laws that describe a remainder, and of
-    the tests for lack of fit, for scatter of the stiffness within records, of one strength and of a free run
-    that got worse. The score test takes half of it after each finding, so that all its levels of one loop sum
-    up to twice the first."""
+    """Family-wise level of the score test (Westfall & Young 1993), of laws that describe a remainder or stand
+    out beside a good fit, and of the tests for lack of fit, for scatter of the stiffness within records, of
+    one strength and of a free run that got worse. The score test takes half of it after each finding, so that
+    all its levels of one loop sum up to twice the first."""
 
     close_bic: float = 10.0
     """Difference of Schwarz's criterion from which the evidence is clear: very strong in the scale of Kass
