@@ -107,7 +107,9 @@ SPOILT = {"spikes": spiked, "nonlinear_sensor": bent, "jitter": jittered}
 FLAWS = (*COLOURS, "one_level", "two_records", *SPOILT, "noisy_record", "noisy_base", "noisy_force")
 
 SAYS: dict[str, Callable[[Loop, DataHealth], bool]] = {
-    "noise": lambda loop, _: loop.before.noise.method == "residual" or "noise" in loop.last.reason,
+    "noise": lambda loop, _: (
+        loop.last.law is None and (loop.before.noise.method == "residual" or "noise" in loop.last.reason)
+    ),
     "records": lambda loop, _: bool(loop.before.noise.range_words),
     "peak": lambda _, health: bool(health.noise_peak),
     "spikes": lambda loop, _: any("remove_spikes" in str(one) for one in loop.check_first),

@@ -141,7 +141,7 @@ def run_one(seed: int, flaw: str) -> Row:
     case = case_of(search, fit)
     refits = refit_candidates(case)
     usable = by_evidence(refits, rules)
-    finding = weigh_refits(case, refits).finding
+    finding = weigh_refits(case, refits).verdict.finding
     row |= {
         "named": finding.effect if finding else None,
         "set": [finding.effect, *finding.indistinguishable] if finding else [],

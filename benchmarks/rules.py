@@ -173,11 +173,11 @@ class Trial:
             guess = self.guess
             before = remembered(fit, self.known)(guess.model, self.campaign, rules=rules)
             search = Search(self.scales, rules)
-            extensions, last = search_effects(before, search, 3)
+            extensions, (last, beside) = search_effects(before, search, 3)
             after = extensions[-1].after if extensions else before
             found = findings_in(after.model, extensions)
             names = tuple(finding.effect for finding in found)
-            beside = last.beside or remembered(trace_free_laws, self.known)(*thinned(after.estimate, search))
+            beside = beside or remembered(trace_free_laws, self.known)(*thinned(after.estimate, search))
             others = find_alternatives(beside, names, rules) if names else ()
             verdict = overall_verdict(before, after, len(names), last, rules, others)
             words = [" or ".join(sorted((one.effect, *one.indistinguishable))) for one in found]

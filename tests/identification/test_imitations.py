@@ -20,7 +20,7 @@ from isojax.identification import (
     fit,
     scales,
 )
-from isojax.identification.diagnosis import findings_in
+from isojax.identification.diagnosis import Diagnosis, findings_in
 from isojax.identification.diagnosis._imitations import find_simpler_pair, find_superfluous
 from isojax.identification.diagnosis._refit import Refit, refit_candidate
 from isojax.identification.diagnosis._score import absent_effects, score_test
@@ -88,14 +88,15 @@ def test_a_superfluous_finding_is_dropped_where_the_search_without_it_finds_noth
     first = step(before, "maxwell_branch")
     second = step(first.after, "cubic_stiffness", CoulombFriction(3.0, 2e-4), CubicStiffness(1e11))
     last = Verdict("none", None, (), (), 1.0, (), {}, None, "Nothing more.")
-    answers, asked = [((first, second), second.verdict), ((), first.verdict), ((), last)], []
+    verdicts = (((first, second), second.verdict), ((), first.verdict), ((), last))
+    answers, asked = [(steps, Diagnosis(one)) for steps, one in verdicts], []
 
     def grow(*given):
         asked.append(given)
         return answers.pop(0)
 
     monkeypatch.setattr(_close_loop, "_grow", grow)
-    extensions, verdict = _close_loop.search_effects(before, Search(scales(thin)), 3)
+    extensions, (verdict, _) = _close_loop.search_effects(before, Search(scales(thin)), 3)
     # The last diagnosis is that of the smaller model.
     assert verdict is last
     assert asked[-1][0] is extensions[-1].after

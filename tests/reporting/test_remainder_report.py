@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from isojax import plot
 from isojax.reporting import loop_summary, render_page, render_text, result_dict
 
-LAW = {"formula", "coefficient", "standard_error", "unit", "share", "alike"}
+LAW = {"formula", "coefficient", "standard_error", "unit", "share", "alike", "z"}
 
 
 @pytest.fixture(scope="module")

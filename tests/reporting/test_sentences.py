@@ -89,22 +89,26 @@ def test_where_nothing_left_comes_back_with_the_drive_no_effect_is_said_to_be_mi
 
 
 def test_a_force_law_that_stands_out_beside_a_good_fit_is_told_and_forbids_the_word_found(found):
-    law = SelectedLaw("|x| v", "damping-like", 2e5, 1e4, "N s/m^2", 3.0, 20.3, 1.0, ())
+    law = SelectedLaw("|x| v", "damping-like", 2e5, 1e4, "N s/m^2", 3.0, 20.3, math.nan, ())
     last = found.last._replace(law=law)
-    doubted = dataclasses.replace(found, last=last)
+    doubted = dataclasses.replace(found, last=last, verdict="partly_explained")
     assert doubted.doubt == "a further law"
     assert overall_verdict(found.before, found.after, 1, last, found.rules) == "partly_explained"
-    sentence = verdict_sentence(dataclasses.replace(doubted, verdict="partly_explained"))
-    assert "something else is missing too: a force c |x| v stands out" in sentence
+    told = ": a force |x| v stands out of the noise (z = 20); "
+    assert "something else is missing too" + told in verdict_sentence(doubted)
+    assert result_dict(doubted)["law"]["formula"] == "|x| v"
+    (step,) = found.extensions
+    assert told in verdict_sentence(dataclasses.replace(doubted, extensions=(step,) * 3))
     alone = dataclasses.replace(
         found, extensions=(), before=found.after, verdict="unexplained", last=last, bounds={}
     )
-    assert overall_verdict(
-        alone.before, alone.after, 0, last._replace(verdict="unexplained"), found.rules
-    ) == ("unexplained")
-    assert verdict_sentence(alone).startswith(
-        "Something small is missing that no known effect explains: a force c |x| v stands out of the noise"
-    )
+    said = last._replace(verdict="unexplained")
+    assert overall_verdict(alone.before, alone.after, 0, said, found.rules) == "unexplained"
+    sentence = verdict_sentence(alone)
+    assert sentence.startswith("Something small is missing, and its cause is not identified" + told)
+    constant = last._replace(law=law._replace(formula="1"))
+    assert ": a constant force stands out" in verdict_sentence(dataclasses.replace(alone, last=constant))
+    assert "law" not in result_dict(found)
 
 
 def test_a_finding_that_a_later_one_contains_is_told_by_that(found):

@@ -20,6 +20,7 @@ from ..models import Isolator, as_isolator
 from ..records import Campaign, Suspicion, find_suspicions, refuse_contradictions
 from ._rules import Rules
 from .diagnosis import (
+    Diagnosis,
     Extension,
     Finding,
     Verdict,
@@ -229,7 +230,7 @@ def _loop(
     search = search_of(campaign, rules, solver, progress)
     before = fit_by_output(as_isolator(guess.model, recorded=True), campaign, search)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
-    extensions, verdict = search_effects(before, search, max_iterations, excluded)
+    extensions, (verdict, beside) = search_effects(before, search, max_iterations, excluded)
     if extensions:
         progress(Stage("search for separating experiments", _EXPERIMENT, (_LAWS, _RUNS)))
         extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
@@ -243,8 +244,9 @@ def _loop(
     alternatives: tuple[Alternatives, ...] = ()
     if names and is_successful(after.result):
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
-        beside = verdict.beside or trace_free_laws(*thinned(after.estimate, search))
+        beside = beside or trace_free_laws(*thinned(after.estimate, search))
         alternatives = find_alternatives(beside, names, rules)
+    del beside
     judged = overall_verdict(before, after, len(names), verdict, rules, alternatives)
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.
@@ -276,15 +278,15 @@ def _without_evidence(failed: Fit) -> Verdict:
 
 def search_effects(
     before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...] = ()
-) -> tuple[tuple[Extension, ...], Verdict]:
+) -> tuple[tuple[Extension, ...], Diagnosis]:
     """Add effects while they are significant; search again without one that later ones made superfluous.
 
     Where that search finds nothing better, but the later effects alone explain as much, the effect is dropped
     and the search goes on from there.
     """
-    extensions, verdict = _grow(before, search, max_iterations, excluded)
+    extensions, last = _grow(before, search, max_iterations, excluded)
     if len(extensions) < 2:
-        return extensions, verdict
+        return extensions, last
     whole = extensions[-1].after.estimate
     final, coarser = thinned(whole, search)
     search.progress(
@@ -295,19 +297,19 @@ def search_effects(
     )
     doubtful = find_superfluous(final, earlier, coarser)
     if doubtful is None:
-        return extensions, verdict
+        return extensions, last
     name = doubtful.effect
     search.progress(KeyFigure(f"{name} is not needed beside the later findings: search again without it"))
-    again, last = _grow(before, search, max_iterations, (*excluded, name))
+    again, other = _grow(before, search, max_iterations, (*excluded, name))
     without = on_all_samples(doubtful.without, whole, coarser, search) if doubtful.is_better else whole
     best = without if is_successful(without.result) else whole
     if again:
         new = again[-1].after.estimate
         inflation = min(new.inflation, best.inflation)
         if bic(new, inflation) <= bic(best, inflation):
-            return again, last
+            return again, other
     if best is whole:
-        return extensions, verdict
+        return extensions, last
     dropped = complete(best, before.model, before.campaign, before.noise)
     more, last = _grow(dropped, search, max_iterations - len(extensions) + 1, (*excluded, name))
     return (*extensions[:-1], extensions[-1]._replace(fit=dropped), *more), last
@@ -315,7 +317,7 @@ def search_effects(
 
 def _grow(
     before: Fit, search: Search, max_iterations: int, excluded: tuple[str, ...]
-) -> tuple[tuple[Extension, ...], Verdict]:
+) -> tuple[tuple[Extension, ...], Diagnosis]:
     """Add effects until no further one is significant; give the steps and the last diagnosis.
 
     A good fit is diagnosed like any other: a second effect may still stand out of the residual.
@@ -326,11 +328,11 @@ def _grow(
         # Halved after each addition: the levels of all searches sum up to twice the first.
         significance = search.rules.significance / 2 ** len(extensions)
         search.progress(_diagnosis(len(extensions), max_iterations))
-        verdict = diagnose_with(search, current, significance, excluded)
-        search.progress(KeyFigure(verdict.reason))
-        if verdict.after is None or len(extensions) == max_iterations:
-            return extensions, verdict
-        extensions = (*extensions, extend(current, verdict))
+        found = diagnose_with(search, current, significance, excluded)
+        search.progress(KeyFigure(found.verdict.reason))
+        if found.verdict.after is None or len(extensions) == max_iterations:
+            return extensions, found
+        extensions = (*extensions, extend(current, found.verdict))
         current = extensions[-1].after
 
 

@@ -7,6 +7,7 @@ and `_passivity` (what speaks against them), `_evidence`, `_transfer` and `_boun
 `_separation` hold the results.
 """
 
+from ._diagnose import Diagnosis as Diagnosis
 from ._diagnose import diagnose as diagnose
 from ._diagnose import diagnose_with as diagnose_with
 from ._diagnose import is_good as is_good

@@ -1,7 +1,8 @@
 """The diagnosis: from a residual to the effect that the model lacks, or to the word that nothing is."""
 
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..._cores import in_own_threads
 from ..._progress import silent
@@ -26,7 +27,7 @@ from ..fitting import (
     weighted_by_output,
     weighted_by_residual,
 )
-from ..traces import matching_pursuit, trace_free_laws
+from ..traces import FreeTraces, SelectedLaw, matching_pursuit, trace_free_laws
 from ._bounds import upper_bounds
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, ranked_first, smallest_inflation
@@ -35,6 +36,18 @@ from ._refit import Refit, bic, least_difference, refit_to_convergence, rivals, 
 from ._score import absent_effects, score_test
 from ._separating_words import is_exact, separating_experiment
 from ._transfer import transferred_share
+
+
+class Diagnosis(NamedTuple):
+    """A verdict, and what of its work serves others.
+
+    Attributes:
+        verdict: what the residual says.
+        beside: traces of the free force laws beside the fit, weighted as it is; None where there are none.
+    """
+
+    verdict: Verdict
+    beside: FreeTraces | None = None
 
 
 def is_good(fit: Fit, rules: Rules) -> bool:
@@ -97,7 +110,7 @@ def diagnose(
     """
     fit = as_fit(fit)
     search = search_of(fit.campaign, rules, solver, progress, max_steps)
-    return diagnose_with(search, weighted_by_output(fit, search), significance, excluded)
+    return diagnose_with(search, weighted_by_output(fit, search), significance, excluded).verdict
 
 
 def diagnose_with(
@@ -105,7 +118,7 @@ def diagnose_with(
     fit: Fit,
     significance: float | None = None,
     excluded: tuple[str, ...] = (),
-) -> Verdict:
+) -> Diagnosis:
     """Diagnose as `diagnose` does, with a search of the campaign that is known already.
 
     Args:
@@ -115,11 +128,11 @@ def diagnose_with(
         excluded: see `diagnose`.
 
     Returns:
-        The verdict.
+        The diagnosis.
     """
     if not fit.estimate.point.is_finite:
         reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[fit.result]}"
-        return Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason)
+        return Diagnosis(Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason))
     case = case_of(search, fit, significance, excluded)
     return weigh_refits(case, refit_candidates(case))
 
@@ -148,7 +161,7 @@ def case_of(
     )
 
 
-def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
+def weigh_refits(case: Case, refits: list[Refit]) -> Diagnosis:
     """Weigh the refits, and word the verdict."""
     fitted, rules, test = case.fitted, case.rules, case.test
     inflation = smallest_inflation(by_evidence(refits, rules))
@@ -174,7 +187,7 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
             whole = on_all_samples(shaped, case.fit.estimate, case.search, case.finer)
             if is_successful(whole.result) and whole.misfit < case.fit.estimate.misfit:
                 usable[0] = best._replace(estimate=whole)
-                return _verdict_of_finding(case, usable, ranked_first(ranking, usable[0]), share)
+                return Diagnosis(_verdict_of_finding(case, usable, ranked_first(ranking, usable[0]), share))
             against = "its refit to all samples did not converge"
         # What imitates the missing effect on the records of its refit alone must not hide that effect.
         reason = f"{too_little}, but {against}"
@@ -186,17 +199,27 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Verdict:
     # Tests of all samples together overlook a law that the catalogue lacks until it is many standard errors
     # large. A free law like it does not.
     beside = trace_free_laws(case.seen, case.search) if good and tone is None else None
-    law = next(iter(matching_pursuit(beside, rules).laws), None) if beside is not None else None
+    law = None if beside is None else _clear_law(beside, rules)
     verdict = "none" if good and tone is None and law is None else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if tone is not None:
         words = tone.words(plain_unit("SI unit of the output", case.fit.campaign)) + "; "
     elif law is not None:
-        words = f"The fit is good, but a force {law.formula} stands out of what it leaves, z = {law.z:.3g}; "
+        words = f"The fit is good, but {law.force_words} stands out of what it leaves, z = {law.z:.3g}; "
     elif not good and leaves_noise(case.fit, rules):
         words = _words_of_noise(case.fit, rules)
     words = f"{words}{reason}."
-    return Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words, tone, law, beside)
+    said = Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words, tone, law)
+    return Diagnosis(said, beside if case.seen is case.fitted else None)
+
+
+def _clear_law(beside: FreeTraces, rules: Rules) -> SelectedLaw | None:
+    """Give the free force law that stands out most, if it is as clear as an effect must be to be named."""
+    fitted, laws = beside.fitted, matching_pursuit(beside, rules).laws
+    if not laws:
+        return None
+    gained = laws[0].z ** 2 / fitted.inflation - math.log(fitted.point.samples.sum())
+    return laws[0] if gained > rules.close_bic else None
 
 
 def _words_of_noise(fit: Fit, rules: Rules) -> str:

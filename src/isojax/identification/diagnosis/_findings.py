@@ -7,7 +7,7 @@ from ..._show import Row, amount, shown
 from ...elements import AbstractElement
 from ...models import Isolator
 from ..fitting import Estimate, Fit, Tone
-from ..traces import FreeTraces, SelectedLaw
+from ..traces import SelectedLaw
 from ._separation import Separation
 
 VerdictWord = Literal["none", "found", "partly_explained", "unexplained"]
@@ -114,9 +114,7 @@ class Verdict(NamedTuple):
         after: the fit with the effect; None where nothing was found.
         reason: one sentence.
         tone: a tone that is left where nothing was found, and does not belong to the drive; or None.
-        law: the force law outside the catalogue that stands out most where the fit is good and nothing was
-            found; or None.
-        beside: traces of the force laws outside the catalogue; None where they were not asked for.
+        law: the free force law that stands out most where the fit is good and nothing was found; or None.
     """
 
     verdict: VerdictWord
@@ -130,7 +128,6 @@ class Verdict(NamedTuple):
     reason: str
     tone: Tone | None = None
     law: SelectedLaw | None = None
-    beside: FreeTraces | None = None
 
     @property
     def refit(self) -> Estimate | None:
@@ -148,6 +145,8 @@ class Verdict(NamedTuple):
         lines = []
         if self.indistinguishable:
             lines.append(f"  these data do not distinguish it from: {', '.join(self.indistinguishable)}")
+        if self.law is not None:
+            lines.append(f"  a free force law stands out: {self.law._headline()}")
         if self.hidden:
             lines.append(f"  these data cannot show: {', '.join(self.hidden)}")
         return lines

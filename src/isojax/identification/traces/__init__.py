@@ -1,7 +1,7 @@
 """Traces that absent forces leave in the records, beside the coefficients that are fitted.
 
 In: an `Estimate` and elements at zero strength. Out: their projected traces (`_projection`). `_free_laws` are
-the force laws outside the catalogue, `_free_traces` their traces beside a fit, of which `_matching_pursuit`
+force laws of any power and shape, `_free_traces` their traces beside a fit, of which `_matching_pursuit`
 selects those that stand out of the residual.
 """
 

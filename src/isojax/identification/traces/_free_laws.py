@@ -1,4 +1,4 @@
-"""Force laws outside the catalogue: powers of the motion, waves along the path, laws with an internal state.
+"""Free force laws: powers of the motion, waves along the path, laws with an internal state.
 
 They are elements, so that they are scored like any other, but the catalogue does not list them: a diagnosis
 cannot name one.

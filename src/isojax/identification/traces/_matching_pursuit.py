@@ -29,7 +29,8 @@ class SelectedLaw(NamedTuple):
         unit: unit of the coefficient.
         force: its size at the largest motion [N].
         z: score when it was selected, in standard deviations of the noise.
-        share: share of the excess that the laws up to this one remove, by the linear step; 1 at most.
+        share: share of the excess that the laws up to this one remove, by the linear step; 1 at most, NaN
+            where chance explains the excess.
         alike: formulas of laws that would remove most of the same, nearest first: all but `smallest_share`.
     """
 
@@ -42,6 +43,11 @@ class SelectedLaw(NamedTuple):
     z: float
     share: float
     alike: tuple[str, ...]
+
+    @property
+    def force_words(self) -> str:
+        """What acts, such as "a force |x| v"."""
+        return "a constant force" if self.formula == "1" else f"a force {self.formula}"
 
     def _headline(self) -> str:
         return f"{self.formula}, {amount(self.coefficient, self.unit, self.error)}, {self.words}"
@@ -160,6 +166,7 @@ def matching_pursuit(beside: FreeTraces, rules: Rules) -> MatchingPursuit:
     amount = inverse @ traces.score[places]
     linear = (fitted.chi2 - sum(one.gain for one in selected)) / (fitted.dof - len(selected))
     error = np.sqrt(np.diag(inverse) * max(1.0, linear))
+    exceeds = stats.chi2.sf(fitted.chi2, fitted.dof) < rules.significance
     described, removed = [], 0.0
     for one, strength, spread in zip(selected, amount, error, strict=True):
         removed += one.gain
@@ -173,7 +180,7 @@ def matching_pursuit(beside: FreeTraces, rules: Rules) -> MatchingPursuit:
                 words.unit,
                 float(strength * unit),
                 one.z,
-                min(1.0, float(removed / max(fitted.excess, 1.0))),
+                min(1.0, float(removed / fitted.excess)) if exceeds else float("nan"),
                 tuple(wordings[place].formula for place in one.alike),
             )
         )

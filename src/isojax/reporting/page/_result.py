@@ -7,7 +7,14 @@ from ..._parameters import list_parameters
 from ..._results import is_successful
 from ...health import CampaignHealth
 from ...identification import Errors, Finding, Fit, Loop, plain_unit
-from ..words import alternatives_list, check_first_dicts, finite_or_none, health_dict, remainder_dict
+from ..words import (
+    alternatives_list,
+    check_first_dicts,
+    finite_or_none,
+    health_dict,
+    law_dict,
+    remainder_dict,
+)
 
 SCHEMA = 1
 
@@ -17,8 +24,8 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
 
     "alternatives", other force laws in the place of the findings, is there only where something was found;
     "remainder" only where the verdict is "unexplained" or "partly_explained"; "integration", beside the
-    coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records; "tone" only
-    where nothing was found and one is left.
+    coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records; "tone" and
+    "law" only where the last diagnosis found no further effect, but one of these is left.
 
     Args:
         loop: the closed loop.
@@ -46,6 +53,7 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
         **({} if health is None else {"health": health_dict(health)}),
         **({} if remainder is None else {"remainder": remainder_dict(remainder)}),
         **({} if loop.last.tone is None else {"tone": loop.last.tone._asdict()}),
+        **({} if loop.last.law is None else {"law": law_dict(loop.last.law)}),
     }
 
 

@@ -24,6 +24,7 @@ from ._health_words import budget_words as budget_words
 from ._health_words import dwell_words as dwell_words
 from ._health_words import health_dict as health_dict
 from ._health_words import mains_words as mains_words
+from ._remainder_words import law_dict as law_dict
 from ._remainder_words import law_rows as law_rows
 from ._remainder_words import remainder_dict as remainder_dict
 from ._remainder_words import remainder_summary as remainder_summary

@@ -12,7 +12,7 @@ from ..._quantities import (
     typeset_unit,
 )
 from ..._quantities import typeset_with_error as with_error
-from ...identification import Loop, MatchingPursuit, Remainder
+from ...identification import Loop, MatchingPursuit, Remainder, SelectedLaw
 
 
 def remainder_summary(loop: Loop) -> tuple[str, ...]:
@@ -43,17 +43,17 @@ def selected_laws_words(pursuit: MatchingPursuit) -> str:
         return f"None of {pursuit.tried} free force laws explains a significant share of it."
     names = ["c"] if len(pursuit.laws) == 1 else [f"c{place + 1}" for place in range(len(pursuit.laws))]
     named = list(zip(names, pursuit.laws, strict=True))
-    terms = " + ".join(f"{name} {typeset_formula(law.formula)}" for name, law in named)
+    terms = " + ".join(
+        name if law.formula == "1" else f"{name} {typeset_formula(law.formula)}" for name, law in named
+    )
     strengths = ", ".join(
         f"{name} = {with_error(law.coefficient, law.error, typeset_formula(law.unit))}" for name, law in named
     )
     refit = f" ({typeset_goodness(pursuit.refitted)} refitted)" if math.isfinite(pursuit.refitted) else ""
-    # Of an excess that is none there is no share.
-    share = (
-        f"explain {typeset_share(pursuit.laws[-1].share)} of it: " if pursuit.chi2_per_dof > 1.0 else "give "
-    )
+    share = pursuit.laws[-1].share
+    explained = f"explain {typeset_share(share)} of it: " if math.isfinite(share) else "give "
     return (
-        f"A force {terms}, {strengths}, selected from {pursuit.tried} free laws, would {share}"
+        f"A force {terms}, {strengths}, selected from {pursuit.tried} free laws, would {explained}"
         f"χ²/dof {typeset_goodness(pursuit.chi2_per_dof)} → {typeset_goodness(pursuit.linear)} by a linear "
         f"step{refit}. It is a description and no finding."
     )
@@ -81,6 +81,24 @@ def law_rows(pursuit: MatchingPursuit) -> list[dict[str, str]]:
     ]
 
 
+def law_dict(law: SelectedLaw) -> dict[str, Any]:
+    """Give a free force law in plain numbers.
+
+    Args:
+        law: the law.
+
+    Returns:
+        What JSON holds; None where a number is not finite.
+    """
+    return {
+        "formula": law.formula,
+        "coefficient": finite_or_none(law.coefficient),
+        "standard_error": finite_or_none(law.error),
+        "unit": law.unit,
+        "z": finite_or_none(law.z),
+    }
+
+
 def remainder_dict(remainder: Remainder) -> dict[str, Any]:
     """Give the unexplained residual as plain numbers.
 
@@ -93,14 +111,7 @@ def remainder_dict(remainder: Remainder) -> dict[str, Any]:
     pursuit = remainder.pursuit
     return {
         "laws": [
-            {
-                "formula": law.formula,
-                "coefficient": finite_or_none(law.coefficient),
-                "standard_error": finite_or_none(law.error),
-                "unit": law.unit,
-                "share": finite_or_none(law.share),
-                "alike": list(law.alike),
-            }
+            law_dict(law) | {"share": finite_or_none(law.share), "alike": list(law.alike)}
             for law in pursuit.laws
         ],
         "laws_tried": pursuit.tried,

@@ -123,7 +123,7 @@ def _verdict_words(loop: Loop) -> str:
     if loop.verdict == "partly_explained" and len(found) > 2 and loop.bounds:
         return (
             f"{_capital(effects)}, explain the records together, but so many effects can imitate a single "
-            f"law outside the catalogue; {error} (noise alone: 1)."
+            f"law outside the catalogue{_standing_out(loop)}; {error} (noise alone: 1)."
         )
     better = next((one.better for one in loop.alternatives if one.better is not None), None)
     if (
@@ -138,11 +138,9 @@ def _verdict_words(loop: Loop) -> str:
             f"{effects}; {error}."
         )
     if loop.verdict == "partly_explained" and found:
-        law = loop.last.law
-        too = "" if law is None else f": a force c {typeset_formula(law.formula)} stands out"
         return (
-            f"{_capital(effects)}, {verb} missing, and something else is missing too{too}; {error} "
-            "(noise alone: 1)."
+            f"{_capital(effects)}, {verb} missing, and something else is missing too{_standing_out(loop)}; "
+            f"{error} (noise alone: 1)."
         )
     pending = loop.last.finding
     if pending is not None and not found:
@@ -157,12 +155,7 @@ def _verdict_words(loop: Loop) -> str:
         rest = "Otherwise the model explains the records" if good else "More than noise is left beside it"
         return f"{tone.words(unit)}. {rest}; {error}."
     if loop.last.law is not None and not found:
-        law = loop.last.law
-        return (
-            "Something small is missing that no known effect explains: a force "
-            f"c {typeset_formula(law.formula)} stands out of the noise (z = {typeset_number(law.z, 2)}); "
-            f"{error}."
-        )
+        return f"Something small is missing, and its cause is not identified{_standing_out(loop)}; {error}."
     if not found and leaves_noise(loop.after, loop.rules):
         goodness = max(loop.after.stats.chi2 / loop.after.stats.dof, loop.after.noise.excess)
         return (
@@ -172,6 +165,14 @@ def _verdict_words(loop: Loop) -> str:
         )
     known = f" even with {effects}" if found else ""
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
+
+
+def _standing_out(loop: Loop) -> str:
+    """Give the free force law that stands out beside the last fit, after a colon; "" where none does."""
+    law = loop.last.law
+    if law is None:
+        return ""
+    return f": {typeset_formula(law.force_words)} stands out of the noise (z = {typeset_number(law.z, 2)})"
 
 
 def _finding_sentence(fit: Fit, finding: Finding) -> str:
