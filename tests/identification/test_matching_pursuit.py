@@ -44,8 +44,10 @@ def test_relaxation_is_described_as_a_force_that_relaxes(left_by):
     pursuit = left_by(rig.MaxwellBranch(4e4, 0.03))
     first = pursuit.laws[0]
     assert first.formula.startswith("fade(x; ")
-    assert first.coefficient > 0.0
-    assert first.share > 0.9
+    assert abs(first.coefficient - 4e4) < 3.0 * first.error
+    assert first.z > 20.0
+    # It is so small that chance would explain the excess, of which there is no share then.
+    assert np.isnan(first.share)
 
 
 @pytest.mark.slow
