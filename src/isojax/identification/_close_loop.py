@@ -255,18 +255,11 @@ def _loop(
     progress(Stage("free runs of every record", _RUNS))
     if is_successful(before.result) and is_successful(after.result):
         progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
+    for step in (before, after):
+        step.estimate.simulator.forget()
+    seconds, bounds = time.perf_counter() - start, verdict.bounds
     return Loop(
-        campaign,
-        guess,
-        before,
-        extensions,
-        after,
-        judged,
-        verdict,
-        verdict.bounds,
-        time.perf_counter() - start,
-        rules,
-        alternatives,
+        campaign, guess, before, extensions, after, judged, verdict, bounds, seconds, rules, alternatives
     )
 
 
@@ -333,6 +326,7 @@ def _grow(
         if found.verdict.after is None or len(extensions) == max_iterations:
             return extensions, found
         extensions = (*extensions, extend(current, found.verdict))
+        current.estimate.simulator.forget()
         current = extensions[-1].after
 
 

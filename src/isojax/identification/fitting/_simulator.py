@@ -35,6 +35,12 @@ class Simulator:
         self._internal: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
         self._last: tuple[tuple[np.ndarray, ...], Float[np.ndarray, "lanes column column"]] | None = None
 
+    def forget(self) -> None:
+        """Drop the batches, which are large; they are made again when they are next asked for."""
+        self._prepared.clear()
+        if self._heads is not None:
+            self._heads.forget()
+
     def prepared(self, model: Isolator, carried: int) -> Prepared:
         """Give the batches for a model.
 
