@@ -117,3 +117,17 @@ def test_a_start_that_diverges_is_taken_up_again_from_its_linear_part(simulated)
     assert any("diverges" in line for line in said)
     assert is_successful(found.result)
     assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_search_that_fails_is_taken_up_again_from_the_linear_part_of_its_start(simulated):
+    """Half cycles that ring down to the noise give nonlinear coefficients ten times too large."""
+    bench = rig.Bench(rate=250.0, noise=0.01, drift=0.0, force_noise=0.0, anti_alias=False, tolerance=1e-7)
+    campaign = simulated(rig.y_plant(), rig.FreeDecay((2e-4, 5e-4, 1e-3), seconds=3.0, repeats=2), 1, bench)
+    said = []
+    found = fit(classical_guess(campaign).model, campaign, progress=said.append)
+    assert any("the search from the start values fails" in line for line in said)
+    assert is_successful(found.result)
+    assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.1)
+    name = "linear_stiffness.coefficient"
+    assert abs(float(found.model[name]) - 1.0805e6) < 4.0 * found.standard_errors[name]

@@ -143,10 +143,16 @@ def fit_by_output(
         return estimate(simulator_for(start, campaign, noise, integrator), start, places, search)
 
     found = fit_from(model)
-    if found.result == RESULTS.not_finite:
-        search.progress("the simulation from the start values diverges: again from their linear part")
-        again = fit_from(_linear_part(model, places))
-        found = found if again.result == RESULTS.not_finite else again
+    straight = _linear_part(model, places)
+    if not is_successful(found.result) and straight.parameters != model.parameters:
+        diverges = found.result == RESULTS.not_finite
+        why = (
+            "simulation from the start values diverges" if diverges else "search from the start values fails"
+        )
+        search.progress(f"the {why}: again from their linear part")
+        again = fit_from(straight)
+        if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
+            found = again
     return _with_less_noise(complete(found, model, campaign, noise), search)
 
 
