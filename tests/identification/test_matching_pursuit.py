@@ -5,9 +5,10 @@ import pytest
 from strange_laws import BASE, Detent, Governor, Grip
 
 from isojax import rig
-from isojax.elements import CATALOGUE
+from isojax.elements import CATALOGUE, CoulombFriction
 from isojax.identification import classical_guess, diagnose, explain_remainder, fit, scales
 from isojax.identification.traces import free_laws
+from isojax.identification.traces._free_traces import _forces, _is_one
 from isojax.reporting.words._remainder_words import selected_laws_words
 
 PLAN = rig.SteppedSine(
@@ -82,6 +83,16 @@ def test_of_noise_that_was_declared_too_small_no_law_is_sought(simulated):
     assert pursuit.tried == 0
     assert pursuit.laws == ()
     assert "Nothing of it comes back with the drive" in selected_laws_words(pursuit)
+
+
+def test_beside_dry_friction_only_its_own_law_is_no_other(simulated):
+    magnitudes = scales(simulated(rig.Plant(BASE), PLAN))
+    laws = free_laws(magnitudes)
+    friction = _forces([CoulombFriction.guess(magnitudes)], magnitudes)[0]
+    same = [
+        law for law, force in zip(laws, _forces(laws, magnitudes), strict=True) if _is_one(force, friction)
+    ]
+    assert [law.wording().formula for law in same] == ["sgn(v)"]
 
 
 def test_free_laws_are_no_effects(simulated):
