@@ -8,7 +8,7 @@ from isojax import rig
 from isojax.elements import CATALOGUE, CoulombFriction
 from isojax.identification import classical_guess, diagnose, explain_remainder, fit, scales
 from isojax.identification.traces import free_laws
-from isojax.identification.traces._free_traces import _forces, _is_one
+from isojax.identification.traces._free_traces import _forces, _is_same_law
 from isojax.reporting.words._remainder_words import selected_laws_words
 
 PLAN = rig.SteppedSine(
@@ -90,7 +90,9 @@ def test_beside_dry_friction_only_its_own_law_is_no_other(simulated):
     laws = free_laws(magnitudes)
     friction = _forces([CoulombFriction.guess(magnitudes)], magnitudes)[0]
     same = [
-        law for law, force in zip(laws, _forces(laws, magnitudes), strict=True) if _is_one(force, friction)
+        law
+        for law, force in zip(laws, _forces(laws, magnitudes), strict=True)
+        if _is_same_law(force, friction)
     ]
     assert [law.wording().formula for law in same] == ["sgn(v)"]
 

@@ -48,7 +48,7 @@ ACCURACY = {
     # What is drawn up and shown.
     "_fit_result": {"STRONG", "UNMOVED"},
     "_free_laws": {"ORDER"},
-    "_free_traces": {"ONE_LAW"},
+    "_free_traces": {"SAME_LAW"},
 }
 """Constants that a file compares with to compute accurately, not to decide what the records show."""
 

@@ -246,7 +246,7 @@ def _loop(
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
         beside = beside or trace_free_laws(*thinned(after.estimate, search))
         alternatives = find_alternatives(beside, names, rules)
-    del beside
+    del beside  # the traces are large
     judged = overall_verdict(before, after, len(names), verdict, rules, alternatives)
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.

@@ -1,4 +1,4 @@
-"""The fit: coefficients straight from the time histories of all records together."""
+"""The fit: coefficients linear from the time histories of all records together."""
 
 import dataclasses
 import math
@@ -143,14 +143,14 @@ def fit_by_output(
         return estimate(simulator_for(start, campaign, noise, integrator), start, places, search)
 
     found = fit_from(model)
-    straight = _linear_part(model, places)
-    if not is_successful(found.result) and straight.parameters != model.parameters:
+    linear = _linear_part(model, places)
+    if not is_successful(found.result) and linear.parameters != model.parameters:
         diverges = found.result == RESULTS.not_finite
         why = (
             "simulation from the start values diverges" if diverges else "search from the start values fails"
         )
         search.progress(f"the {why}: again from their linear part")
-        again = fit_from(straight)
+        again = fit_from(linear)
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
     return _with_less_noise(complete(found, model, campaign, noise), search)

@@ -109,8 +109,8 @@ def explain_remainder(
     whole = fit.estimate
     thin, coarser = thinned(whole, search)
     # Of noise that is not as it was measured no law's significance is known.
-    forced = is_good(fit, rules) or not leaves_noise(fit, rules)
-    found = matching_pursuit(trace_free_laws(thin, coarser), rules) if forced else no_laws(thin)
+    noise_alone = leaves_noise(fit, rules) and not is_good(fit, rules)
+    found = no_laws(thin) if noise_alone else matching_pursuit(trace_free_laws(thin, coarser), rules)
     refitted = _refitted_goodness(thin, found, coarser) if refit and found.laws else float("nan")
     pursuit = found._replace(
         chi2_per_dof=chi2_per_dof_of_all(found.chi2_per_dof, thin, whole),

@@ -16,8 +16,8 @@ from ._projection import Projection, project
 _AWAY = np.array([-1.0, -0.7, -0.4, 0.4, 0.7, 1.0])
 """Shares of the largest motion at which laws are compared: far from where their jumps are rounded."""
 
-_ONE_LAW = 1e-3
-"""Lack of correlation there that rounding explains."""
+_SAME_LAW = 1e-3
+"""Lack of correlation there of two laws that differ in their rounding alone."""
 
 
 class FreeTraces(NamedTuple):
@@ -54,8 +54,10 @@ def trace_free_laws(fitted: Estimate, search: Search) -> FreeTraces:
     units = np.array([1e-3 * law.typical_strength(search.scales) for law in laws])
     traces = project(fitted, laws, units)
     known = _forces([one for one in fitted.model.elements if one.splits], search.scales)
-    own = [any(_is_one(force, other) for other in known) for force in _forces(laws, search.scales)]
-    return FreeTraces(fitted, laws, units, traces._replace(visibility=np.where(own, 0.0, traces.visibility)))
+    already = [any(_is_same_law(force, other) for other in known) for force in _forces(laws, search.scales)]
+    return FreeTraces(
+        fitted, laws, units, traces._replace(visibility=np.where(already, 0.0, traces.visibility))
+    )
 
 
 def _forces(elements: Sequence[AbstractElement], scales: Scales) -> list[Float[np.ndarray, " point"] | None]:
@@ -73,8 +75,10 @@ def _forces(elements: Sequence[AbstractElement], scales: Scales) -> list[Float[n
     return [force(element) for element in elements]
 
 
-def _is_one(force: Float[np.ndarray, " point"] | None, other: Float[np.ndarray, " point"] | None) -> bool:
+def _is_same_law(
+    force: Float[np.ndarray, " point"] | None, other: Float[np.ndarray, " point"] | None
+) -> bool:
     """Say whether two forces are one law but for how their jumps are rounded."""
     if force is None or other is None:
         return False
-    return bool(abs(np.mean(force * other)) > 1.0 - _ONE_LAW)
+    return bool(abs(np.mean(force * other)) > 1.0 - _SAME_LAW)
