@@ -159,6 +159,7 @@ def run_one(task: tuple[int, str, str], reports: bool) -> Row:
         * generator(seed, law, drive, str(level), "noise").standard_normal(one.size)
         for one, level in zip(motions, levels, strict=True)
     ]
+    measured = [one + error for one, error in zip(motions, errors, strict=True)]
     near = moved(plant._replace(damping_ratio=(1.0 + OFF) * plant.damping_ratio), drives)
     parts = {"fit": slice(0, 3), "holdout": slice(3, 4)}
     off = [one - other for one, other in zip(near, motions, strict=True)]
@@ -170,10 +171,9 @@ def run_one(task: tuple[int, str, str], reports: bool) -> Row:
         "numbers": plant.numbers,
         "units": units,
         "rms": [float(np.std(one)) for one in motions],
-        "noise": {role: share_of(errors[part], motions[part]) for role, part in parts.items()},
-        "reach": {role: share_of(off[part], motions[part]) for role, part in parts.items()},
+        "noise": {role: share_of(errors[part], measured[part]) for role, part in parts.items()},
+        "reach": {role: share_of(off[part], measured[part]) for role, part in parts.items()},
     }
-    measured = [one + error for one, error in zip(motions, errors, strict=True)]
 
     def write(folder: Path) -> Path:
         return write_records(folder, drive, units, levels, drives, measured)
