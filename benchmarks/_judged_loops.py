@@ -97,10 +97,15 @@ def _said_of(loop: Loop) -> Row:
         "chi2_per_dof": [_finite(fit.stats.chi2 / fit.stats.dof) for fit in (loop.before, after)],
         "before": _errors(loop.before),
         "after": _errors(after),
-        "coefficients": {
-            name: [_finite(float(after.model[name])), _finite(error)]
-            for name, error in after.standard_errors.items()
-        },
+        "declared": _coefficients(loop.before),
+        "coefficients": _coefficients(after),
+    }
+
+
+def _coefficients(fit: Fit) -> dict[str, tuple[float | None, float | None]]:
+    """Give each fitted coefficient and its standard error."""
+    return {
+        name: (_finite(float(fit.model[name])), _finite(error)) for name, error in fit.standard_errors.items()
     }
 
 
