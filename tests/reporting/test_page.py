@@ -81,6 +81,11 @@ def test_pictures_are_png_of_some_size(page):
         assert len(data) > 5000
 
 
+def test_every_picture_is_drawn(page, plain_page):
+    for content in (page, plain_page):
+        assert "could not be drawn" not in content
+
+
 def test_at_most_nine_hundred_words_stand_before_the_folds(page, plain_page):
     for content in (page, plain_page):
         assert 150 < len(" ".join(read(content).shown).split()) <= 900

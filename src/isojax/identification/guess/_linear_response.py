@@ -7,12 +7,13 @@ from jaxtyping import Complex, Float
 from scipy import signal
 
 from ..._show import shown
-from ...records import Record
+from ...records import Record, excited_band
 from ._circle_fit import CircleFit, fit_circle
 from ._motion import Motion
 
 _DRIVEN = 1e-3
-"""Power density of the drive, over its largest, below which a line is not driven."""
+"""Power density of the drive, over its largest, below which a line is not driven: nor is one outside of the
+excited band, where the means of segments leak into the first lines."""
 
 
 @shown
@@ -45,7 +46,8 @@ def linear_response(
     """Estimate the linear receptance of a record by Welch's method.
 
     H1 = S_FX/S_FF: noise in the response averages out, noise in the force does not. It comes from the
-    acceleration, divided by -omega^2, which avoids the drift of an integrated displacement.
+    acceleration, divided by -omega^2, which avoids the drift of an integrated displacement. Noise grows
+    without bound where nothing is driven: there are no lines there.
 
     Args:
         record: the record; of a periodic drive each period is one segment without a window, hence without
@@ -68,7 +70,8 @@ def linear_response(
     frequency, cross = signal.csd(force, motion.acceleration, **options)
     _, drive = signal.welch(force, **options)
     _, response = signal.welch(motion.acceleration, **options)
-    live = (frequency > 0) & (drive > _DRIVEN * np.max(drive))
+    band = excited_band(record)
+    live = (frequency >= band.lowest) & (frequency <= band.highest) & (drive > _DRIVEN * np.max(drive))
     frequency, cross, drive, response = frequency[live], cross[live], drive[live], response[live]
     receptance = cross / drive / -((2 * np.pi * frequency) ** 2)
     tiny = np.finfo(float).tiny

@@ -2,8 +2,9 @@
 
 In: a closed loop with its data health, or a stability map. Out: report.html, result.json, model.json,
 tables for rich, map.npz with its pictures. Read `_summary.py` (terminal), `_result.py` (numbers),
-`_pictures.py` and `_page.py` (HTML), `_write.py` (which files, whole or not at all), the two files on
-maps, `_inspection.py`, and `_plain.py` (files and maps as JSON).
+`_pictures.py` and `_page.py` (HTML), `_or_a_line.py` (pictures that cannot be drawn), `_write.py` (which
+files, whole or not at all), the two files on maps, `_inspection.py`, and `_plain.py` (files and maps as
+JSON).
 """
 
 from ._inspection import inspection_summary as inspection_summary

@@ -9,7 +9,8 @@ from ..._quantities import CONDITIONS
 from ..._results import is_successful
 from ...identification import ClassicalGuess, Loop, MeasuredResponse, measured_receptance
 from ...models import HALF_WIDTH, Estimated, fit_at
-from ...records import Campaign, excited_band
+from ...records import Campaign
+from ...records.spectrum import driven_range
 from ...stability import ResponseBands, response_bands
 from ..plots import drive_unit, median_drive, quantity
 from ..words import typeset_number, typeset_with_error
@@ -112,13 +113,19 @@ def _sines(
         lines: tuple[str, ...] = ()
     else:
         driven = [one for one in campaign.records if not one.rings_down and np.any(one.input)]
-        if not driven or not guess.linear:
+        # A line counts as far as the drive explains it: noise over the square of a low frequency is large.
+        resonances = [
+            one.frequency[np.argmax(one.coherence * np.abs(one.receptance))]
+            for one in guess.linear
+            if one.frequency.size
+        ]
+        if not driven or not resonances:
             return "no record is driven for longer than a blow, so that no drive amplitude is known"
         amplitudes = [float(np.sqrt(2.0) * np.std(one.input[one.settle :])) for one in driven]
-        ends = [excited_band(one) for one in driven]
-        peak = np.median([one.frequency[np.argmax(np.abs(one.receptance))] for one in guess.linear])
-        low, high = min(one.lowest for one in ends), max(one.highest for one in ends)
-        band = max(low, float(peak) / _AROUND), min(high, float(peak) * _AROUND)
+        lowest, highest = zip(*(driven_range(one) for one in driven), strict=True)
+        low, high = min(lowest) / _WIDER, max(highest) * _WIDER
+        peak = min(max(float(np.median(resonances)), low), high)  # of a blow it may lie beyond the drives
+        band = max(low, peak / _AROUND), min(high, peak * _AROUND)
         lines = (
             "The records have no dwells: the curves are those of sines with the rms of the measured drives.",
         )

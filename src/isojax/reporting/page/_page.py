@@ -33,7 +33,8 @@ from ..words import (
     verdict_sentence,
 )
 from ..words import typeset_with_error as with_error
-from ._identified_response import identified_response
+from ._identified_response import IdentifiedResponse, identified_response
+from ._or_a_line import or_a_line
 from ._pictures import Picture, draw_pictures
 from ._summary import error_rows, parameter_words
 
@@ -74,7 +75,7 @@ def render_pages(content: Mapping[str, Any], *, markdown: bool = False) -> dict[
     if markdown:
         pages["report.md"] = _rendered("report.md.jinja", content)
         pictures = [one for name, some in content.items() if name.endswith("_pictures") for one in some]
-        pages |= {picture.file: picture.png for picture in pictures}
+        pages |= {picture.file: picture.png for picture in pictures if picture.png}
     return pages
 
 
@@ -109,7 +110,11 @@ def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
         )
         for effect, (upper, unit) in loop.bounds.items()
     ]
-    response = identified_response(loop)
+    response = or_a_line(
+        "the response of the model",
+        lambda: identified_response(loop),
+        lambda line: IdentifiedResponse((line,)),
+    )
     pictures = draw_pictures(loop, health, response)
     return {
         "title": campaign.title,

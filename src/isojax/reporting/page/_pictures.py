@@ -42,6 +42,7 @@ from ..plots import (
     worst_window,
 )
 from ._identified_response import IdentifiedResponse
+from ._or_a_line import or_a_line
 from ._png import png_bytes
 
 _THIRD, _HALF, _WHOLE, _HEIGHT = 3.8, 4.6, 11.0, 2.9
@@ -55,7 +56,7 @@ class Picture(NamedTuple):
     Attributes:
         name: what it shows, a few words.
         caption: how to read it.
-        png: the file.
+        png: the file; empty where the picture could not be drawn, and the caption says why.
         wide: whether it takes the whole width.
     """
 
@@ -94,7 +95,10 @@ def draw_pictures(
     before = loop.before if is_successful(loop.before.result) else None
     differs = loop.after is not loop.before and is_successful(loop.after.result)
     after = loop.after if differs else None
-    telling = "damping" if before is None else telling_slice(before, after)
+    # The two pictures that need it have a line of their own where it fails.
+    telling: Slice = "damping"
+    if before is not None:
+        telling = or_a_line("the force", lambda: telling_slice(before, after), lambda _: telling)
     return {
         "lead_pictures": () if before is None else _lead_pictures(before, after, telling),
         "response_pictures": _response_pictures(response),
@@ -119,8 +123,17 @@ def _draw(
     """Draw one picture, as a row of its own to join to others."""
     step(f"drawing: {name}")
     size = (_WHOLE if wide else _THIRD, _HEIGHT) if size is None else size
-    ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
-    return (Picture(name, caption, png_bytes(plot(*args, ax=ax, **options)), wide),)
+
+    def draw() -> tuple[Picture, ...]:
+        ax: Axes = Figure(figsize=size, layout="constrained").add_subplot()
+        return (Picture(name, caption, png_bytes(plot(*args, ax=ax, **options)), wide),)
+
+    return _or_why_not(name, draw)
+
+
+def _or_why_not(name: str, draw: Callable[[], tuple[Picture, ...]]) -> tuple[Picture, ...]:
+    """Draw pictures; one without a file where that fails."""
+    return or_a_line(name, draw, lambda line: (Picture(name, line, b""),))
 
 
 def _lead_pictures(before: Fit, after: Fit | None, telling: Slice) -> tuple[Picture, ...]:
@@ -129,17 +142,25 @@ def _lead_pictures(before: Fit, after: Fit | None, telling: Slice) -> tuple[Pict
         caption = "The worst dwell, averaged over its cycles: noise averages out, a missing force remains."
         residuals = _draw("residual over the cycle", caption, plot_cycle_residual, before, after)
     else:
-        place, low, high = worst_window(before)
-        where = {"record": place, "window": (low, high)}
         caption = "Measured minus model, where the error before is largest."
-        residuals = _draw("largest residual", caption, plot_residual, before, after, **where)
-    left, right = residual(before), None if after is None else residual(after)
+        residuals = _draw("largest residual", caption, _plot_worst, plot_residual, before, after)
     caption = "Inside the band, the residual is uncorrelated with the drive."
     return (
         *residuals,
         *_restoring_force(before, after, telling),
-        *_draw("cross-correlation", caption, plot_correlation, left, right, what="drive"),
+        *_draw("cross-correlation", caption, _plot_correlation, before, after, what="drive"),
     )
+
+
+def _plot_worst(plot: Callable[..., Figure], before: Fit, after: Fit | None, **options: Any) -> Figure:
+    """Draw a record where the error before is largest."""
+    place, low, high = worst_window(before)
+    return plot(before, after, record=place, window=(low, high), **options)
+
+
+def _plot_correlation(before: Fit, after: Fit | None, **options: Any) -> Figure:
+    """Draw the correlation of what the fits leave of the records."""
+    return plot_correlation(residual(before), None if after is None else residual(after), **options)
 
 
 def _restoring_force(before: Fit, after: Fit | None, what: Slice) -> tuple[Picture, ...]:
@@ -191,7 +212,7 @@ def _evidence_pictures(loop: Loop) -> tuple[Picture, ...]:
             options = {"effect": effect, "indistinguishable": others, "wide": True}
             size = _WHOLE, 1.3 + 0.27 * min(10, max(3, len(ranking)))
             pictures += _draw(name, caption, plot_ranking, ranking, size=size, **options)
-    return tuple(pictures) + _effect_pictures(loop)
+    return (*pictures, *_or_why_not("each effect by itself", lambda: _effect_pictures(loop)))
 
 
 def _remainder_pictures(loop: Loop) -> tuple[Picture, ...]:
@@ -245,22 +266,12 @@ def _motion(loop: Loop) -> tuple[float, float, float]:
 
 def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
     """Draw the worst record against the models, and the residuals."""
-    place, low, high = worst_window(before)
     caption = "Free run: the record with the largest error before."
     zoomed = "The same record at the cycles with the largest error before."
-    left, right = residual(before), None if after is None else residual(after)
     return (
-        *_draw("time history", caption, plot_time_history, before, after, record=place, wide=True),
-        *_draw("zoom", zoomed, plot_time_history, before, after, record=place, window=(low, high)),
-        *_draw(
-            "residual there",
-            "Measured minus model.",
-            plot_residual,
-            before,
-            after,
-            record=place,
-            window=(low, high),
-        ),
+        *_draw("time history", caption, plot_time_history, before, after, wide=True),
+        *_draw("zoom", zoomed, _plot_worst, plot_time_history, before, after),
+        *_draw("residual there", "Measured minus model.", _plot_worst, plot_residual, before, after),
         *_draw(
             "residual of each dwell",
             "1 means noise alone. A trend over frequency hints at the missing effect.",
@@ -268,13 +279,13 @@ def _record_pictures(before: Fit, after: Fit | None) -> tuple[Picture, ...]:
             before,
             after,
         ),
-        *_draw("residual", "Whole record, one scale.", plot_residual, before, after, record=place),
+        *_draw("residual", "Whole record, one scale.", plot_residual, before, after),
         *_draw(
             "autocorrelation",
             "Fitted records; white noise stays inside the band.",
-            plot_correlation,
-            left,
-            right,
+            _plot_correlation,
+            before,
+            after,
         ),
     )
 

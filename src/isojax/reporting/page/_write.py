@@ -23,10 +23,12 @@ MODEL_FILES = ("model.json", "fit.json", "fit.txt", "report.html", "result.json"
 def write_report(
     loop: Loop, folder: str | Path, health: CampaignHealth | None = None, *, markdown: bool = False
 ) -> None:
-    """Write report.html, result.json, model.json and fit.json; all is ready before the first is written.
+    """Write result.json, model.json and fit.json, and then, once its pictures are drawn, report.html.
 
-    Where the last fit failed there is no model: neither of the last two is written, and those of before are
-    removed. So are the other files that isojax wrote there: they belong to another run.
+    The numbers are there whatever becomes of the pictures; one that cannot be drawn is a line of the report.
+
+    Where the last fit failed there is no model: model.json and fit.json are not written, and those of before
+    are removed. So are the other files that isojax wrote there: they belong to another run.
 
     Args:
         loop: the closed loop.
@@ -40,13 +42,15 @@ def write_report(
     """
     folder = check_folder(folder)
     health = campaign_health(loop) if health is None else health
-    texts = {
+    numbers = {
         "model.json": model_text(loop.after),
         "fit.json": fit_text(loop.after),
-        **render_pages(page_content(loop, health), markdown=markdown),
         "result.json": json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n",
     }
-    write_model_files(folder, texts)
+    write_model_files(folder, numbers)
+    pages = render_pages(page_content(loop, health), markdown=markdown)
+    # All of them again: what a full disk does not take is then whole in another place.
+    write_model_files(folder, {**numbers, **pages})
 
 
 def model_text(fit: Fit) -> str | None:
