@@ -4,9 +4,10 @@ Run `python benchmarks/building.py`. A row is added to `results/building.jsonl`,
 the figures of the last run again. The data are looked for in ISOJAX_DATA, else in ../shared/data beside the
 repository.
 
-The acceleration `u` of the table is the input, the displacement `d1` on the bearings, relative to the table,
-the output. The mass is 1 kg, since only ratios to the mass count. A linear spring and a linear damper are declared. ICA50 and ICA100 are fitted,
-CNP100 is held out. The records are filtered, so that the floor of their spectra does not show the noise.
+The acceleration `u` of the table is the input, the displacement `d1` on the bearings, relative to the
+table, the output. The mass is 1 kg, since only ratios to the mass count. A linear spring and a linear
+damper are declared. ICA50 and ICA100 are fitted, CNP100 is held out. The records are filtered, so that the
+floor of their spectra does not show the noise.
 
 Least squares of free runs in SciPy leave these errors over the rms of each record:
 
