@@ -108,7 +108,7 @@ class Loop:
     @cached_property
     def remainder(self) -> Remainder | None:
         """What the last fit leaves; None where the verdict claims no remainder, or the fit failed."""
-        asked = self.verdict in ("unexplained", "partly_explained")
+        asked = self.verdict in ("unexplained", "partly_explained") and self.after.innovations is None
         if not (asked and is_successful(self.after.result) and self.after.estimate.point.is_finite):
             return None
         return explain_remainder(self.after, rules=self.rules)
@@ -233,7 +233,10 @@ def _loop(
     extensions, (verdict, beside) = search_effects(before, search, max_iterations, excluded)
     if extensions:
         progress(Stage("search for separating experiments", _EXPERIMENT, (_LAWS, _RUNS)))
-        extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
+        extensions = tuple(
+            step if step.after.innovations is not None else with_separating_experiment(step, rules)
+            for step in extensions
+        )
     after = extensions[-1].after if extensions else before
     if not is_successful(after.result):
         verdict = _without_evidence(after)
@@ -242,7 +245,7 @@ def _loop(
         verdict = verdict._replace(verdict="unexplained", reason=reason)
     names = tuple(finding.effect for finding in findings_in(after.model, extensions))
     alternatives: tuple[Alternatives, ...] = ()
-    if names and is_successful(after.result):
+    if names and is_successful(after.result) and after.innovations is None:
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
         beside = beside or trace_free_laws(*thinned(after.estimate, search))
         alternatives = find_alternatives(beside, names, rules)
@@ -278,7 +281,7 @@ def search_effects(
     and the search goes on from there.
     """
     extensions, last = _grow(before, search, max_iterations, excluded)
-    if len(extensions) < 2:
+    if len(extensions) < 2 or before.innovations is not None:
         return extensions, last
     whole = extensions[-1].after.estimate
     final, coarser = thinned(whole, search)
@@ -355,6 +358,11 @@ def doubt_of(
         stands out of them; whether they hold a tone that is not locked to the drive; "" where nothing speaks
         against it.
     """
+    if final.innovations is not None:
+        worse = final.errors["holdout"] is not None and not (
+            final.errors["holdout"].nrmse <= before.errors["holdout"].nrmse
+        )
+        return "worse" if worse and not final.innovations.is_noise else ""
     tone: Doubt = "" if unlocked_tone(final, rules) is None else "a tone"
     other: Doubt = tone if last.law is None else "a further law"
     if any(one.better is not None for one in alternatives):
@@ -389,4 +397,6 @@ def overall_verdict(
     if findings <= rules.most_at_once and is_good(final, rules):
         return "partly_explained" if doubt_of(before, final, last, rules, alternatives) else "found"
     explained = 1.0 - found.excess / max(first.excess, 1.0)
+    if final.innovations is not None:
+        explained = 1.0 - (final.nrmse / before.nrmse) ** 2
     return "partly_explained" if explained >= 1.0 - rules.smallest_share else "unexplained"

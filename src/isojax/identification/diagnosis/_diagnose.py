@@ -29,6 +29,7 @@ from ..fitting import (
 )
 from ..traces import FreeTraces, SelectedLaw, matching_pursuit, trace_free_laws
 from ._bounds import upper_bounds
+from ._by_innovations import diagnose_innovations
 from ._candidate_refits import Case, refit_candidates
 from ._evidence import by_evidence, rank_candidates, ranked_first, smallest_inflation
 from ._findings import Candidate, Finding, Verdict
@@ -61,6 +62,8 @@ def is_good(fit: Fit, rules: Rules) -> bool:
         Whether chi2/dof, by the noise that the output shows, is near one and what is left is no more locked
         to the drive than noise and the declared error of the response are.
     """
+    if fit.innovations is not None:
+        return fit.innovations.is_noise or fit.innovations.model.splits and _ratio(fit) <= rules.good
     return max(_ratio(fit), fit.noise.excess) <= rules.good and not is_locked(fit, rules)
 
 
@@ -133,6 +136,8 @@ def diagnose_with(
     if not fit.estimate.point.is_finite:
         reason = f"The fit failed, so that there is nothing to diagnose. {RESULTS[fit.result]}"
         return Diagnosis(Verdict("unexplained", None, (), (), float("nan"), (), {}, None, reason))
+    if fit.innovations is not None:
+        return Diagnosis(diagnose_innovations(search, fit, significance, excluded))
     case = case_of(search, fit, significance, excluded)
     return weigh_refits(case, refit_candidates(case))
 

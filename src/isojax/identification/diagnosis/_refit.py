@@ -48,9 +48,9 @@ def refit_candidate(test: ScoreTest, index: int, search: Search) -> Estimate:
     """Fit the model with one absent effect, everything free, from the linear step that the score gives."""
     fitted, score = test.fitted, test.scores[index]
     best: tuple[float, Isolator, Nuisances] | None = None
-    places = _free_places(fitted, fitted.model.with_elements(score.element))
+    places = new_places(fitted, fitted.model.with_elements(score.element))
     for share in STEP_SHARES:
-        model = _extended(fitted, score.element, share * score.strength, share * test.steps[index])
+        model = extended_model(fitted, score.element, share * score.strength, share * test.steps[index])
         old, new = fitted.point.nuisances, test.nuisances[index]
         motion = old.states[:, :2] + share * (new.states[:, :2] - old.states[:, :2])
         # Internal states start where the measured motion puts them.
@@ -90,7 +90,7 @@ def refit_from(fitted: Estimate, model: Isolator, search: Search, far: bool = Fa
     Returns:
         The refit.
     """
-    places, search = _free_places(fitted, model), rough(search, fitted)
+    places, search = new_places(fitted, model), rough(search, fitted)
     if far and fitted.problem.heads:
         # Windows have a chi2 of their own, and linear steps over whole records promise nothing.
         search = search._replace(rival=None)
@@ -133,7 +133,7 @@ def least_difference(found: Estimate, rules: Rules) -> float:
     return max(rules.close_bic, rules.smallest_gain * found.dof * found.problem.thinned)
 
 
-def _free_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
+def new_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
     """Give the free coefficients of a model that shares some with a fitted one: those, and what is new."""
     known = {entry.name for entry in list_parameters(fitted.model)}
     return tuple(
@@ -143,7 +143,7 @@ def _free_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
     )
 
 
-def _extended(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
+def extended_model(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
     """Give the model with the effect at a strength, the fitted coefficients moved by a step."""
     own = [name for name, _ in own_parameters(element)]
     for old in fitted.model.elements:

@@ -29,9 +29,11 @@ from ._errors import Run as Run
 from ._errors import run_freely as run_freely
 from ._estimate import Estimate as Estimate
 from ._estimate import estimate as estimate
+from ._estimate import magnitudes as magnitudes
 from ._fit import complete as complete
 from ._fit import fit as fit
 from ._fit import fit_by_output as fit_by_output
+from ._fit import fit_with_errors as fit_with_errors
 from ._fit import weighted_by_output as weighted_by_output
 from ._fit import weighted_by_residual as weighted_by_residual
 from ._fit_result import Fit as Fit

@@ -17,9 +17,11 @@ from ...models import Integrator, Isolator, Modelled, as_isolator, check_integra
 from ...records import Campaign, NoiseEstimate, estimate_noise, refuse_contradictions
 from .._rules import Rules
 from ..guess import as_campaign, classical_guess
+from ..innovations import ErrorFit
 from ._build_problem import build_problem
 from ._estimate import Estimate, estimate, free_places
 from ._evaluation import Evaluation
+from ._fit_of_errors import as_fit_of_errors, fit_errors_of, noise_of_errors, suits_innovations
 from ._fit_result import Fit
 from ._integration_steps import find_integrator
 from ._noise_left import less_noise, noise_left
@@ -29,6 +31,9 @@ from ._simulator import Simulator
 
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
+
+_NEAR = 1.3
+"""chi2/dof below which a search without a random force has explained the records."""
 
 _WEIGHINGS = 4
 """Times that a fit is weighted anew by less noise."""
@@ -133,6 +138,8 @@ def fit_by_output(
     """
     places = free_places(model, (), None, campaign.mass_free) if places is None else places
     noise = estimate_noise(campaign)
+    if integrator is None and suits_innovations(campaign):
+        return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
         raise ValueError(
             f"{campaign.file}: the noise of the output must be above 0, but the records, so short or so "
@@ -154,6 +161,37 @@ def fit_by_output(
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
     return _with_less_noise(complete(found, model, campaign, noise), search)
+
+
+def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search: Search) -> Fit:
+    """Make a fit of a model that was fitted together with the sizes of its errors.
+
+    Where noise of the output is the only error, a search without a random force ends it: initial states are
+    then exact, and laws that jump are split where they do.
+
+    Args:
+        found: the model with the sizes of its errors.
+        start: the isolator that the search started from.
+        campaign: the measurements.
+        search: how to search.
+
+    Returns:
+        The fit.
+    """
+    whole = as_fit_of_errors(found, start, campaign)
+    if not (found.is_noise_of_output or found.model.splits):
+        return whole
+    noise = noise_of_errors(found, campaign)
+    simulator = simulator_for(found.model, campaign, noise, None)
+    plain = complete(estimate(simulator, found.model, found.places, search), start, campaign, noise)
+    if is_successful(plain.result) and (found.is_noise_of_output or is_near(plain)):
+        return plain._replace(innovations=found)
+    return whole
+
+
+def is_near(found: Fit) -> bool:
+    """Say whether a fit leaves about as much as the noise that its output shows."""
+    return found.stats.chi2 < _NEAR * found.stats.dof
 
 
 def _with_less_noise(found: Fit, search: Search) -> Fit:
@@ -184,6 +222,8 @@ def weighted_by_residual(found: Fit, search: Search) -> Fit:
     Returns:
         The fit; `found` itself where its residual is locked to the drive or shows the same noise.
     """
+    if found.innovations is not None:
+        return found
     left = noise_left(found.estimate, found.campaign, found.noise, search.rules)
     if left is None:
         return found
@@ -201,7 +241,7 @@ def weighted_by_output(found: Fit, search: Search) -> Fit:
     Returns:
         The fit, as `fit_by_output` weighs it.
     """
-    if found.noise.method != "residual":
+    if found.noise.method != "residual" or found.innovations is not None:
         return found
     return _with_less_noise(_weighted_by(found, estimate_noise(found.campaign), search), search)
 

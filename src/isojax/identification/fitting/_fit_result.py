@@ -13,6 +13,7 @@ from ..._results import RESULTS, is_successful, name_of_result
 from ..._show import LINES, Row, shown
 from ...models import Isolator, NormalMixture
 from ...records import Campaign, NoiseEstimate, brief_blows
+from ..innovations import ErrorFit
 from ._coefficients import Coefficient, Coefficients
 from ._errors import Errors, Restarts, Run
 from ._estimate import Estimate
@@ -46,6 +47,7 @@ class Fit(NamedTuple):
         result: how the search ended.
         estimate: the equations at the solution.
         evaluation: the model compared with every record, fitted and held out, when first asked for.
+        innovations: the same model with the sizes of its errors, where records have no dwells; else None.
     """
 
     model: Isolator
@@ -58,6 +60,7 @@ class Fit(NamedTuple):
     result: RESULTS
     estimate: Estimate
     evaluation: Evaluation
+    innovations: ErrorFit | None = None
 
     @property
     def mixture(self) -> NormalMixture | None:

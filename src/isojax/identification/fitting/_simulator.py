@@ -6,7 +6,7 @@ from jaxtyping import Float
 from ..._kept import recall
 from ..._parameters import element_names, list_parameters
 from ...models import Isolator
-from ..jacobian import Prepared, Unknowns, information, internal_starts, prepare, score_information
+from ..jacobian import Prepared, Tables, Unknowns, information, internal_starts, score_information
 from ._elimination import Nuisances, Spread, eliminate
 from ._problem import Point, Problem
 
@@ -31,13 +31,20 @@ class Simulator:
         self.problem = problem
         self.at_rest = at_rest
         self._heads = Simulator(problem._replace(segments=problem.heads, heads=())) if problem.heads else None
-        self._prepared: dict[tuple[int, float, float], Prepared] = {}
+        self._tables = Tables(
+            problem.records,
+            problem.segments,
+            problem.quantity,
+            problem.hold,
+            problem.integrator,
+            problem.whitening,
+        )
         self._internal: dict[str, Float[np.ndarray, "2 internal lanes"]] = {}
         self._last: tuple[tuple[np.ndarray, ...], Float[np.ndarray, "lanes column column"]] | None = None
 
     def forget(self) -> None:
         """Drop the batches, which are large; they are made again when they are next asked for."""
-        self._prepared.clear()
+        self._tables.forget()
         if self._heads is not None:
             self._heads.forget()
 
@@ -54,32 +61,7 @@ class Simulator:
         Raises:
             ValueError: if an effect follows signals that no record has.
         """
-        for element in model.elements:
-            element.check_record()
-        problem = self.problem
-        steps = problem.integrator.table_steps(
-            Isolator(model.mass, model.elements[:carried], model.excitation)
-        )
-        key = (steps, float(model.shift()), float(model.skew()))
-        channels = set(model.channels)
-        known = set(self._prepared[key].batches[0].channels) if key in self._prepared else set()
-        if key not in self._prepared or not channels <= known:
-            # What is known already stays known: the tables serve models with and without their followers.
-            self._prepared.clear()
-            self._prepared[key] = prepare(
-                problem.records,
-                problem.segments,
-                quantity=problem.quantity,
-                hold=problem.hold,
-                substeps=steps,
-                shift=key[1],
-                skew=key[2],
-                based=model.excitation == "base_acceleration",
-                channels=tuple(sorted(channels | known)),
-                integrator=problem.integrator,
-                whitening=problem.whitening,
-            )
-        return self._prepared[key]
+        return self._tables.prepared(model, carried)
 
     def starts(
         self, model: Isolator, prepared: Prepared, carried: int | None = None

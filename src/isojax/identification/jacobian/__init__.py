@@ -8,6 +8,7 @@ diffrax solver with its tolerances) with `_whitening`, `_unknowns`, `_families`,
 `_transitions` and `_propagation`.
 """
 
+from ._batch import Batch as Batch
 from ._batch import Prepared as Prepared
 from ._batch import coordinate_motion as coordinate_motion
 from ._batch import prepare as prepare
@@ -21,6 +22,8 @@ from ._families import follow_motion as follow_motion
 from ._information import information as information
 from ._information import readings as readings
 from ._internal_states import internal_starts as internal_starts
+from ._score_columns import PIECES as PIECES
+from ._score_columns import Followed as Followed
 from ._score_columns import score_information as score_information
 from ._segments import SHORTEST as SHORTEST
 from ._segments import Segment as Segment
@@ -28,6 +31,7 @@ from ._segments import cut_evenly as cut_evenly
 from ._segments import cut_segments as cut_segments
 from ._segments import segments_between as segments_between
 from ._segments import slowest_decay as slowest_decay
+from ._tables import Tables as Tables
 from ._unknowns import STIFFNESS_SCALE_UNIT as STIFFNESS_SCALE_UNIT
 from ._unknowns import Unknowns as Unknowns
 from ._unknowns import has_stiffness_scale as has_stiffness_scale

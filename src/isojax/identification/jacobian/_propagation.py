@@ -107,6 +107,7 @@ def respond(
     direct: Float[Array, "time column lanes"],
     starts: Float[Array, "state column lanes"],
     weight: Float[Array, "time lanes"],
+    gains: tuple[Float[Array, "time lanes"], ...] = (),
 ) -> Float[Array, "time column lanes"]:
     """Carry some columns from sample to sample.
 
@@ -118,6 +119,7 @@ def respond(
         direct: what the columns do to the reading at once.
         starts: where they begin.
         weight: of each reading.
+        gains: by which a filter corrects each state by what is read; none of a simulation.
 
     Returns:
         What the weighted reading does.
@@ -127,7 +129,9 @@ def respond(
 
     def body(carry: tuple, table: tuple) -> tuple[tuple, Float[Array, "column lanes"]]:
         d, (before, now, ahead), pending = carry
-        place, by, seen, at_once, weigh = table
+        place, by, seen, at_once, weigh, gain = table
+        reading = sum((one * slope[None] for one, slope in zip(d, seen, strict=True)), start=at_once)
+        d = (*(one - k[None] * reading for one, k in zip(d, gain, strict=False)), *d[len(gain) :])
         # All in one pass: tables of what pushes each sample would cost more than the pushing.
         after = jax.lax.dynamic_index_in_dim(forcing, jnp.minimum(place + 2, last), 1, keepdims=False)
         kick = None if kicks is None else jax.lax.dynamic_index_in_dim(kicks, place, 1, keepdims=False)
@@ -139,11 +143,10 @@ def respond(
                 for column, rate in enumerate(rates):
                     pushed = pushed + matrix[row][column + 1][None] * rate
             moved.append(sum((f[None] * one for f, one in zip(onward, d, strict=True)), start=pushed))
-        reading = sum((one * slope[None] for one, slope in zip(d, seen, strict=True)), start=at_once)
         if splits:
             reading, pending = reading + moved[size] + pending, moved[size + 1]
         return (tuple(moved[:size]), (now, ahead, after), pending), reading * weigh[None]
 
     window = forcing[:, 0], forcing[:, 0], forcing[:, 1]
-    tables = jnp.arange(last + 1), propagation, readings, direct, weight
+    tables = jnp.arange(last + 1), propagation, readings, direct, weight, gains
     return jax.lax.scan(body, (tuple(starts), window, jnp.zeros_like(starts[0])), tables)[1]

@@ -8,13 +8,15 @@ Compiled code depends on the model, on the kind of an effect, or on neither, and
 along with which model.
 """
 
+import dataclasses
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -27,7 +29,7 @@ from ._effect_inputs import input_columns
 from ._families import ElementFamily, find_families, in_turn, stack_states
 from ._information import find_stepping
 from ._propagation import propagate, respond
-from ._slopes import Change, Slopes, impulse_at_samples, slopes_along
+from ._slopes import Change, Slopes, impulse_at_samples, sample_stages, slopes_along
 from ._transitions import Transitions, transitions_along
 from ._unknowns import STIFFNESS_SCALE_UNIT, Lanes, Unknowns, has_stiffness_scale
 from ._whitening import whitened_products
@@ -39,8 +41,34 @@ _LEAST_COLUMNS = 160
 """Columns for which a table has room at least: absent effects and free force laws, however many, then share
 compiled code."""
 
+PIECES = 10
+"""Pieces of a lane over which the scatter of scores is seen."""
+
+_BY_STAGE = ("drive", "drive_rate", "channels")
+"""Fields of a batch that have a value at each stage of a sample's steps."""
+
 _TOGETHER = 24
 """Columns that one linear solve carries: the last one is filled up, so that all have one shape."""
+
+
+class Followed(NamedTuple):
+    """What a filter makes of the records, in the place of a simulation.
+
+    Attributes:
+        path: states before each sample is seen.
+        gains: by which it corrects each state by an innovation, the random force last.
+        memory: of the random force: its correlation from sample to sample.
+        error: innovations [SI unit of the output].
+        weight: of each, one over its standard deviation.
+        piece: which piece of its record each sample belongs to.
+    """
+
+    path: State
+    gains: State
+    memory: float
+    error: Array
+    weight: Array
+    piece: Array
 
 
 class _Layout(NamedTuple):
@@ -84,7 +112,7 @@ def _layout(unknowns: Unknowns, carried: int) -> _Layout:
 
 
 def score_information(
-    unknowns: Unknowns, carried: int, prepared: Prepared
+    unknowns: Unknowns, carried: int, prepared: Prepared, followed: Sequence[Followed] = ()
 ) -> Float[np.ndarray, "lanes column column"]:
     """Give the information matrix of each segment, absent effects among the columns.
 
@@ -96,9 +124,11 @@ def score_information(
         unknowns: where the simulation stands and its directions.
         carried: count of elements that move the state.
         prepared: the segments.
+        followed: a filter's path along each batch, whose innovations are then the residual; none of a
+            simulation. Initial states then have columns like those of a simulation, which nobody asks for.
 
     Returns:
-        A^T A of each lane, lanes first.
+        A^T A of each lane, lanes first; with a filter, A^T times the residual of each `PIECES` of the lane behind.
     """
     layout = _layout(unknowns, carried)
     size = 2 + layout.model.internal_states
@@ -121,7 +151,7 @@ def score_information(
         for first in range(0, used, width):
             # The last block reaches back, so that all have one shape.
             begin = min(first, lanes - width)
-            some: Any = (batch, scale, states, scales)
+            some: Any = (batch, scale, states, scales, followed[part] if followed else None)
             if blocks > 1:
                 some = jax.tree_util.tree_map(partial(_some_lanes, begin=begin, width=width), some)
             done.append(_block(layout, prepared, columns, part, *some)[first - begin :])
@@ -148,14 +178,23 @@ def _block(
     scale: Array,
     states: State,
     scales: State,
+    followed: Followed | None,
 ) -> Float[np.ndarray, "lanes column column"]:
     """Work out the columns of a few lanes, and multiply them out."""
     model, size, sampling = layout.model, 2 + layout.model.internal_states, prepared.sampling
     stepping, own = find_stepping(prepared), batch.following(model)
     begin = Lanes(model, scale, states[:size])
-    error = (batch.measured - stepping.readings(begin, own, sampling)) * batch.weight
     quantity, step = sampling.quantity, sampling.time
-    path, ringing = stepping.path(begin, own, sampling)
+    if followed is None:
+        weight, gains = batch.weight, ()
+        error = (batch.measured - stepping.readings(begin, own, sampling)) * weight
+        path, ringing = stepping.path(begin, own, sampling)
+    else:
+        weight, gains = followed.weight, followed.gains
+        error, path, ringing = followed.error * weight, followed.path, None
+        # The filter's path has a node a sample.
+        tables = {name: jax.tree.map(sample_stages, getattr(own, name)) for name in _BY_STAGE}
+        own = dataclasses.replace(own, **tables)
     slopes = slopes_along(model, layout.moving, scale, path, ringing, own, quantity)
     lanes, time = scale.shape[0], batch.measured.shape[0]
     table = np.empty((lanes, columns, time))
@@ -164,7 +203,10 @@ def _block(
     exact = None
     if ringing is not None:
         exact = transitions_along(model, layout.moving, scale, path, own.acting, quantity, step)
-    group = _Group(slopes.states, exact, batch.weight, step)
+    by_state = slopes.states
+    if followed is not None:
+        by_state = _with_random_force(slopes, followed.memory, step)
+    group = _Group(by_state, exact, weight, step, gains)
     for source in _sources(layout, step, batch, slopes, exact, states[size:], columns, part):
         group.add(*source)
         if group.is_full:
@@ -177,9 +219,13 @@ def _block(
     if sampling.whitening is not None:
         rows = on_device(table.transpose(2, 1, 0))
         return np.moveaxis(np.asarray(_weigh(rows, batch.weight, sampling.whitening)), -1, 0)
+    other = np.swapaxes(table, 1, 2)
+    if followed is not None:
+        piece = np.asarray(followed.piece).T[..., None] == np.arange(PIECES)
+        other = np.concatenate([other, table[:, -1, :, None] * piece], axis=2)
     # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
-        return table @ np.swapaxes(table, 1, 2)
+        return table @ other
 
 
 def _sources(
@@ -245,11 +291,29 @@ def _sources(
                 yield column, np.asarray(forcing), np.asarray(direct), 0.0
 
 
+def _with_random_force(slopes: Slopes, memory: float, step: float) -> tuple[Change, ...]:
+    """Give the slopes with each state, and with the random force as one more state behind them."""
+    still = jnp.zeros_like(slopes.states[0].reading)
+    pushed = slopes.inputs["recorded"]
+    own = Change(
+        (*(still + rate for rate in pushed.rates), still + np.log(max(memory, 1e-3)) / step),
+        still + pushed.reading,
+    )
+    return (*(Change((*one.rates, still), one.reading) for one in slopes.states), own)
+
+
 class _Group:
     """Columns that wait for one linear solve."""
 
-    def __init__(self, by_state: tuple[Change, ...], exact: Transitions | None, weight: Array, step: float):
-        self.weight = weight
+    def __init__(
+        self,
+        by_state: tuple[Change, ...],
+        exact: Transitions | None,
+        weight: Array,
+        step: float,
+        gains: State = (),
+    ):
+        self.weight, self.gains = weight, gains
         self.propagation = propagate(by_state, step) if exact is None else exact.propagation
         self.readings = tuple(entry.reading for entry in by_state)
         size, (time, lanes) = len(by_state), weight.shape
@@ -274,7 +338,9 @@ class _Group:
     ) -> None:
         """Put a column that is pushed along the motion."""
         place = len(self.columns)
-        self.forcing[:, :, place], self.direct[:, place], self.starts[:, place] = forcing, direct, 0.0
+        rows = np.shape(forcing)[0] if np.ndim(forcing) else len(self.forcing)  # nothing pushes a random force
+        self.forcing[rows:, :, place] = 0.0
+        self.forcing[:rows, :, place], self.direct[:, place], self.starts[:, place] = forcing, direct, 0.0
         if np.ndim(kick):
             # Coefficients of a law that jumps: of one group at most, so that the others carry no such table.
             self.kicks = np.zeros(self.kick_shape) if self.kicks is None else self.kicks
@@ -291,7 +357,9 @@ class _Group:
         if self.columns:
             forcing, direct, starts = map(on_device, (self.forcing, self.direct, self.starts))
             kicks = None if self.kicks is None else on_device(self.kicks)
-            rows = respond(self.propagation, self.readings, forcing, kicks, direct, starts, self.weight)
+            rows = respond(
+                self.propagation, self.readings, forcing, kicks, direct, starts, self.weight, self.gains
+            )
             # Turned here, and not in compiled code, which takes four times as long.
             table[:, self.columns] = np.asarray(rows).transpose(2, 1, 0)[:, : len(self.columns)]
         self.columns, self.kicks = [], None

@@ -1,0 +1,297 @@
+"""The diagnosis of records without dwells: effects weighed by the likelihood of a filter's innovations."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from ...elements import CATALOGUE
+from .._rules import Rules
+from ..fitting import Fit, Search, fit_with_errors, magnitudes
+from ..innovations import ErrorFit, free_squares, refined
+from ._bounds import WIDTH_95, strength_unit
+from ._effect_search import Refit, Score, Scores, Transfer, refit_effect, score_effects, transfer
+from ._findings import Candidate, Finding, Verdict, VerdictWord
+from ._separating_words import is_exact, separating_experiment
+
+MOST_INTERNAL = 4
+"""Internal states of a model that is refitted: the filter's covariance grows with their square."""
+
+_AS_GOOD = 0.1
+"""Larger error of free runs, relative, up to which two models of a model's error are as good."""
+
+_ALIKE = 0.95
+"""Likeness of two traces from which the records hardly distinguish their effects."""
+
+
+class Weighed(NamedTuple):
+    """A candidate that nothing speaks against, and what it takes off records that its refit did not see.
+
+    Attributes:
+        refit: the candidate.
+        transfer: what it takes off.
+    """
+
+    refit: Refit
+    transfer: Transfer
+
+
+def diagnose_innovations(
+    search: Search, fit: Fit, significance: float | None = None, excluded: tuple[str, ...] = ()
+) -> Verdict:
+    """Name the effect that a model lacks, from records without dwells.
+
+    Where the error with the effect is noise, the likelihood decides. Where the error is the model's all the
+    same, an effect is judged by what it takes off the squared error of free runs of records that its refit did
+    not see: innovations are then neither independent nor normal, and their likelihood is too sure.
+
+    Args:
+        search: how to search.
+        fit: the fit, with the sizes of its errors.
+        significance: family-wise level; `rules.significance` if omitted.
+        excluded: catalogue names that are not to be considered.
+
+    Returns:
+        The verdict.
+
+    Source: Kristensen, Madsen & Jorgensen 2004; Gelman, Hwang & Vehtari 2014, Stat. Comput. 24:997.
+    """
+    found, rules = fit.innovations, search.rules
+    assert found is not None
+    level = rules.significance if significance is None else significance
+    scores = score_effects(found, search, excluded)
+    search.progress(f"score test of {len(scores.scores)} absent effects")
+    refits = _refits(found, scores, search)
+    usable = _by_evidence(found, refits, scores, level, rules)
+    reason = "no absent effect is both significant and physical"
+    best: Weighed | None = None
+    for refit in usable:
+        one = Weighed(refit, transfer(found, refit.fit, search))
+        needed = 0.0 if refit.fit.is_noise else rules.smallest_share
+        if one.transfer.deviance > 0.0 and one.transfer.share >= needed:
+            best = one
+            break
+        reason = f"{refit.score.element.name} does not carry over to records left out of its refit"
+    if best is None:
+        return _nothing(found, scores, refits, reason, fit, rules)
+    return _finding(search, fit, scores, refits, best)
+
+
+def _refits(found: ErrorFit, scores: Scores, search: Search) -> list[Refit]:
+    """Refit the effects that the scores ask for, strongest first; then what looks like the best of them."""
+    rules, refits = search.rules, list[Refit]()
+
+    def refit(score: Score) -> None:
+        search.progress(f"refit with {score.element.name}")
+        refits.append(refit_effect(found, score, search))
+
+    asked = [
+        score
+        for score in scores.scores
+        if score.admissible
+        and abs(score.pull) > _least_pull(scores)
+        and found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
+    ]
+    for score in asked[: rules.survivors]:
+        refit(score)
+        if refits[-1].violation is None and refits[-1].fit.is_noise_of_output:
+            break  # nothing can explain more, but another law may explain as much
+    best = min(
+        (one for one in refits if one.violation is None), key=lambda one: one.fit.criterion, default=None
+    )
+    if best is None:
+        return refits
+    alike = _look_alikes(best.score.element.name)
+    place = next(index for index, one in enumerate(scores.scores) if one is best.score)
+    for index, score in enumerate(scores.scores):
+        near = score.element.name in alike or abs(best.score.likeness[index]) > _ALIKE
+        done = any(one.score is score for one in refits)
+        few = found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
+        if near and few and not done and index != place and score.admissible:
+            refit(score)
+    return refits
+
+
+def _least_pull(scores: Scores) -> float:
+    """Give the score below which chance explains the largest of so many."""
+    return float(stats.norm.isf(0.5 * 0.05 / max(1, len(scores.scores))))
+
+
+def _look_alikes(name: str) -> set[str]:
+    """Give the catalogue names of effects that are declared to look like one."""
+    found: set[str] = set()
+    for kind_name, kind in CATALOGUE.items():
+        for alike in kind.look_alikes:
+            group = {kind_name, *alike.others}
+            if name == kind_name or (name in group and alike.among):
+                found |= group
+            elif name in alike.others:
+                found.add(kind_name)
+    return found - {name}
+
+
+def _gain(found: ErrorFit, refit: Refit) -> float:
+    return float(found.deviance.sum() - refit.fit.deviance.sum())
+
+
+def _by_evidence(
+    found: ErrorFit, refits: list[Refit], scores: Scores, level: float, rules: Rules
+) -> list[Refit]:
+    """List the refits that are significant and physical, best first.
+
+    Of those within `close_bic` of each other the one with the fewest coefficients goes first, then the one with
+    the fewest internal states.
+    """
+    dispersion, tests = max(1.0, scores.dispersion), max(1, len(scores.scores))
+    usable = []
+    for refit in refits:
+        extra = len(refit.fit.places) - len(found.places)
+        gain = _gain(found, refit) / dispersion
+        chance = tests * stats.chi2.sf(max(gain, 0.0), max(1, extra))
+        if refit.violation is None and chance < level and gain - extra * np.log(found.samples) > rules.close_bic:
+            usable.append(refit)
+    if any(one.fit.is_noise for one in usable):
+        usable = sorted(usable, key=lambda one: (not one.fit.is_noise, one.fit.criterion))
+        lowest = usable[0].fit.criterion + rules.close_bic
+        tied = [one for one in usable if one.fit.is_noise and one.fit.criterion <= lowest]
+    else:
+        # The error is the model's: what a free run leaves counts, record by record over its size.
+        usable = sorted(usable, key=lambda one: _free_error(one.fit))
+        tied = [one for one in usable if _as_good(one.fit, usable[0].fit)]
+    if not usable:
+        return []
+    first = min(tied, key=lambda one: (len(one.fit.places), one.fit.model.internal_states))
+    return [first, *(one for one in usable if one is not first)]
+
+
+def _free_error(fit: ErrorFit) -> float:
+    """Give the rms error of free runs [SI unit of the output]; infinite where one diverges."""
+    squares = free_squares(fit).sum()
+    return float(np.sqrt(squares / fit.samples)) if np.isfinite(squares) else np.inf
+
+
+def _candidate(score: Score, refits: list[Refit], best: Refit | None, scores: Scores) -> Candidate:
+    refit = next((one for one in refits if one.score is score), None)
+    strength, error, chi2, delta, admissible = score.strength, score.error, np.nan, np.nan, score.admissible
+    element = score.element
+    if refit is not None and np.isfinite(refit.fit.deviance.sum()):
+        own = refit.fit
+        name = f"{element.name}.{element.strength}"
+        place = own.names.index(name)
+        strength = float(own.values[place])
+        inverse = np.linalg.pinv(own.information, hermitian=True)
+        error = float(np.sqrt(max(inverse[place, place], 0.0)))
+        chi2 = own.chi2 / max(1.0, own.samples - len(own.places))
+        delta = np.nan if best is None else own.criterion - best.fit.criterion
+        admissible = admissible and refit.violation is None
+    place = None if best is None else next(i for i, one in enumerate(scores.scores) if one is best.score)
+    return Candidate(
+        element.name,
+        element.words,
+        score.z,
+        score.p_value,
+        score.visibility,
+        strength,
+        error,
+        strength_unit(element),
+        float(chi2),
+        float(delta),
+        0.0 if place is None else float(score.likeness[place]),
+        admissible,
+    )
+
+
+def _ranking(scores: Scores, refits: list[Refit], best: Refit | None) -> tuple[Candidate, ...]:
+    first = [] if best is None else [best.score]
+    others = sorted((one for one in refits if one is not best), key=lambda one: one.fit.criterion)
+    order = [*first, *(one.score for one in others)]
+    order += [one for one in scores.scores if not any(one is other for other in order)]
+    return tuple(_candidate(score, refits, best, scores) for score in order)
+
+
+def _nothing(
+    found: ErrorFit, scores: Scores, refits: list[Refit], reason: str, fit: Fit, rules: Rules
+) -> Verdict:
+    """Word that nothing is named."""
+    good = found.is_noise
+    bounds = {}
+    if good:
+        bounds = {
+            one.element.name: (abs(one.strength) + WIDTH_95 * one.error, strength_unit(one.element))
+            for one in scores.scores
+        }
+    verdict: VerdictWord = "none" if good else "unexplained"
+    words = f"{_error_words(found, fit)} {reason[0].upper()}{reason[1:]}."
+    return Verdict(verdict, None, _ranking(scores, refits, None), (), 1.0, scores.hidden, bounds, None, words)
+
+
+def _error_words(found: ErrorFit, fit: Fit) -> str:
+    """Say what the error of a model is."""
+    if found.is_noise_of_output:
+        return "What the model leaves is noise of the output."
+    size = np.sqrt(found.sizes.variance)
+    unit = "m/s^2" if fit.model.excitation == "base_acceleration" else "N"
+    if found.is_noise:
+        return (
+            f"What the model leaves is noise: that of the output, and noise of {size:.3g} {unit} rms of the drive or "
+            "of a force on the mass, which repeats at equal drive would tell apart."
+        )
+    return (
+        f"The error is the model's and not noise: a force of {size:.3g} {unit} rms on the mass would explain it, "
+        f"and a free run is off by {100.0 * fit.nrmse:.3g} %."
+    )
+
+
+def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best: Weighed) -> Verdict:
+    """Word a finding."""
+    found, rules, refit = fit.innovations, search.rules, best.refit
+    assert found is not None
+    sizes = magnitudes(refit.fit.model, refit.fit.places, search.scales)
+    search.progress("the finding, fitted to the end")
+    fine = refined(refit.fit, sizes)
+    whole = fit_with_errors(fine, fit.model, fit.campaign, search)
+    name = refit.score.element.name
+    free = set(refit.fit.names)
+    names = {one for one in CATALOGUE if f"{one}.{CATALOGUE[one].strength}" in free}
+    limit = refit.fit.criterion + max(rules.close_bic, rules.smallest_gain * found.samples)
+    if not refit.fit.is_noise:
+        limit = np.inf
+    together = tuple(
+        one.score.element.name
+        for one in refits
+        if one is not refit
+        and one.violation is None
+        and (one.fit.criterion <= limit if np.isfinite(limit) else _as_good(one.fit, refit.fit))
+        and name not in CATALOGUE[one.score.element.name].absorbs
+    )
+    exact = tuple(one for one in CATALOGUE if one != name and one not in together and is_exact(name, one, names))
+    together += exact
+    before, after = _free_error(found), _free_error(fine)
+    explained = 1.0 - (after / before) ** 2 if np.isfinite(after) and before > 0.0 else 0.0
+    explained = 1.0 if fine.is_noise else explained
+    good = whole.innovations is None or whole.innovations.is_noise or whole.estimate.inflation < rules.good
+    verdict: VerdictWord = "found" if good else "unexplained"
+    if not good and explained >= 1.0 - rules.smallest_share:
+        verdict = "partly_explained"
+    ranking = _ranking(scores, refits, refit)
+    finding = Finding(
+        name,
+        together,
+        refit.score.p_value,
+        float(np.clip(explained, 0.0, 1.0)),
+        float(np.clip(best.transfer.share, 0.0, 1.0)),
+        ranking,
+        separating_experiment(name, together),
+    )
+    reason = (
+        f"Adding {refit.score.element.words} takes {100.0 * best.transfer.share:.3g} % off the squared error of free "
+        "runs of records left out of its refit."
+        if not refit.fit.is_noise
+        else f"With {refit.score.element.words} what the model leaves is noise."
+    )
+    return Verdict(verdict, finding, ranking, together, 1.0 - explained, scores.hidden, {}, whole, reason)
+
+
+def _as_good(one: ErrorFit, best: ErrorFit) -> bool:
+    """Say whether a model follows the records about as well as another, when nothing is fed back."""
+    return _free_error(one) <= _free_error(best) * (1.0 + _AS_GOOD)

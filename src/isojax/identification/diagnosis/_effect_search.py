@@ -1,0 +1,243 @@
+"""Which absent effect the innovations of a filter ask for: scores, refits, and what carries over."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy import stats
+
+from ..._parameters import list_parameters
+from ...elements import CATALOGUE, AbstractElement
+from ..fitting import Search, magnitudes
+from ..innovations import (
+    ErrorFit,
+    effect_products,
+    first_sizes,
+    fit_errors,
+    fit_measured,
+    free_squares,
+)
+from ..jacobian import effects_without_signal
+from ._admissibility import find_violation
+from ._refit import extended_model, new_places
+from ._score import absent_effects
+
+_SHARES = (1.0, 0.3, 0.1, 0.03)
+"""Shares of the score's linear step at which a refit may start."""
+
+_ROUGH_STEPS = 16
+"""Steps of a refit that is only ranked."""
+
+DISPERSED = 1.5
+"""Variance of scores over what independent innovations give, from which their error is the model's."""
+
+
+class Score(NamedTuple):
+    """What the innovations say of an absent effect, before any refit.
+
+    Attributes:
+        element: the effect at zero strength, with the shape of its largest score.
+        z: score over its standard deviation; its sign is that of the strength.
+        pull: the same if the innovations were independent: z^2 is what one linear step takes off the deviance.
+        strength: by one linear step [its unit].
+        error: standard error of the strength [its unit].
+        visibility: share of its trace that the fitted coefficients leave.
+        p_value: family-wise, over all candidates.
+        admissible: whether the sign of the strength is physical.
+        step: of the fitted coefficients that goes with the strength [their units].
+        likeness: cosines of its trace with those of the other scores.
+    """
+
+    element: AbstractElement
+    z: float
+    pull: float
+    strength: float
+    error: float
+    visibility: float
+    p_value: float
+    admissible: bool
+    step: Float[np.ndarray, " coefficient"]
+    likeness: Float[np.ndarray, " score"]
+
+
+class Scores(NamedTuple):
+    """Scores of all absent effects.
+
+    Attributes:
+        scores: one a family, largest first.
+        hidden: catalogue names that the records cannot show beside the fitted coefficients.
+        dispersion: variance of the scores from piece to piece of the records, over that of independent
+            innovations: about 1 where the error is noise.
+    """
+
+    scores: tuple[Score, ...]
+    hidden: tuple[str, ...]
+    dispersion: float
+
+
+class Refit(NamedTuple):
+    """A candidate refitted with everything free.
+
+    Attributes:
+        score: its score before.
+        fit: the refit.
+        violation: what speaks against it, or None.
+    """
+
+    score: Score
+    fit: ErrorFit
+    violation: str | None
+
+
+def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ()) -> Scores:
+    """Test every absent effect, all at once.
+
+    Args:
+        fit: the model beside which they are absent.
+        search: the scales of the campaign, and how much of a trace must be left.
+        excluded: catalogue names that are not to be considered.
+
+    Returns:
+        The scores.
+
+    Source: Rao 1948; White 1980, Econometrica 48:817 (variance of scores where the model is not quite right).
+    """
+    rules, records = search.rules, fit.filter.tables.records
+    pointless = effects_without_signal(records)
+    probes = tuple(
+        probe
+        for probe in absent_effects(fit.model, search.scales, excluded)
+        if probe.name not in pointless and not probe.phased
+    )
+    units = np.array([1e-3 * probe.typical_strength(search.scales) for probe in probes])
+    products, count = effect_products(fit, probes, units), len(fit.places)
+    own = 1.0 / np.sqrt(np.maximum(np.diag(fit.information), 1e-300))
+    scale = np.r_[own, np.ones(len(probes) + 1)]
+    whole, pieces = products.whole * np.outer(scale, scale), products.pieces * scale[:, None]
+    lost = ~np.isfinite(np.diag(whole))
+    whole[lost], whole[:, lost], pieces[lost] = 0.0, 0.0, 0.0
+    absorbed = np.linalg.pinv(whole[:count, :count], rcond=1e-12, hermitian=True) @ whole[:count, count:]
+    left = whole[count:, count:] - whole[:count, count:].T @ absorbed
+    apart = pieces[count:-1] - absorbed[:, :-1].T @ pieces[:count]
+    size = np.sqrt(np.maximum(np.diag(left)[:-1], 0.0))
+    visibility = size / np.sqrt(np.maximum(np.diag(whole)[count:-1], 1e-300))
+    seen = (visibility > rules.smallest_visibility) & (size > 0.0)
+    amount = np.where(seen, left[:-1, -1] / np.where(seen, size, 1.0) ** 2, 0.0)
+    scatter = apart.var(axis=1, ddof=1) * apart.shape[1] / np.where(seen, size, 1.0) ** 2
+    dispersion = float(np.median(scatter[seen])) if np.any(seen) else 1.0
+    factor = np.sqrt(np.maximum(1.0, scatter)) if dispersion > DISPERSED else np.ones_like(scatter)
+    z = np.where(seen, amount * size / factor, 0.0)
+    physical = np.array([probe.signed for probe in probes], dtype=bool) | (amount > 0.0)
+    pull = np.abs(amount * size)
+    weight = np.where(physical, pull, -1.0 / np.maximum(pull, 1e-300))
+    best: dict[str, int] = {}
+    for column, probe in enumerate(probes):
+        if seen[column] and (probe.name not in best or weight[column] > weight[best[probe.name]]):
+            best[probe.name] = column
+    order = sorted(best.values(), key=lambda column: -pull[column])
+    safe = np.where(seen, size, np.inf)
+    likeness = (left[:-1, :-1] / np.outer(safe, safe))[np.ix_(order, order)]
+    tests = int(np.sum(seen))
+    scores = tuple(
+        Score(
+            probes[column],
+            float(z[column]),
+            float(amount[column] * size[column]),
+            float(amount[column] * units[column]),
+            float(units[column] * factor[column] / size[column]),
+            float(visibility[column]),
+            float(min(1.0, tests * (1 + probes[column].signed) * stats.norm.sf(abs(z[column])))),
+            bool(physical[column]),
+            -own * absorbed[:, column] * amount[column] + own * absorbed[:, -1],
+            likeness[place],
+        )
+        for place, column in enumerate(order)
+    )
+    return Scores(scores, tuple(sorted({probe.name for probe in probes} - set(best))), dispersion)
+
+
+def refit_effect(fit: ErrorFit, score: Score, search: Search) -> Refit:
+    """Fit the model with one absent effect, everything free, from where the score points.
+
+    Args:
+        fit: the model without it.
+        score: the effect.
+        search: the scales of the campaign.
+
+    Returns:
+        The refit, with what speaks against it whatever it gains.
+    """
+    model = extended_model(fit, score.element, score.strength, score.step)
+    places = new_places(fit, model)
+    starts = []
+    for share in _SHARES:
+        listed = list_parameters(extended_model(fit, score.element, share * score.strength, share * score.step))
+        starts.append(np.array([float(listed[place].value) for place in places]))
+    large = first_sizes(fit.filter)
+    sizes = fit.sizes._replace(force=max(fit.sizes.force, large.force - 4.0), memory=max(fit.sizes.memory, 1.0))
+    found = fit_measured(
+        model,
+        places,
+        magnitudes(model, places, search.scales),
+        fit.filter.measured,
+        sizes,
+        starts[1:],
+        _ROUGH_STEPS,
+    )
+    return Refit(score, found, _violation(fit, found, score))
+
+
+def _violation(fit: ErrorFit, found: ErrorFit, score: Score) -> str | None:
+    """Say what speaks against a refit, whatever it gains."""
+    if not np.isfinite(found.deviance.sum()):
+        return "its refit diverged"
+    element = found.model.element(score.element.name)
+    if element is not None and not element.signed and float(getattr(element, element.strength)) <= 0.0:
+        return "its refit ends at a strength of zero"
+    tables = fit.filter.tables
+    return find_violation(found.model, tables.records, tables.quantity)
+
+
+class Transfer(NamedTuple):
+    """What an effect takes off the error of records that its refit did not see.
+
+    Attributes:
+        deviance: decrease of -2 log-likelihood: above 0 where the unseen records are more probable with it.
+        share: of the squared error of their free runs.
+    """
+
+    deviance: float
+    share: float
+
+
+def transfer(fit: ErrorFit, found: ErrorFit, search: Search) -> Transfer:
+    """Refit both models without each record in turn, and predict that record.
+
+    Args:
+        fit: the model without the effect.
+        found: with it.
+        search: the scales of the campaign.
+
+    Returns:
+        What it takes off all records together.
+    """
+    count = fit.filter.count
+    folds = [np.arange(count) == place for place in range(count)]
+    if count > 4:
+        folds = [np.arange(count) % 4 == place for place in range(4)]
+    gained, squares = 0.0, np.zeros(2)
+    for unseen in folds:
+        for place, one in enumerate((fit, found)):
+            part = fit_errors(
+                one.filter,
+                one.places,
+                magnitudes(one.model, one.places, search.scales),
+                one.sizes,
+                judged=1.0 - unseen,
+                most_steps=12,
+                starts=(one.values,),
+                loudest=fit.filter.measured.loudest,
+            )
+            gained += (1 - 2 * place) * float(part.deviance @ unseen)
+            squares[place] += float(free_squares(part) @ unseen)
+    return Transfer(gained, float(1.0 - squares[1] / squares[0]) if squares[0] > 0.0 else 0.0)

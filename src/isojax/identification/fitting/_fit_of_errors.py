@@ -1,0 +1,222 @@
+"""Records without dwells, fitted together with the sizes of their errors."""
+
+import dataclasses
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from ..._parameters import element_names, list_parameters
+from ..._results import RESULTS, is_successful
+from ...excitations import Hold
+from ...models import Integrator, Isolator
+from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thin_record
+from ..innovations import ErrorFit, Measured, fit_measured, free_squares
+from ..jacobian import SHORTEST
+from ._build_problem import build_problem
+from ._covariance import invert_information
+from ._elimination import Spread
+from ._estimate import SMALLEST_SCATTER, Estimate, magnitudes
+from ._evaluation import Evaluation
+from ._fit_result import Fit
+from ._problem import one_hot
+from ._saved_fit import Statistics
+from ._search import Search
+from ._simulator import Simulator
+
+_LOUDEST = 1.3
+"""Noise of a record at most, over what its output shows: the estimate has an error of its own."""
+
+_SMALL_NOISE = 0.05
+"""Noise that any record may have, over its rms: a filtered record shows less above the band than inside it."""
+
+_SHOWN = ("declared", "repeats", "periods", "cycle_scatter")
+"""Methods that show the noise of the output itself."""
+
+_SAMPLES_A_CYCLE = 25.0
+_POWER = 0.999
+"""Samples a cycle of the frequency below which so much of the output's power lies: fewer say as much."""
+
+
+def suits_innovations(campaign: Campaign) -> bool:
+    """Say whether a campaign's records are followed by a filter from their first sample to their last.
+
+    Args:
+        campaign: the measurements.
+
+    Returns:
+        False where a record has dwells, or is the decay after a release.
+    """
+    records = campaign.fit_records
+    return all(
+        not record.dwells and record.kind != "free_decay" and record.output.size > 8 * SHORTEST and np.any(record.input)
+        for record in records
+    )
+
+
+def _thinning(records: tuple[Record, ...], hold: Hold) -> int:
+    """Give how many samples may become one: what the output holds lies far below half the rate."""
+    if hold == "zero_order":
+        return 1
+    highest = 0.0
+    for record in records:
+        power = np.abs(np.fft.rfft(record.output - record.output.mean())) ** 2
+        share = np.cumsum(power) / max(power.sum(), 1e-300)
+        highest = max(highest, float(np.searchsorted(share, _POWER)) * record.rate / record.output.size)
+    return max(1, int(records[0].rate / (_SAMPLES_A_CYCLE * highest))) if highest > 0.0 else 1
+
+
+def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:
+    """Give the records to fit, as a filter takes them.
+
+    Args:
+        campaign: the measurements.
+        noise: of their output.
+
+    Returns:
+        The records, thinned where the output is slow.
+    """
+    fitted = [place for place, record in enumerate(campaign.records) if record.role == "fit"]
+    factor = _thinning(campaign.fit_records, campaign.input.hold)
+    least = [_SMALL_NOISE * float(np.std(record.output)) for record in campaign.fit_records]
+    loudest = np.maximum(_LOUDEST * np.array(noise.whites)[fitted], least)
+    records = tuple(thin_record(record, factor) for record in campaign.fit_records)
+    return Measured(records, campaign.output.quantity, campaign.input.hold, loudest)
+
+
+def fit_errors_of(
+    model: Isolator, places: tuple[int, ...], campaign: Campaign, search: Search
+) -> ErrorFit:
+    """Fit a model and the sizes of its errors to a campaign without dwells.
+
+    Args:
+        model: start.
+        places: coefficients to fit.
+        campaign: the measurements.
+        search: the scales of the campaign.
+
+    Returns:
+        The fit.
+    """
+    measured = measured_of(campaign, estimate_noise(campaign))
+    sizes = magnitudes(model, places, search.scales)
+    values = np.array([float(list_parameters(model)[place].value) for place in places])
+    starts = [values * factor for factor in _starts(model, places)]
+    return fit_measured(model, places, sizes, measured, starts=starts)
+
+
+def _starts(model: Isolator, places: tuple[int, ...]) -> list[Float[np.ndarray, " coefficient"]]:
+    """Give factors on a start: the linear part of the model, stiffer and softer, and with more damping."""
+    listed = list_parameters(model)
+    linear, stiffness, damping = np.zeros(len(places)), np.zeros(len(places)), np.zeros(len(places))
+    for name, element in zip(element_names(model), model.elements, strict=True):
+        for row, place in enumerate(places):
+            if listed[place].name == f"{name}.{element.strength}" and element.proportional_to:
+                linear[row] = 1.0
+                stiffness[row] = element.proportional_to == "displacement"
+                damping[row] = element.proportional_to == "velocity"
+            elif not listed[place].name.startswith(f"{name}.") or listed[place].name == "mass":
+                continue
+            elif listed[place].name != f"{name}.{element.strength}":
+                linear[row] = 1.0
+    return [
+        linear * (1.0 + (stiffer - 1.0) * stiffness) * (1.0 + (more - 1.0) * damping)
+        for stiffer, more in ((1.0, 1.0), (1.0, 3.0), (0.7, 1.0), (1.4, 1.0))
+    ]
+
+
+def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fit:
+    """Make a fit of a model whose error is more than noise of the output.
+
+    Args:
+        found: the model with the sizes of its errors.
+        start: the isolator that the search started from.
+        campaign: the measurements.
+
+    Returns:
+        The fit. Its errors are compared with the free run's; its error bars hold the random force.
+    """
+    noise = noise_of_errors(found, campaign)
+    fitted = [place for place, record in enumerate(campaign.records) if record.role == "fit"]
+    problem = build_problem(
+        campaign.fit_records,
+        found.model,
+        quantity=campaign.output.quantity,
+        hold=campaign.input.hold,
+        noise=tuple(noise.levels[place] for place in fitted),
+        integrator=Integrator(substeps=found.filter.steps),
+    )
+    simulator, carried = Simulator(problem), len(found.model.elements)
+    nuisances = simulator.settle(None, found.model, carried, Spread(SMALLEST_SCATTER))
+    count, samples = len(found.places), found.samples
+    result = found.result if np.isfinite(found.deviance.sum()) else RESULTS.not_finite
+    point = simulator.evaluate(found.model, one_hot(found.model, found.places, [1.0] * count), nuisances)
+    inflation = 1.0 if found.is_noise else found.inflation
+    uncertainty = invert_information(found.information, inflation)
+    estimate = Estimate(found.model, found.places, simulator, point, uncertainty, result, found.steps)
+    deviance = float(found.deviance.sum())
+    stats = Statistics(
+        int(samples),
+        count,
+        found.chi2,
+        max(1.0, samples - count),
+        deviance + 2.0 * count,
+        found.criterion,
+        found.steps,
+        0.0,
+        0.0,
+        math.nan,
+        math.nan,
+    )
+    if not is_successful(result):
+        stats = stats._replace(chi2=math.nan, aic=math.nan, bic=math.nan)
+    return Fit(
+        found.model,
+        start,
+        campaign,
+        found.names,
+        uncertainty.covariance,
+        stats,
+        noise,
+        result,
+        estimate,
+        Evaluation(estimate, campaign, noise.levels),
+        found,
+    )
+
+
+def noise_of_errors(found: ErrorFit, campaign: Campaign) -> NoiseEstimate:
+    """Give what errors are compared with: the noise where nothing else is, else the error of the free run.
+
+    Args:
+        found: the model with the sizes of its errors.
+        campaign: the measurements.
+
+    Returns:
+        The noise.
+    """
+    shown = estimate_noise(campaign)
+    alone = found.is_noise_of_output
+    if alone and shown.method in _SHOWN:
+        return shown
+    owners = np.array([one.record for one in found.filter.measured.segments])
+    lengths = np.array([one.stop - one.counted for one in found.filter.measured.segments], dtype=float)
+    squares = np.exp(found.sizes.noise) * lengths if alone else free_squares(found)
+    own = np.array(
+        [math.sqrt(squares[owners == place].sum() / lengths[owners == place].sum()) for place in sorted(set(owners))]
+    )
+    pooled = float(np.sqrt(np.sum(squares) / np.sum(lengths)))
+    fitted = iter(own.tolist())
+    levels = tuple(next(fitted) if record.role == "fit" else pooled for record in campaign.records)
+    note = "" if alone else "the error is not noise of the output: errors are compared with those of free runs"
+    return dataclasses.replace(
+        shown,
+        sigma=pooled,
+        method="residual",
+        per_record=levels,
+        methods=("residual",) * len(levels),
+        note=note,
+        levels=levels,
+        share=1.0,
+        colour=None,
+    )

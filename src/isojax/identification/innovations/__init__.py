@@ -1,0 +1,18 @@
+"""The model of the error: noise of the output, and a random force for noise of the drive and what is not known.
+
+Read `_filter` (innovations of records side by side, and their derivatives), `_record_filter` (a model's filter over
+the records of a campaign), `_error_fit` (coefficients and the sizes of the errors) and `_effect_products` (what
+absent effects would add).
+"""
+
+from ._effect_products import EffectProducts as EffectProducts
+from ._effect_products import effect_products as effect_products
+from ._error_fit import ErrorFit as ErrorFit
+from ._error_fit import first_sizes as first_sizes
+from ._error_fit import fit_errors as fit_errors
+from ._error_fit import free_squares as free_squares
+from ._fit_measured import fit_measured as fit_measured
+from ._fit_measured import refined as refined
+from ._measured import Measured as Measured
+from ._record_filter import RecordFilter as RecordFilter
+from ._record_filter import Sizes as Sizes

@@ -1,0 +1,84 @@
+"""What absent effects would add to the innovations."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..._parameters import element_names, list_parameters
+from ...elements import AbstractElement
+from ...models import Isolator
+from ..jacobian import PIECES, Followed, Unknowns, has_stiffness_scale, internal_starts, score_information
+from ._error_fit import ErrorFit
+
+
+class EffectProducts(NamedTuple):
+    """Products of columns, over the standard deviations of the innovations.
+
+    The columns are the fitted coefficients, the absent effects, and the innovations.
+
+    Attributes:
+        whole: A^T A.
+        pieces: A^T times the innovations of each piece of each record.
+    """
+
+    whole: Float[np.ndarray, "column column"]
+    pieces: Float[np.ndarray, "column piece"]
+
+
+def effect_products(
+    fit: ErrorFit, absent: Sequence[AbstractElement], units: Float[np.ndarray, " effect"]
+) -> EffectProducts:
+    """Give the products of the innovations and of what a unit of each coefficient adds to the reading.
+
+    Args:
+        fit: the model beside which the effects are absent.
+        absent: effects at zero strength.
+        units: size of one unit of each strength.
+
+    Returns:
+        The products.
+    """
+    tables, fitted = fit.filter.tables, fit.model
+    whole = Isolator(fitted.mass, (*fitted.elements, *absent), fitted.excitation)
+    carried = len(fitted.elements)
+    listed, prepared = list_parameters(whole), tables.prepared(whole, carried)
+    place_of = {entry.name: place for place, entry in enumerate(listed)}
+    names = element_names(whole)[carried:]
+    strengths = [place_of[f"{name}.{one.strength}"] for name, one in zip(names, absent, strict=True)]
+    # Products of columns of the same size keep their digits.
+    own = 1.0 / np.sqrt(np.maximum(np.diag(fit.information), 1e-300))
+    directions = np.zeros((len(listed), len(fit.places) + len(absent)))
+    directions[[*fit.places, *strengths], range(directions.shape[1])] = [*own, *units]
+    lanes, states = prepared.record.size, 2 + whole.internal_states
+    starts = np.zeros((states, lanes))
+    starts[2:] = internal_starts(whole, tables.records, prepared, carried)[0]
+    unknowns = Unknowns(whole, directions, np.ones(lanes), starts, np.ones((states, lanes)))
+    followed = [
+        Followed(
+            trace.states[:-1],
+            trace.gains,
+            fit.sizes.correlation,
+            jnp.nan_to_num(trace.error),
+            jnp.where(jnp.isfinite(trace.deviation), 1.0 / trace.deviation, 0.0),
+            _pieces(trace.deviation),
+        )
+        for trace in fit.way.traces
+    ]
+    products = score_information(unknowns, carried, prepared, followed)
+    columns, last = directions.shape[1], products.shape[1] - 1
+    assert last == columns + int(has_stiffness_scale(fitted)) + 2 + fitted.internal_states
+    # Between coefficients and residual stand the stiffness scale and the initial states of a simulation.
+    keep = np.r_[0:columns, last]
+    unit = np.r_[1.0 / own, np.ones(len(absent)), 1.0]
+    pieces = np.moveaxis(products[:, keep, last + 1 :], 0, 1).reshape(keep.size, -1)
+    whole = products[:, keep[:, None], keep].sum(axis=0)
+    return EffectProducts(whole * np.outer(unit, unit), pieces * unit[:, None])
+
+
+def _pieces(deviation: Float[Array, "time lanes"]) -> Float[Array, "time lanes"]:
+    """Cut the samples of each lane that count into pieces of equal length."""
+    counted = jnp.cumsum(jnp.isfinite(deviation), axis=0)
+    return jnp.minimum(PIECES * counted // jnp.maximum(counted[-1], 1), PIECES - 1)

@@ -1,0 +1,283 @@
+"""The extended Kalman filter of records side by side: innovations, their variances, and their derivatives.
+
+`y_k = h(z_k, u_k + w_k) + e_k`, `z_(k+1) = f(z_k, u_k + w_k)`, `w_(k+1) = a w_k + n_k`: w is the random force, which
+stands for noise of the drive and for what the model does not know, white (a = 0) or with a correlation time; e is
+the noise of the output. The mean of the state takes the whole nonlinear step; its covariance the step's derivatives.
+
+Source: Jazwinski 1970, Stochastic Processes and Filtering Theory, sec. 8.3; Kristensen, Madsen & Jorgensen 2004,
+Automatica 40:225 (grey-box models with system noise).
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..._parameters import replace_parameters
+from ..._quick_jit import quick_jit
+from ...models import RK4, Instant, Isolator, Quantity, State, advance, split_stages
+from ..jacobian import Batch
+
+_ORDERS = 4
+"""Terms of the exponential that carries the covariance over a sample."""
+
+
+class Lanes(NamedTuple):
+    """What differs from lane to lane beside the records.
+
+    Attributes:
+        force: variance of the random force [squared SI unit of the drive].
+        memory: a, its correlation from sample to sample.
+        noise: variance of the output's noise [squared SI unit of the output].
+        start: mean of the first state, the random force behind the model's states.
+        spread: its variances.
+    """
+
+    force: Float[Array, " lanes"]
+    memory: Float[Array, " lanes"]
+    noise: Float[Array, " lanes"]
+    start: State
+    spread: State
+
+
+class Trace(NamedTuple):
+    """The filter along the records.
+
+    Attributes:
+        states: before each sample is seen, the random force last.
+        gains: of each, over the innovation.
+        error: innovations [SI unit of the output].
+        deviation: their standard deviation; infinite where a sample does not count.
+    """
+
+    states: State
+    gains: State
+    error: Float[Array, "time lanes"]
+    deviation: Float[Array, "time lanes"]
+
+
+class Followed(NamedTuple):
+    """A filter's likelihood, a lane each, and its way along the first lanes.
+
+    Attributes:
+        deviance: sum of `log s + e^2/s` over innovations e of variance s: twice the negative log-likelihood but
+            for a constant.
+        square: mean square of each state.
+        slope: of half the deviance with each of the sizes by which groups of lanes differ.
+        fisher: its information.
+        trace: of the first lanes, as many as were asked for.
+    """
+
+    deviance: Float[Array, " lanes"]
+    square: State
+    slope: Float[Array, "size kept"]
+    fisher: Float[Array, "size size kept"]
+    trace: Trace
+
+
+def _read(model: Isolator, quantity: Quantity, state: State, at: Instant) -> Array:
+    """Give the reading of a state, the random force last."""
+    return model.reading(state[:-1], at._replace(drive=at.drive + state[-1]), quantity)
+
+
+def _predict(
+    model: Isolator, quantity: Quantity, step: float, memory: Array, state: State, stages: tuple[Instant, ...]
+) -> State:
+    """Give the state one sample later, the random force constant on the way."""
+    pushed = tuple(at._replace(drive=at.drive + state[-1]) for at in stages)
+    return (*advance(model, RK4(), quantity, step, state[:-1], pushed), memory * state[-1])
+
+
+def _correct(state: State, gain: State, error: Array) -> State:
+    return tuple(one + k * error for one, k in zip(state, gain, strict=True))
+
+
+def _update(
+    model: Isolator,
+    quantity: Quantity,
+    step: float,
+    lanes: Lanes,
+    state: State,
+    covariance: tuple[State, ...],
+    stages: tuple[Instant, ...],
+    measured: Array,
+    used: Array,
+) -> tuple[State, Array, tuple[State, ...]]:
+    """Give the gains and the variance of a sample, and the covariance at the next."""
+    every, last = range(len(state)), len(state) - 1
+    zero = jnp.zeros_like(measured)
+    units = [tuple(zero + float(row == place) for row in every) for place in every]
+
+    def read(state: State) -> Array:
+        return _read(model, quantity, state, stages[0])
+
+    predicted = read(state)
+    slopes = [jax.jvp(read, (state,), (unit,))[1] for unit in units]
+    seen = [sum(covariance[row][other] * slopes[other] for other in every) for row in every]
+    variance = sum((slopes[row] * seen[row] for row in every), start=lanes.noise)
+    gain = tuple(used * one / variance for one in seen)
+    after = [[covariance[row][other] - gain[row] * seen[other] for other in every] for row in every]
+    moved = _correct(state, gain, measured - predicted)
+    # A covariance needs no more than the rates' derivatives in the middle of the sample, in a truncated
+    # exponential: those of the whole step take three times as long to compile.
+    ends = _predict(model, quantity, step, lanes.memory, moved, stages)
+    middle = tuple(0.5 * (one + other) for one, other in zip(moved[:-1], ends[:-1], strict=True))
+    half = stages[len(stages) // 2]
+
+    def rates(state: State) -> State:
+        return model.rates(state[:-1], half._replace(drive=half.drive + state[-1]), quantity)
+
+    slope = [jax.jvp(rates, ((*middle, moved[-1]),), (unit,))[1] for unit in units]
+    ahead = []
+    for place in every:
+        column = [step * one + zero for one in slope[place]]
+        total = [one + float(to == place) for to, one in enumerate(column)]
+        for order in range(2, _ORDERS + 1):
+            column = [
+                step / order * sum(slope[row][to] * column[row] for row in range(last)) for to in range(last)
+            ]
+            total = [one + more for one, more in zip(total, column, strict=True)]
+        ahead.append((*total, lanes.memory + zero if place == last else zero))
+    mixed = [[sum(after[row][other] * ahead[other][to] for other in every) for row in every] for to in every]
+    upper = {
+        (to, other): sum(ahead[row][other] * mixed[to][row] for row in every)
+        for to in every
+        for other in range(to, len(state))
+    }
+    upper[last, last] = upper[last, last] + (1.0 - lanes.memory**2) * lanes.force
+    return gain, variance, tuple(tuple(upper[min(a, b), max(a, b)] for b in every) for a in every)
+
+
+@quick_jit
+def follow_records(
+    model: Isolator,
+    values: tuple[Array, ...],
+    lanes: Lanes,
+    batch: Batch,
+    quantity: Quantity,
+    step: float,
+    kept: int,
+    spacing: float,
+) -> Followed:
+    """Filter records side by side, the first lanes again with each size a little larger and a little smaller.
+
+    Args:
+        model: the isolator.
+        values: its parameters, one a lane.
+        lanes: what else differs from lane to lane.
+        batch: the records.
+        quantity: what the sensor measures.
+        step: time between samples [s].
+        kept: the first lanes, whose way is wanted; so many more follow for each size up, and down.
+        spacing: by which the logarithm of a size differs there.
+
+    Returns:
+        The likelihood, not finite where a lane diverged, and the way of the first lanes.
+    """
+    present = replace_parameters(model, list(values))
+    nothing = jnp.zeros(batch.measured.shape[1])
+
+    def body(carry: tuple, table: tuple) -> tuple[tuple, Trace]:
+        state, covariance, deviance, square, slope, fisher = carry
+        acting, measured, weight, used = table
+        stages = split_stages(acting)
+        gain, variance, ahead = _update(
+            present, quantity, step, lanes, state, covariance, stages, measured, used
+        )
+        error = measured - _read(present, quantity, state, stages[0])
+        variance = jnp.where(used > 0.0, variance, 1.0)
+        deviance = deviance + weight * (jnp.log(variance) + error**2 / variance)
+        square = tuple(old + weight * one**2 for old, one in zip(square, state, strict=True))
+        shares = [one.reshape(-1, kept) for one in (error, jnp.log(variance), variance, weight)]
+        by_error, by_log = ((one[1::2] - one[2::2]) / (2.0 * spacing) for one in shares[:2])
+        own, weigh = shares[2][0], shares[3][0]
+        excess = 0.5 * (1.0 - shares[0][0] ** 2 / own)
+        slope = slope + weigh * (by_log * excess + by_error * shares[0][0] / own)
+        fisher = fisher + weigh * (0.5 * by_log[:, None] * by_log + by_error[:, None] * by_error / own)
+        seen = Trace(state, gain, error, jnp.where(weight > 0.0, jnp.sqrt(variance), jnp.inf))
+        after = _predict(present, quantity, step, lanes.memory, _correct(state, gain, error), stages)
+        return (after, ahead, deviance, square, slope, fisher), jax.tree.map(lambda one: one[:kept], seen)
+
+    every = range(len(lanes.spread))
+    begun = tuple(tuple((lanes.spread[a] if a == b else 0.0) + nothing for b in every) for a in every)
+    start = tuple(one + nothing for one in lanes.start)
+    used = jax.lax.cummax(batch.weight, axis=0, reverse=True)
+    tables = batch.acting, batch.measured, batch.weight, used
+    differing = (nothing.size // kept - 1) // 2
+    flat = jnp.zeros((differing, kept)), jnp.zeros((differing, differing, kept))
+    (_, _, deviance, square, slope, fisher), trace = jax.lax.scan(
+        body, (start, begun, nothing, tuple(nothing for _ in every), *flat), tables
+    )
+    counted = jnp.maximum(batch.weight.sum(axis=0), 1.0)
+    return Followed(deviance, tuple(one / counted for one in square), slope, fisher, trace)
+
+
+@quick_jit
+def innovation_products(
+    model: Isolator,
+    values: tuple[Array, ...],
+    directions: tuple[Array, ...],
+    start: State,
+    memory: Array,
+    trace: Trace,
+    batch: Batch,
+    quantity: Quantity,
+    step: float,
+) -> Float[Array, "column column lanes"]:
+    """Differentiate the innovations with the gains and their deviations held.
+
+    Args:
+        model: the isolator.
+        values: its parameters, one a lane.
+        directions: change of each with the columns; no entries of those that do not move.
+        start: mean of the first state.
+        memory: correlation of the random force from sample to sample.
+        trace: gains and deviations.
+        batch: the records.
+        quantity: what the sensor measures.
+        step: time between samples [s].
+
+    Returns:
+        `A^T A` of each lane, with A the columns of de/dtheta and, last, e, over their deviations.
+    """
+    columns = max((one.shape[0] for one in directions if one.size), default=0)
+    count = batch.measured.shape[1]
+    moving = [place for place, one in enumerate(directions) if one.size]
+    known = tuple(values[place] for place in moving)
+    seeds = tuple(jnp.broadcast_to(directions[place][:, None], (columns, count)) for place in moving)
+
+    def with_moved(moved: Sequence[Array]) -> Isolator:
+        numbers = list(values)
+        for place, number in zip(moving, moved, strict=True):
+            numbers[place] = number
+        return replace_parameters(model, numbers)
+
+    def body(carry: tuple, table: tuple) -> tuple[tuple, None]:
+        state, tangents, products = carry
+        acting, measured, gain, deviation = table
+        stages = split_stages(acting)
+
+        def innovate(moved: tuple[Array, ...], state: State) -> tuple[State, Array]:
+            current = with_moved(moved)
+            slowed = tuple(current.with_delay_slope(at) for at in stages)
+            error = measured - _read(current, quantity, state, slowed[0])
+            after = _correct(state, gain, error)
+            return _predict(current, quantity, step, memory, after, slowed), error
+
+        if columns:
+            (state, error), (tangents, slopes) = jax.vmap(
+                lambda seed, tangent: jax.jvp(innovate, (known, state), (seed, tangent)), out_axes=(None, 0)
+            )(seeds, tangents)
+            rows = jnp.concatenate([slopes, error[None]]) / deviation
+        else:
+            state, error = innovate(known, state)
+            rows = error[None] / deviation
+        return (state, tangents, products + rows[:, None] * rows[None]), None
+
+    begun = tuple(one + jnp.zeros(count) for one in start)
+    tangents = tuple(jnp.zeros((columns, count)) for _ in start)
+    empty = jnp.zeros((columns + 1, columns + 1, count))
+    tables = batch.acting, batch.measured, trace.gains, trace.deviation
+    return jax.lax.scan(body, (begun, tangents, empty), tables)[0][2]
