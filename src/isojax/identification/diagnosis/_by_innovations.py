@@ -148,7 +148,11 @@ def _by_evidence(
         extra = len(refit.fit.places) - len(found.places)
         gain = _gain(found, refit) / dispersion
         chance = tests * stats.chi2.sf(max(gain, 0.0), max(1, extra))
-        if refit.violation is None and chance < level and gain - extra * np.log(found.samples) > rules.close_bic:
+        if (
+            refit.violation is None
+            and chance < level
+            and gain - extra * np.log(found.samples) > rules.close_bic
+        ):
             usable.append(refit)
     if any(one.fit.is_noise for one in usable):
         usable = sorted(usable, key=lambda one: (not one.fit.is_noise, one.fit.criterion))
@@ -264,7 +268,9 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         and (one.fit.criterion <= limit if np.isfinite(limit) else _as_good(one.fit, refit.fit))
         and name not in CATALOGUE[one.score.element.name].absorbs
     )
-    exact = tuple(one for one in CATALOGUE if one != name and one not in together and is_exact(name, one, names))
+    exact = tuple(
+        one for one in CATALOGUE if one != name and one not in together and is_exact(name, one, names)
+    )
     together += exact
     before, after = _free_error(found), _free_error(fine)
     explained = 1.0 - (after / before) ** 2 if np.isfinite(after) and before > 0.0 else 0.0

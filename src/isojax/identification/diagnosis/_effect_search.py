@@ -7,7 +7,7 @@ from jaxtyping import Float
 from scipy import stats
 
 from ..._parameters import list_parameters
-from ...elements import CATALOGUE, AbstractElement
+from ...elements import AbstractElement
 from ..fitting import Search, magnitudes
 from ..innovations import (
     ErrorFit,
@@ -171,10 +171,14 @@ def refit_effect(fit: ErrorFit, score: Score, search: Search) -> Refit:
     places = new_places(fit, model)
     starts = []
     for share in _SHARES:
-        listed = list_parameters(extended_model(fit, score.element, share * score.strength, share * score.step))
+        listed = list_parameters(
+            extended_model(fit, score.element, share * score.strength, share * score.step)
+        )
         starts.append(np.array([float(listed[place].value) for place in places]))
     large = first_sizes(fit.filter)
-    sizes = fit.sizes._replace(force=max(fit.sizes.force, large.force - 4.0), memory=max(fit.sizes.memory, 1.0))
+    sizes = fit.sizes._replace(
+        force=max(fit.sizes.force, large.force - 4.0), memory=max(fit.sizes.memory, 1.0)
+    )
     found = fit_measured(
         model,
         places,

@@ -49,7 +49,10 @@ def suits_innovations(campaign: Campaign) -> bool:
     """
     records = campaign.fit_records
     return all(
-        not record.dwells and record.kind != "free_decay" and record.output.size > 8 * SHORTEST and np.any(record.input)
+        not record.dwells
+        and record.kind != "free_decay"
+        and record.output.size > 8 * SHORTEST
+        and np.any(record.input)
         for record in records
     )
 
@@ -84,9 +87,7 @@ def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:
     return Measured(records, campaign.output.quantity, campaign.input.hold, loudest)
 
 
-def fit_errors_of(
-    model: Isolator, places: tuple[int, ...], campaign: Campaign, search: Search
-) -> ErrorFit:
+def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, search: Search) -> ErrorFit:
     """Fit a model and the sizes of its errors to a campaign without dwells.
 
     Args:
@@ -203,12 +204,17 @@ def noise_of_errors(found: ErrorFit, campaign: Campaign) -> NoiseEstimate:
     lengths = np.array([one.stop - one.counted for one in found.filter.measured.segments], dtype=float)
     squares = np.exp(found.sizes.noise) * lengths if alone else free_squares(found)
     own = np.array(
-        [math.sqrt(squares[owners == place].sum() / lengths[owners == place].sum()) for place in sorted(set(owners))]
+        [
+            math.sqrt(squares[owners == place].sum() / lengths[owners == place].sum())
+            for place in sorted(set(owners))
+        ]
     )
     pooled = float(np.sqrt(np.sum(squares) / np.sum(lengths)))
     fitted = iter(own.tolist())
     levels = tuple(next(fitted) if record.role == "fit" else pooled for record in campaign.records)
-    note = "" if alone else "the error is not noise of the output: errors are compared with those of free runs"
+    note = (
+        "" if alone else "the error is not noise of the output: errors are compared with those of free runs"
+    )
     return dataclasses.replace(
         shown,
         sigma=pooled,

@@ -81,4 +81,4 @@ def effect_products(
 def _pieces(deviation: Float[Array, "time lanes"]) -> Float[Array, "time lanes"]:
     """Cut the samples of each lane that count into pieces of equal length."""
     counted = jnp.cumsum(jnp.isfinite(deviation), axis=0)
-    return jnp.minimum(PIECES * counted // jnp.maximum(counted[-1], 1), PIECES - 1)
+    return jnp.minimum(PIECES * counted // jnp.maximum(counted[-1:], 1), PIECES - 1)

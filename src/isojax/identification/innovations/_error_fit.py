@@ -153,7 +153,9 @@ class ErrorFit:
         for white in self.innovations:
             own = white - white.mean()
             power = float(own @ own) or 1.0
-            times.append(1.0 + 2.0 * sum(float(own[:-lag] @ own[lag:]) / power for lag in range(1, _LAGS + 1)))
+            times.append(
+                1.0 + 2.0 * sum(float(own[:-lag] @ own[lag:]) / power for lag in range(1, _LAGS + 1))
+            )
         return max(times)
 
     @property
@@ -250,7 +252,9 @@ def fit_errors(
 
     def followed(frees: Sequence[np.ndarray], sizes: Sequence[Sizes]) -> Way:
         more = COPIES - len(frees)  # always as many, so that they share compiled code
-        return record_filter.follow(places, points([*frees, *[frees[0]] * more]), [*sizes, *[sizes[0]] * more])
+        return record_filter.follow(
+            places, points([*frees, *[frees[0]] * more]), [*sizes, *[sizes[0]] * more]
+        )
 
     free, damping = frees[0], 1e-3
     if len(frees) > 1:

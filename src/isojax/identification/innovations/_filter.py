@@ -194,8 +194,11 @@ def follow_records(
         by_error, by_log = ((one[1::2] - one[2::2]) / (2.0 * spacing) for one in shares[:2])
         own, weigh = shares[2][0], shares[3][0]
         excess = 0.5 * (1.0 - shares[0][0] ** 2 / own)
-        slope = slope + weigh * (by_log * excess + by_error * shares[0][0] / own)
-        fisher = fisher + weigh * (0.5 * by_log[:, None] * by_log + by_error[:, None] * by_error / own)
+        scaled = by_error / jnp.sqrt(own)[None]
+        by_size = by_log * excess[None] + scaled * (shares[0][0] / jnp.sqrt(own))[None]
+        slope = slope + weigh[None] * by_size
+        squares = 0.5 * by_log[:, None] * by_log[None] + scaled[:, None] * scaled[None]
+        fisher = fisher + weigh[None, None] * squares
         seen = Trace(state, gain, error, jnp.where(weight > 0.0, jnp.sqrt(variance), jnp.inf))
         after = _predict(present, quantity, step, lanes.memory, _correct(state, gain, error), stages)
         return (after, ahead, deviance, square, slope, fisher), jax.tree.map(lambda one: one[:kept], seen)
@@ -270,10 +273,10 @@ def innovation_products(
             (state, error), (tangents, slopes) = jax.vmap(
                 lambda seed, tangent: jax.jvp(innovate, (known, state), (seed, tangent)), out_axes=(None, 0)
             )(seeds, tangents)
-            rows = jnp.concatenate([slopes, error[None]]) / deviation
+            rows = jnp.concatenate([slopes, error[None]]) / deviation[None]
         else:
             state, error = innovate(known, state)
-            rows = error[None] / deviation
+            rows = (error / deviation)[None]
         return (state, tangents, products + rows[:, None] * rows[None]), None
 
     begun = tuple(one + jnp.zeros(count) for one in start)

@@ -75,7 +75,12 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     measured = found.filter.measured
     if not is_successful(found.result):
         found = fit_errors(
-            found.filter, found.places, magnitudes, found.sizes, loudest=measured.loudest, starts=(found.values,)
+            found.filter,
+            found.places,
+            magnitudes,
+            found.sizes,
+            loudest=measured.loudest,
+            starts=(found.values,),
         )
     while not steps_are_fine(found):
         steps = 2 * found.filter.steps
@@ -104,5 +109,3 @@ def steps_are_fine(found: ErrorFit) -> bool:
     squares = finer.products(found.places, found.values[None], found.way, columns=False)[0, 0, 0]
     change = float(np.sum(np.abs(squares - found.products[-1, -1])))
     return change < max(SMALL, SMALL_SHARE * found.samples)
-
-

@@ -8,6 +8,7 @@ from ...models import Integrator, Quantity
 from ...records import Record
 from ..jacobian import Segment, Tables
 
+
 class Measured:
     """Records to fit, each from its first sample to its last.
 

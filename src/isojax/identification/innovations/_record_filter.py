@@ -251,7 +251,9 @@ class RecordFilter:
     def _in_parts(self, work: Callable[[int], Any]) -> list[Any]:
         """Work on each batch in a thread of its own."""
         with ThreadPoolExecutor(workers()) as pool:
-            return list(pool.map(lambda part: jax.block_until_ready(work(part)), range(len(self.prepared.batches))))
+            return list(
+                pool.map(lambda part: jax.block_until_ready(work(part)), range(len(self.prepared.batches)))
+            )
 
     def _known(self, part: int) -> tuple[Int[np.ndarray, " lane"], int]:
         """Give the records of the lanes of a batch; lanes without one repeat the last."""
@@ -260,7 +262,10 @@ class RecordFilter:
 
     def _start(self, part: int, copies: int) -> State:
         known, width = self._known(part)
-        return (*(on_device(np.tile(row[known], copies)) for row in self.starts), on_device(np.zeros(copies * width)))
+        return (
+            *(on_device(np.tile(row[known], copies)) for row in self.starts),
+            on_device(np.zeros(copies * width)),
+        )
 
     def _values(
         self, part: int, places: tuple[int, ...], points: Float[np.ndarray, "copy column"]

@@ -338,7 +338,9 @@ class _Group:
     ) -> None:
         """Put a column that is pushed along the motion."""
         place = len(self.columns)
-        rows = np.shape(forcing)[0] if np.ndim(forcing) else len(self.forcing)  # nothing pushes a random force
+        rows = (
+            np.shape(forcing)[0] if np.ndim(forcing) else len(self.forcing)
+        )  # nothing pushes a random force
         self.forcing[rows:, :, place] = 0.0
         self.forcing[:rows, :, place], self.direct[:, place], self.starts[:, place] = forcing, direct, 0.0
         if np.ndim(kick):

@@ -56,9 +56,7 @@ class Tables:
         """
         for element in model.elements:
             element.check_record()
-        steps = self.integrator.table_steps(
-            Isolator(model.mass, model.elements[:carried], model.excitation)
-        )
+        steps = self.integrator.table_steps(Isolator(model.mass, model.elements[:carried], model.excitation))
         key = (steps, float(model.shift()), float(model.skew()))
         channels = set(model.channels)
         known = set(self._prepared[key].batches[0].channels) if key in self._prepared else set()
