@@ -42,8 +42,8 @@ def diagnose_innovations(
     """Name the effect that a model lacks, from records without dwells.
 
     Where the error with the effect is noise, the likelihood decides. Where the error is the model's all the
-    same, an effect is judged by what it takes off the squared error of free runs of records that its refit did
-    not see: innovations are then neither independent nor normal, and their likelihood is too sure.
+    same, innovations are neither independent nor normal, and their likelihood is too sure. An effect is then
+    judged by what it takes off the squared error of free runs of records that its refit did not see.
 
     Args:
         search: how to search.
@@ -139,8 +139,8 @@ def _by_evidence(
 ) -> list[Refit]:
     """List the refits that are significant and physical, best first.
 
-    Of those within `close_bic` of each other the one with the fewest coefficients goes first, then the one with
-    the fewest internal states.
+    Of those that are as good the one with the fewest coefficients goes first, then the one with the fewest
+    internal states.
     """
     dispersion, tests = max(1.0, scores.dispersion), max(1, len(scores.scores))
     usable = []
@@ -233,17 +233,14 @@ def _error_words(found: ErrorFit, fit: Fit) -> str:
     """Say what the error of a model is."""
     if found.is_noise_of_output:
         return "What the model leaves is noise of the output."
-    size = np.sqrt(found.sizes.variance)
     unit = "m/s^2" if fit.model.excitation == "base_acceleration" else "N"
+    force = f"{np.sqrt(found.sizes.variance):.3g} {unit} rms"
     if found.is_noise:
         return (
-            f"What the model leaves is noise: that of the output, and noise of {size:.3g} {unit} rms of the drive or "
-            "of a force on the mass, which repeats at equal drive would tell apart."
+            f"What the model leaves is noise of the output, and {force} of noise of the drive or of a force on "
+            "the mass: repeats at equal drive would separate the two."
         )
-    return (
-        f"The error is the model's and not noise: a force of {size:.3g} {unit} rms on the mass would explain it, "
-        f"and a free run is off by {100.0 * fit.nrmse:.3g} %."
-    )
+    return f"The error is the model's and not noise: a random force of {force} would explain it."
 
 
 def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best: Weighed) -> Verdict:
@@ -290,8 +287,8 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         separating_experiment(name, together),
     )
     reason = (
-        f"Adding {refit.score.element.words} takes {100.0 * best.transfer.share:.3g} % off the squared error of free "
-        "runs of records left out of its refit."
+        f"Adding {refit.score.element.words} takes {100.0 * best.transfer.share:.3g} % off the squared error "
+        "of free runs of records left out of its refit."
         if not refit.fit.is_noise
         else f"With {refit.score.element.words} what the model leaves is noise."
     )

@@ -38,7 +38,7 @@ class Score(NamedTuple):
     Attributes:
         element: the effect at zero strength, with the shape of its largest score.
         z: score over its standard deviation; its sign is that of the strength.
-        pull: the same if the innovations were independent: z^2 is what one linear step takes off the deviance.
+        pull: the same for independent innovations; its square is what a linear step takes off the deviance.
         strength: by one linear step [its unit].
         error: standard error of the strength [its unit].
         visibility: share of its trace that the fitted coefficients leave.

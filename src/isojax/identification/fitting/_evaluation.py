@@ -114,3 +114,42 @@ class Evaluation:
     def known_errors(self) -> dict[str, Errors | None] | None:
         """The errors where they have been asked for; None where they would have to be computed."""
         return vars(self).get("errors")
+
+
+class FreeEvaluation(Evaluation):
+    """A model whose error is not noise of the output: its free runs alone are compared.
+
+    A restart would settle initial states against an error that they do not cause.
+    """
+
+    @cached_property
+    def restarts(self) -> Restarts:
+        """The free runs."""
+        runs, point = self.free_runs, self._found.point
+        return Restarts(runs, point, tuple(np.zeros(run.record.output.size) for run in runs))
+
+    @cached_property
+    def errors(self) -> dict[str, Errors | None]:
+        """Errors of free runs by role; chi2/dof is their mean square over that of the fitted ones."""
+        found: dict[str, Errors | None] = {}
+        for role in ("fit", "holdout"):
+            runs = [
+                (run, level)
+                for run, level in zip(self.free_runs, self._noise, strict=True)
+                if run.record.role == role
+            ]
+            counted = [run.counted > 0.0 for run, _ in runs]
+            measured = [run.record.output[kept] for (run, _), kept in zip(runs, counted, strict=True)]
+            errors = [run.residual[kept] for (run, _), kept in zip(runs, counted, strict=True)]
+            count = float(sum(one.size for one in errors))
+            if not count:
+                found[role] = None
+                continue
+            square = float(sum(np.sum(one**2) for one in errors))
+            signal = float(sum(np.sum((one - one.mean()) ** 2) for one in measured))
+            scaled = sum(
+                float(np.sum((one / level) ** 2)) for one, (_, level) in zip(errors, runs, strict=True)
+            )
+            share = float(np.sqrt(square / signal)) if signal > 0.0 else float("nan")
+            found[role] = Errors(float(np.sqrt(square / count)), share, share, scaled / count, count)
+        return found

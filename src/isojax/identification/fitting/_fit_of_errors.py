@@ -17,7 +17,7 @@ from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
 from ._estimate import SMALLEST_SCATTER, Estimate, magnitudes
-from ._evaluation import Evaluation
+from ._evaluation import FreeEvaluation
 from ._fit_result import Fit
 from ._problem import one_hot
 from ._saved_fit import Statistics
@@ -28,7 +28,7 @@ _LOUDEST = 1.3
 """Noise of a record at most, over what its output shows: the estimate has an error of its own."""
 
 _SMALL_NOISE = 0.05
-"""Noise that any record may have, over its rms: a filtered record shows less above the band than inside it."""
+"""Noise that any record may have, over its rms: a filtered record shows too little above its band."""
 
 _SHOWN = ("declared", "repeats", "periods", "cycle_scatter")
 """Methods that show the noise of the output itself."""
@@ -181,7 +181,7 @@ def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fi
         noise,
         result,
         estimate,
-        Evaluation(estimate, campaign, noise.levels),
+        FreeEvaluation(estimate, campaign, noise.levels),
         found,
     )
 

@@ -1,8 +1,9 @@
-"""The model of the error: noise of the output, and a random force for noise of the drive and what is not known.
+"""The model of the error: noise of the output, and a random force that stands for what else disturbs.
 
-Read `_filter` (innovations of records side by side, and their derivatives), `_record_filter` (a model's filter over
-the records of a campaign), `_error_fit` (coefficients and the sizes of the errors) and `_effect_products` (what
-absent effects would add).
+Read `_filter` (innovations of records side by side, and their derivatives), `_measured` and `_record_filter`
+(a model's filter over the records of a campaign), `_error_fit` (coefficients and the sizes of the errors),
+`_fit_measured` (as many integration steps as the motion needs) and `_effect_products` (what absent effects
+would add).
 """
 
 from ._effect_products import EffectProducts as EffectProducts

@@ -19,7 +19,7 @@ MOST_STEPS = 40
 """Steps of a search at most."""
 
 CONVERGED = 0.05
-"""Decrease of the deviance of a step below which a search is over: a hundredth of a standard error squared."""
+"""Decrease of the deviance of a step below which a search is over."""
 
 _TRIED = np.array([1e-3, 0.03, 1.0, 30.0])
 """Marquardt's dampings that a step tries side by side, over that of the last step."""
@@ -136,7 +136,7 @@ class ErrorFit:
 
     @cached_property
     def colour(self) -> float:
-        """How much of an innovation those before it foretell: sum of squared correlations, at most over records."""
+        """How well earlier innovations foretell one, the worst of any record: squared correlations."""
         found = []
         for white in self.innovations:
             own = white - white.mean()
@@ -148,7 +148,7 @@ class ErrorFit:
 
     @property
     def inflation(self) -> float:
-        """Factor on the covariance where innovations are not independent: their correlation time [samples]."""
+        """Factor on the covariance: the correlation time of the innovations [samples]."""
         times = [1.0]
         for white in self.innovations:
             own = white - white.mean()
@@ -165,7 +165,7 @@ class ErrorFit:
 
     @property
     def is_noise(self) -> bool:
-        """Whether the error of the model is noise: of the output alone, or white, and as large in every record."""
+        """Whether the error is noise: of the output alone, or white and as large in every record."""
         if not np.isfinite(self.deviance.sum()):
             return False
         if self.is_noise_of_output:
@@ -215,10 +215,10 @@ def fit_errors(
 ) -> ErrorFit:
     """Fit coefficients and the sizes of the errors.
 
-    A step takes the gains at its start as they are: with these held the innovations are a least-squares problem
-    (Gauss-Newton, several dampings side by side), and the sizes take a step of Newton's on the likelihood. A filter
-    follows the records however far the coefficients are off, as long as its random force is large; so it starts
-    large, and falls as the innovations do.
+    With the gains held the innovations are a problem of least squares: each step is one of Gauss and Newton,
+    with several dampings tried side by side. The sizes take a step of Fisher's scoring. A filter follows the
+    records however far the coefficients are off, as long as its random force is large. So it starts large,
+    and falls as the innovations do.
 
     Args:
         record_filter: the model and the records.

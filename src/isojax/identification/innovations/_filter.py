@@ -1,11 +1,12 @@
 """The extended Kalman filter of records side by side: innovations, their variances, and their derivatives.
 
-`y_k = h(z_k, u_k + w_k) + e_k`, `z_(k+1) = f(z_k, u_k + w_k)`, `w_(k+1) = a w_k + n_k`: w is the random force, which
-stands for noise of the drive and for what the model does not know, white (a = 0) or with a correlation time; e is
-the noise of the output. The mean of the state takes the whole nonlinear step; its covariance the step's derivatives.
+`y_k = h(z_k, u_k + w_k) + e_k`, `z_(k+1) = f(z_k, u_k + w_k)`, `w_(k+1) = a w_k + n_k`. The random force w
+stands for noise of the drive and for what the model does not know; it is white (a = 0) or has a memory.
+e is the noise of the output. The mean of the state takes the whole nonlinear step, its covariance the step's
+derivatives.
 
-Source: Jazwinski 1970, Stochastic Processes and Filtering Theory, sec. 8.3; Kristensen, Madsen & Jorgensen 2004,
-Automatica 40:225 (grey-box models with system noise).
+Source: Jazwinski 1970, Stochastic Processes and Filtering Theory, sec. 8.3; Kristensen, Madsen & Jorgensen
+2004, Automatica 40:225 (grey-box models with system noise).
 """
 
 from collections.abc import Sequence
@@ -62,8 +63,8 @@ class Followed(NamedTuple):
     """A filter's likelihood, a lane each, and its way along the first lanes.
 
     Attributes:
-        deviance: sum of `log s + e^2/s` over innovations e of variance s: twice the negative log-likelihood but
-            for a constant.
+        deviance: sum of `log s + e^2/s` over innovations e of variance s, -2 log-likelihood but for a
+            constant.
         square: mean square of each state.
         slope: of half the deviance with each of the sizes by which groups of lanes differ.
         fisher: its information.

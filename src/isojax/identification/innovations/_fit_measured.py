@@ -63,7 +63,7 @@ def fit_measured(
 
 
 def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
-    """Fit to the end, and again with twice as many integration steps, until they leave the innovations as they are.
+    """Fit to the end, with twice as many integration steps until these leave the innovations as they are.
 
     Args:
         found: a fit.

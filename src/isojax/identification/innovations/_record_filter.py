@@ -131,7 +131,7 @@ def physical(
 
 
 class RecordFilter:
-    """The filter of one model structure over prepared records, each a lane from its first sample to its last."""
+    """The filter of one model structure over records, each a lane from its first sample to its last."""
 
     def __init__(self, model: Isolator, measured: Measured, steps: int):
         """Keep what does not change; nothing is computed yet.
@@ -153,7 +153,7 @@ class RecordFilter:
 
     @property
     def feeds_through(self) -> bool:
-        """Whether the random force acts straight on the reading: white, it would have no finite variance there."""
+        """Whether the random force acts straight on the reading, where a white one has no finite variance."""
         return self.measured.quantity == "acceleration" and self.model.excitation == "force"
 
     @property

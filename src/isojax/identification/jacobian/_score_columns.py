@@ -128,7 +128,8 @@ def score_information(
             simulation. Initial states then have columns like those of a simulation, which nobody asks for.
 
     Returns:
-        A^T A of each lane, lanes first; with a filter, A^T times the residual of each `PIECES` of the lane behind.
+        A^T A of each lane, lanes first; with a filter, behind it A^T times the residual of each piece of the
+        lane.
     """
     layout = _layout(unknowns, carried)
     size = 2 + layout.model.internal_states
