@@ -17,6 +17,9 @@ from ._separating_words import is_exact, separating_experiment
 MOST_INTERNAL = 4
 """Internal states of a model that is refitted: the filter's covariance grows with their square."""
 
+_CLEAR = 0.05
+"""Gain a sample from which an effect that leaves noise alone carries over: no imitation leaves so little."""
+
 _AS_GOOD = 0.1
 """Larger error of free runs, relative, up to which two models of a model's error are as good."""
 
@@ -66,6 +69,9 @@ def diagnose_innovations(
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
     for refit in usable:
+        if refit.fit.is_noise_of_output and _gain(found, refit) > _CLEAR * found.samples:
+            best = Weighed(refit, Transfer(_gain(found, refit), 1.0))
+            break
         one = Weighed(refit, transfer(found, refit.fit, search))
         needed = 0.0 if refit.fit.is_noise else rules.smallest_share
         if one.transfer.deviance > 0.0 and one.transfer.share >= needed:
@@ -237,8 +243,8 @@ def _error_words(found: ErrorFit, fit: Fit) -> str:
     force = f"{np.sqrt(found.sizes.variance):.3g} {unit} rms"
     if found.is_noise:
         return (
-            f"What the model leaves is noise of the output, and {force} of noise of the drive or of a force on "
-            "the mass: repeats at equal drive would separate the two."
+            f"What the model leaves is noise of the output, and {force} of noise of the drive or of a force "
+            "on the mass: repeats at equal drive would separate the two."
         )
     return f"The error is the model's and not noise: a random force of {force} would explain it."
 

@@ -37,6 +37,9 @@ _SAMPLES_A_CYCLE = 25.0
 _POWER = 0.999
 """Samples a cycle of the frequency below which so much of the output's power lies: fewer say as much."""
 
+_FEWEST_SAMPLES = 5000
+"""Samples of all records below which none are left out."""
+
 
 def suits_innovations(campaign: Campaign) -> bool:
     """Say whether a campaign's records are followed by a filter from their first sample to their last.
@@ -66,7 +69,9 @@ def _thinning(records: tuple[Record, ...], hold: Hold) -> int:
         power = np.abs(np.fft.rfft(record.output - record.output.mean())) ** 2
         share = np.cumsum(power) / max(power.sum(), 1e-300)
         highest = max(highest, float(np.searchsorted(share, _POWER)) * record.rate / record.output.size)
-    return max(1, int(records[0].rate / (_SAMPLES_A_CYCLE * highest))) if highest > 0.0 else 1
+    samples = sum(record.output.size for record in records)
+    factor = records[0].rate / (_SAMPLES_A_CYCLE * highest) if highest > 0.0 else 1.0
+    return max(1, int(min(factor, samples / _FEWEST_SAMPLES)))
 
 
 def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:
@@ -137,7 +142,7 @@ def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fi
     Returns:
         The fit. Its errors are compared with the free run's; its error bars hold the random force.
     """
-    noise = noise_of_errors(found, campaign)
+    noise = noise_of_errors(found, campaign, found.is_noise_of_output)
     fitted = [place for place, record in enumerate(campaign.records) if record.role == "fit"]
     problem = build_problem(
         campaign.fit_records,
@@ -186,18 +191,18 @@ def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fi
     )
 
 
-def noise_of_errors(found: ErrorFit, campaign: Campaign) -> NoiseEstimate:
+def noise_of_errors(found: ErrorFit, campaign: Campaign, alone: bool) -> NoiseEstimate:
     """Give what errors are compared with: the noise where nothing else is, else the error of the free run.
 
     Args:
         found: the model with the sizes of its errors.
         campaign: the measurements.
+        alone: whether noise of the output is the only error.
 
     Returns:
         The noise.
     """
     shown = estimate_noise(campaign)
-    alone = found.is_noise_of_output
     if alone and shown.method in _SHOWN:
         return shown
     owners = np.array([one.record for one in found.filter.measured.segments])

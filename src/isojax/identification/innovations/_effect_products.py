@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..._parameters import element_names, list_parameters
 from ...elements import AbstractElement
@@ -78,7 +78,7 @@ def effect_products(
     return EffectProducts(whole * np.outer(unit, unit), pieces * unit[:, None])
 
 
-def _pieces(deviation: Float[Array, "time lanes"]) -> Float[Array, "time lanes"]:
+def _pieces(deviation: Float[Array, "time lanes"]) -> Int[Array, "time lanes"]:
     """Cut the samples of each lane that count into pieces of equal length."""
     counted = jnp.cumsum(jnp.isfinite(deviation), axis=0)
     return jnp.minimum(PIECES * counted // jnp.maximum(counted[-1:], 1), PIECES - 1)

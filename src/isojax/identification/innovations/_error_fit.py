@@ -78,7 +78,7 @@ class ErrorFit:
     places: tuple[int, ...]
     sizes: Sizes
     deviance: Float[np.ndarray, " record"]
-    products: Float[np.ndarray, "column column record"]
+    products: Float[np.ndarray, "row row record"]
     samples: float
     result: RESULTS
     steps: int
@@ -311,7 +311,7 @@ def fit_errors(
 
 
 def _damped_steps(
-    products: Float[np.ndarray, "column column"], dampings: Float[np.ndarray, " try"]
+    products: Float[np.ndarray, "row row"], dampings: Float[np.ndarray, " try"]
 ) -> tuple[list[Float[np.ndarray, " column"]], float]:
     """Give Marquardt's steps of the unbounded variables, and what the longest promises."""
     inner, outer = products[:-1, :-1], products[:-1, -1]

@@ -210,7 +210,7 @@ class RecordFilter:
 
     def products(
         self, places: tuple[int, ...], points: Float[np.ndarray, "copy column"], way: "Way", columns: bool
-    ) -> Float[np.ndarray, "column column copy record"]:
+    ) -> Float[np.ndarray, "row row copy record"]:
         """Give the products of innovations at several points, with the gains of a way held.
 
         Args:

@@ -113,7 +113,7 @@ def _layout(unknowns: Unknowns, carried: int) -> _Layout:
 
 def score_information(
     unknowns: Unknowns, carried: int, prepared: Prepared, followed: Sequence[Followed] = ()
-) -> Float[np.ndarray, "lanes column column"]:
+) -> Float[np.ndarray, "lanes row other"]:
     """Give the information matrix of each segment, absent effects among the columns.
 
     The columns are those of `information`; each direction must move one parameter alone. Elements beyond the
@@ -180,7 +180,7 @@ def _block(
     states: State,
     scales: State,
     followed: Followed | None,
-) -> Float[np.ndarray, "lanes column column"]:
+) -> Float[np.ndarray, "lanes row other"]:
     """Work out the columns of a few lanes, and multiply them out."""
     model, size, sampling = layout.model, 2 + layout.model.internal_states, prepared.sampling
     stepping, own = find_stepping(prepared), batch.following(model)

@@ -1,0 +1,162 @@
+"""Records without dwells: coefficients and the sizes of the errors, by a filter's innovations."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from isojax import Isolator, read_campaign
+from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness
+from isojax.identification import close_loop
+from isojax.identification.innovations import Measured, RecordFilter, Sizes, fit_measured, refined
+from isojax.records import Record
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+MASS, STIFFNESS, DAMPING, RATE = 3.0, 4000.0, 9.0, 200.0
+
+
+def record(drive, output, name="one"):
+    time = np.arange(drive.size) / RATE
+    return Record(name, Path(name), time, RATE, drive, output, drive, output)
+
+
+def linear(**more):
+    return Isolator(MASS, (LinearStiffness(STIFFNESS), LinearDamping(DAMPING)), **more)
+
+
+def smooth_noise(rng, size):
+    """Noise without power near half the rate, so that a hold between samples hardly matters."""
+    return scipy.signal.sosfiltfilt(scipy.signal.butter(4, 0.2, output="sos"), rng.standard_normal(size))
+
+
+def kalman_deviance(drive, output, start, spread, force, noise):
+    """-2 log-likelihood but for a constant: the drive is straight between samples, its random force held."""
+    rates, push = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]]), np.array([0.0, 1.0 / MASS])
+    whole = np.zeros((4, 4))
+    whole[:2, :2], whole[:2, 2], whole[2, 3] = rates / RATE, push / RATE, 1.0
+    whole = expm(whole)
+    ahead, held, ramp = whole[:2, :2], whole[:2, 2], whole[:2, 3]
+    mean, covariance, deviance = start.copy(), np.diag(spread), 0.0
+    for k, measured in enumerate(output):
+        variance = covariance[0, 0] + noise
+        error, gain = measured - mean[0], covariance[:, 0] / variance
+        deviance += np.log(variance) + error**2 / variance
+        mean, covariance = mean + gain * error, covariance - np.outer(gain, covariance[0])
+        if k + 1 < output.size:
+            mean = ahead @ mean + held * drive[k] + ramp * (drive[k + 1] - drive[k])
+            covariance = ahead @ covariance @ ahead.T + force * np.outer(held, held)
+    return deviance
+
+
+def test_the_likelihood_is_that_of_a_kalman_filter():
+    rng = np.random.default_rng(3)
+    drive, output = smooth_noise(rng, 900), 1e-3 * smooth_noise(rng, 900)
+    records = record(drive, output), record(drive[::-1], output[::-1], "two")
+    own = RecordFilter(linear(), Measured(records, "displacement", "linear", np.full(2, 1.0)), 4)
+    force, noise = 0.3**2, 2e-5**2
+    way = own.follow((), np.zeros((7, 0)), Sizes(np.log(force), -30.0, np.log(np.full(2, noise))).around())
+    for place, one in enumerate(records):
+        wanted = kalman_deviance(
+            one.input, one.output, own.starts[:, place], own.spread[:, place], force, noise
+        )
+        # The covariance goes on by an exponential that is cut off after its fourth term.
+        assert way.deviance[0, place] == pytest.approx(wanted, rel=1e-4)
+
+
+def test_slopes_with_the_sizes_are_those_of_the_likelihood():
+    rng = np.random.default_rng(4)
+    drive, output = smooth_noise(rng, 600), 1e-3 * smooth_noise(rng, 600)
+    measured = Measured(
+        (record(drive, output), record(2.0 * drive, output, "two")), "displacement", "linear", np.full(2, 1.0)
+    )
+    own = RecordFilter(linear(), measured, 2)
+
+    def deviance(force, memory, noise):
+        sizes = Sizes(force, memory, np.array([noise, -21.0]))
+        return own.follow((), np.zeros((7, 0)), sizes.around())
+
+    at, step = (np.log(0.1), 1.0, -20.0), 1e-3
+    slope = deviance(*at).slope
+    for size in range(3):
+        up, down = (tuple(a + sign * step * (i == size) for i, a in enumerate(at)) for sign in (1.0, -1.0))
+        change = (deviance(*up).deviance[0] - deviance(*down).deviance[0]) / (4.0 * step)
+        assert slope[size, 0] == pytest.approx(change[0], rel=2e-3)
+
+
+def driven_cubic(seed, level, noise, cubic=4e7):
+    """An oscillator with a cubic spring under a sum of sines, by SciPy: force and noisy acceleration."""
+    rng = np.random.default_rng(seed)
+    count = 2000
+    frequencies = np.arange(1.0, 9.0, 0.13)
+    phases = rng.uniform(0.0, 2.0 * np.pi, frequencies.size)
+    time = np.arange(count) / RATE
+
+    def force(t):
+        return (
+            level
+            * np.sqrt(2.0 / frequencies.size)
+            * np.sin(2.0 * np.pi * np.multiply.outer(t, frequencies) + phases).sum(axis=-1)
+        )
+
+    def rates(t, z):
+        return [z[1], (force(t) - STIFFNESS * z[0] - cubic * z[0] ** 3 - DAMPING * z[1]) / MASS]
+
+    z = solve_ivp(rates, (0.0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-13, method="DOP853").y
+    a = (force(time) - STIFFNESS * z[0] - cubic * z[0] ** 3 - DAMPING * z[1]) / MASS
+    return record(force(time), a + noise * rng.standard_normal(count), f"{level:g}")
+
+
+@pytest.mark.slow
+def test_a_start_that_is_far_off_is_not_lost():
+    records = tuple(driven_cubic(seed, level, 0.01) for seed, level in enumerate((4.0, 10.0)))
+    measured = Measured(records, "acceleration", "band_limited", np.full(2, 0.1))
+    start = Isolator(
+        MASS, (LinearStiffness(1.5 * STIFFNESS), CubicStiffness(0.0), LinearDamping(4.0 * DAMPING))
+    )
+    sizes = (STIFFNESS, 1e7, DAMPING)
+    found = refined(fit_measured(start, (1, 2, 3), sizes, measured), sizes)
+    errors = np.sqrt(np.diag(np.linalg.inv(found.information)))
+    assert np.all(np.abs(found.values - [STIFFNESS, 4e7, DAMPING]) < 4.0 * errors)
+    assert np.all(errors < [4.0, 4e5, 0.1])
+    assert found.is_noise_of_output
+    np.testing.assert_allclose(np.exp(0.5 * found.sizes.noise), 0.01, rtol=0.05)
+
+
+BUILDING = """\
+[campaign]
+title = "building on rubber bearings"
+mass = 1.0
+[input]
+quantity = "base_acceleration"
+column = "u"
+unit = "m/s^2"
+[output]
+quantity = "displacement"
+column = "d1"
+unit = "m"
+[sampling]
+rate = 200.0
+[model]
+stiffness = ["linear"]
+damping = ["linear"]
+"""
+
+
+@pytest.mark.slow
+def test_a_measured_building_on_rubber_bearings_has_hysteresis(shared_data, tmp_path):
+    records = [("ICA50", "fit"), ("ICA100", "fit"), ("CNP100", "holdout")]
+    declared = "".join(
+        f'[[record]]\nfile = "{(shared_data / "building" / name).as_posix()}.npz"\nrole = "{role}"\n'
+        for name, role in records
+    )
+    (tmp_path / "campaign.toml").write_text(BUILDING + declared, encoding="utf-8")
+    loop = close_loop(read_campaign(tmp_path), max_iterations=1)
+    (finding,) = loop.findings
+    assert finding.effect in ("dahl_friction", "bouc_wen")
+    assert loop.after.errors["fit"].nrmse <= 0.28  # a linear model: 0.50 by least squares
+    assert loop.after.errors["holdout"].nrmse <= 0.37
