@@ -359,10 +359,9 @@ def doubt_of(
         against it.
     """
     if final.innovations is not None:
-        worse = final.errors["holdout"] is not None and not (
-            final.errors["holdout"].nrmse <= before.errors["holdout"].nrmse
-        )
-        return "worse" if worse and not final.innovations.is_noise else ""
+        old, new = before.errors["holdout"], final.errors["holdout"]
+        judged = old is not None and new is not None and not final.innovations.is_noise
+        return "worse" if judged and not new.nrmse <= old.nrmse else ""
     tone: Doubt = "" if unlocked_tone(final, rules) is None else "a tone"
     other: Doubt = tone if last.law is None else "a further law"
     if any(one.better is not None for one in alternatives):

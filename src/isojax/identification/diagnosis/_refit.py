@@ -23,6 +23,7 @@ from ..fitting import (
     one_hot,
     run_freely,
 )
+from ..innovations import ErrorFit
 from ..jacobian import has_stiffness_scale
 from ._score import Score, ScoreTest
 
@@ -133,7 +134,7 @@ def least_difference(found: Estimate, rules: Rules) -> float:
     return max(rules.close_bic, rules.smallest_gain * found.dof * found.problem.thinned)
 
 
-def new_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
+def new_places(fitted: Estimate | ErrorFit, model: Isolator) -> tuple[int, ...]:
     """Give the free coefficients of a model that shares some with a fitted one: those, and what is new."""
     known = {entry.name for entry in list_parameters(fitted.model)}
     return tuple(
@@ -143,7 +144,9 @@ def new_places(fitted: Estimate, model: Isolator) -> tuple[int, ...]:
     )
 
 
-def extended_model(fitted: Estimate, element: AbstractElement, strength: float, step: np.ndarray) -> Isolator:
+def extended_model(
+    fitted: Estimate | ErrorFit, element: AbstractElement, strength: float, step: np.ndarray
+) -> Isolator:
     """Give the model with the effect at a strength, the fitted coefficients moved by a step."""
     own = [name for name, _ in own_parameters(element)]
     for old in fitted.model.elements:

@@ -112,23 +112,18 @@ def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, 
 
 
 def _starts(model: Isolator, places: tuple[int, ...]) -> list[Float[np.ndarray, " coefficient"]]:
-    """Give factors on a start: the linear part of the model, stiffer and softer, and with more damping."""
+    """Give factors on a start: its linear part, stiffer and softer, and with more damping."""
+    kinds = {
+        f"{name}.{element.strength}": element.proportional_to or "nonlinear"
+        for name, element in zip(element_names(model), model.elements, strict=True)
+    }
     listed = list_parameters(model)
-    linear, stiffness, damping = np.zeros(len(places)), np.zeros(len(places)), np.zeros(len(places))
-    for name, element in zip(element_names(model), model.elements, strict=True):
-        for row, place in enumerate(places):
-            if listed[place].name == f"{name}.{element.strength}" and element.proportional_to:
-                linear[row] = 1.0
-                stiffness[row] = element.proportional_to == "displacement"
-                damping[row] = element.proportional_to == "velocity"
-            elif not listed[place].name.startswith(f"{name}.") or listed[place].name == "mass":
-                continue
-            elif listed[place].name != f"{name}.{element.strength}":
-                linear[row] = 1.0
-    return [
-        linear * (1.0 + (stiffer - 1.0) * stiffness) * (1.0 + (more - 1.0) * damping)
-        for stiffer, more in ((1.0, 1.0), (1.0, 3.0), (0.7, 1.0), (1.4, 1.0))
-    ]
+    starts = []
+    for stiffer, more in ((1.0, 1.0), (1.0, 3.0), (0.7, 1.0), (1.4, 1.0)):
+        factors = {"displacement": stiffer, "velocity": more, "nonlinear": 0.0}
+        # Shapes of effects and the mass are no strengths, and stay.
+        starts.append(np.array([factors.get(kinds.get(listed[place].name, ""), 1.0) for place in places]))
+    return starts
 
 
 def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fit:

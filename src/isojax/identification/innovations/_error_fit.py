@@ -260,7 +260,8 @@ def fit_errors(
     if len(frees) > 1:
         deviances = followed(frees, [sizes] * len(frees)).deviance @ part
         free = frees[int(np.argmin(deviances[: len(frees)]))]
-    last, result, before, trust = np.inf, RESULTS.not_converged, sizes, FURTHEST
+    last, before, trust = np.inf, sizes, FURTHEST
+    result: RESULTS = RESULTS.not_converged
     for step in range(1, most_steps + 1):
         way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
@@ -283,7 +284,11 @@ def fit_errors(
             damping = min(1e9, 1e3 * damping)
         if deviance > last + CONVERGED:  # the last step of the sizes went too far
             trust *= 0.25
-            new = Sizes(*(old + 0.25 * (own - old) for old, own in zip(before, sizes, strict=True)))
+            new = Sizes(
+                before.force + 0.25 * (sizes.force - before.force),
+                before.memory + 0.25 * (sizes.memory - before.memory),
+                before.noise + 0.25 * (sizes.noise - before.noise),
+            )
         else:
             trust, before, new = min(2.0 * trust, FURTHEST), sizes, sizes.moved(way, part, bounds, trust)
 

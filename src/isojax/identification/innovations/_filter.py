@@ -142,8 +142,8 @@ def _update(
             total = [one + more for one, more in zip(total, column, strict=True)]
         ahead.append((*total, lanes.memory + zero if place == last else zero))
     mixed = [[sum(after[row][other] * ahead[other][to] for other in every) for row in every] for to in every]
-    upper = {
-        (to, other): sum(ahead[row][other] * mixed[to][row] for row in every)
+    upper: dict[tuple[int, int], Array] = {
+        (to, other): sum((ahead[row][other] * mixed[to][row] for row in every), start=zero)
         for to in every
         for other in range(to, len(state))
     }

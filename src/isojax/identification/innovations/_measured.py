@@ -30,7 +30,9 @@ class Measured:
             hold: what the drive does between samples.
             noise: rms that the noise of each record cannot exceed [SI unit of the output].
         """
-        self.records, self.quantity, self.hold = records, quantity, hold
+        self.records = records
+        self.quantity: Quantity = quantity
+        self.hold: Hold = hold
         ends = [(place, 0, record.output.size, record.settle) for place, record in enumerate(records)]
         if len(records) == 1:
             (place, start, stop, settle), middle = ends[0], records[0].output.size // 2

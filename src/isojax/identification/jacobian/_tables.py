@@ -33,7 +33,9 @@ class Tables:
             integrator: solver and steps.
             whitening: see `Prepared`.
         """
-        self.records, self.segments, self.quantity, self.hold = records, segments, quantity, hold
+        self.records, self.segments = records, segments
+        self.quantity: Quantity = quantity
+        self.hold: Hold = hold
         self.integrator, self.whitening = integrator, whitening
         self._prepared: dict[tuple[int, float, float], Prepared] = {}
 

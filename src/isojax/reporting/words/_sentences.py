@@ -14,7 +14,7 @@ from ..._quantities import (
 )
 from ..._results import RESULTS, is_successful
 from ...elements import CATALOGUE
-from ...identification import OUTPUT_UNITS, Finding, Fit, Loop, plain_unit
+from ...identification import OUTPUT_UNITS, Errors, Finding, Fit, Loop, plain_unit
 from ...identification.diagnosis import is_good, leaves_noise
 from ...identification.fitting import bent_words
 from ...records import DataHealth
@@ -70,16 +70,30 @@ def error_words(before: Fit, after: Fit) -> str:
         after: the final fit.
 
     Returns:
-        Such as "held-out χ²/dof 3.00 → 1.02".
+        Such as "held-out χ²/dof 3.00 → 1.02"; where the declared model's error is not noise of the output,
+        the error of free runs.
     """
     role = "holdout" if before.errors["holdout"] is not None else "fit"
     place = "held-out χ²/dof" if role == "holdout" else "χ²/dof on the fitted records (none was held out)"
     first, last = before.errors[role], after.errors[role]
     if first is None or last is None:
         return f"{place} unknown"
+    if has_model_error(before):
+        return _free_run_words(role, first, None if before is after else last)
     if before is after:
         return f"{place} {typeset_goodness(last.chi2_per_dof, 2)}"
     return f"{place} {typeset_goodness(first.chi2_per_dof, 2)} → {typeset_goodness(last.chi2_per_dof, 2)}"
+
+
+def has_model_error(fit: Fit) -> bool:
+    """Say whether a fit's error is known to be more than noise of the output."""
+    return fit.innovations is not None and not fit.innovations.is_noise_of_output
+
+
+def _free_run_words(role: str, first: Errors, last: Errors | None) -> str:
+    place = "held-out" if role == "holdout" else "fitted"
+    shares = typeset_share(first.nrmse) + ("" if last is None else f" → {typeset_share(last.nrmse)}")
+    return f"free runs of the {place} records are off by {shares} of their rms"
 
 
 _DOUBTS = {
@@ -137,7 +151,7 @@ def _verdict_words(loop: Loop) -> str:
             f"a force c {typeset_formula(better.formula)} explains the records clearly better than "
             f"{effects}; {error}."
         )
-    if loop.verdict == "partly_explained" and found:
+    if loop.verdict == "partly_explained" and found and not has_model_error(loop.after):
         return (
             f"{_capital(effects)}, {verb} missing, and something else is missing too{_standing_out(loop)}; "
             f"{error} (noise alone: 1)."
@@ -163,6 +177,15 @@ def _verdict_words(loop: Loop) -> str:
             f"output shows by itself, or a disturbance (χ²/dof {typeset_goodness(goodness)} by that noise); "
             f"{error}."
         )
+    if has_model_error(loop.after) and found:
+        taken = 1.0 - (loop.after.nrmse / loop.before.nrmse) ** 2
+        take = "take" if len(found) > 1 else "takes"
+        return (
+            f"{_capital(effects)}, {take} {typeset_share(taken)} off the squared error of the fitted "
+            f"records; the rest is an error of the model and not noise; {error}."
+        )
+    if has_model_error(loop.after):
+        return f"Something is missing that no known effect explains: {error}, which is not noise."
     known = f" even with {effects}" if found else ""
     return f"Something is missing that no known effect explains{known}; {error} (noise alone: 1)."
 
