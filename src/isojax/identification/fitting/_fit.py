@@ -32,6 +32,9 @@ from ._simulator import Simulator
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
 
+_CONTRADICTED = 100.0
+"""chi2/dof from which the residual contradicts the noise that the output shows: the error is the model's."""
+
 _FEW_STEPS = 20
 """Simulations with derivatives of a search that starts where a filter ended."""
 
@@ -141,7 +144,9 @@ def fit_by_output(
     """
     places = free_places(model, (), None, campaign.mass_free) if places is None else places
     noise = estimate_noise(campaign)
-    if integrator is None and suits_innovations(campaign):
+    followed = integrator is None and suits_innovations(campaign)
+    # Under base excitation the drive is as noisy as the response: both are readings of accelerometers.
+    if followed and campaign.input.quantity == "base_acceleration":
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
         raise ValueError(
@@ -163,6 +168,9 @@ def fit_by_output(
         again = fit_from(linear)
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
+    if followed and not (is_successful(found.result) and found.chi2 < _CONTRADICTED * found.dof):
+        search.progress("the residual is far above the noise that the output shows: with a random force")
+        return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     return _with_less_noise(complete(found, model, campaign, noise), search)
 
 

@@ -50,13 +50,12 @@ def suits_innovations(campaign: Campaign) -> bool:
     Returns:
         False where a record has dwells, or is the decay after a release.
     """
-    records = campaign.fit_records
     return all(
         not record.dwells
         and record.kind != "free_decay"
         and record.output.size > 8 * SHORTEST
-        and np.any(record.input)
-        for record in records
+        and bool(np.any(record.input))
+        for record in campaign.fit_records
     )
 
 
