@@ -22,7 +22,7 @@ from isojax.identification import diagnose, fit, scales
 from isojax.identification.diagnosis._score import chosen_phase_law, score_test
 from isojax.identification.fitting import Search
 from isojax.identification.jacobian._channels import channel_table, drive_harmonic, output_line
-from isojax.models import Isolator
+from isojax.models import Integrator, Isolator
 from isojax.records import Record
 
 RATE = 50.0
@@ -263,7 +263,7 @@ def test_a_held_drive_is_scored_with_its_share_where_one_step_spans_a_sample(sim
     plan = rig.Multisine((60.0,), 2.0, 12.0, 4.0, 3)
     campaign = simulated(plant.plus(rig.InputHold(0.0)), plan, bench=bench)
     truth = Isolator(MASS, (LinearStiffness(STIFFNESS), LinearDamping(DAMPING)))
-    found = fit(truth, campaign)
+    found = fit(truth, campaign, integrator=Integrator())
     (score,) = score_test(found.estimate, Search(scales(campaign)), (InputHold(0.0, 0.0),)).scores
     assert score.strength == pytest.approx(1.0, abs=0.05)
     # Of the noise alone: what the declared course leaves enlarges this error as it does those of a fit.

@@ -154,11 +154,13 @@ def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fi
     inflation = 1.0 if found.is_noise else found.inflation
     uncertainty = invert_information(found.information, inflation)
     estimate = Estimate(found.model, found.places, simulator, point, uncertainty, result, found.steps)
-    deviance = float(found.deviance.sum())
+    deviance, owners = float(found.deviance.sum()), [one.record for one in found.filter.measured.segments]
+    levels = np.array([noise.levels[fitted[place]] for place in owners])
+    chi2 = found.chi2 if found.is_noise else float(np.sum(free_squares(found) / levels**2))
     stats = Statistics(
         int(samples),
         count,
-        found.chi2,
+        chi2,
         max(1.0, samples - count),
         deviance + 2.0 * count,
         found.criterion,
@@ -197,7 +199,7 @@ def noise_of_errors(found: ErrorFit, campaign: Campaign, alone: bool) -> NoiseEs
         The noise.
     """
     shown = estimate_noise(campaign)
-    if alone and shown.method in _SHOWN:
+    if shown.method in _SHOWN:
         return shown
     owners = np.array([one.record for one in found.filter.measured.segments])
     lengths = np.array([one.stop - one.counted for one in found.filter.measured.segments], dtype=float)

@@ -24,6 +24,9 @@ CONVERGED = 0.05
 _TRIED = np.array([1e-3, 0.03, 1.0, 30.0])
 """Marquardt's dampings that a step tries side by side, over that of the last step."""
 
+_UNDETERMINED = 1e-10
+"""Information of a combination of coefficients, each scaled to one, below which it is not determined."""
+
 _FAR = 3.0
 """Largest step of an unbounded variable, in its magnitude."""
 
@@ -321,8 +324,11 @@ def _damped_steps(
     """Give Marquardt's steps of the unbounded variables, and what the longest promises."""
     inner, outer = products[:-1, :-1], products[:-1, -1]
     unit = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-    scaled = inner / np.outer(unit, unit)
-    steps = [-np.linalg.solve(scaled + own * np.eye(unit.size), outer / unit) / unit for own in dampings]
+    values, vectors = np.linalg.eigh(inner / np.outer(unit, unit))
+    known = values > _UNDETERMINED * unit.size
+    values, vectors = values[known], vectors[:, known]
+    along = vectors.T @ (outer / unit)
+    steps = [-(vectors @ (along / (values + own))) / unit for own in dampings]
     promised = float(-steps[0] @ outer)
     return [one * min(1.0, _FAR / max(np.abs(one).max(initial=0.0), 1e-300)) for one in steps], promised
 
