@@ -32,9 +32,6 @@ from ._simulator import Simulator
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
 
-_CONTRADICTED = 100.0
-"""chi2/dof from which the residual contradicts the noise that the output shows: the error is the model's."""
-
 _FEW_STEPS = 20
 """Simulations with derivatives of a search that starts where a filter ended."""
 
@@ -168,16 +165,10 @@ def fit_by_output(
         again = fit_from(linear)
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
-    contradicted = not found.chi2 < _CONTRADICTED * found.dof and not _frees_channels(campaign)
-    if followed and (contradicted or not is_successful(found.result)):
-        search.progress("the residual is far above the noise that the output shows: with a random force")
+    if followed and not is_successful(found.result):
+        search.progress("the search fails: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     return _with_less_noise(complete(found, model, campaign, noise), search)
-
-
-def _frees_channels(campaign: Campaign) -> bool:
-    """Say whether a gain or an offset of a channel is free: what a random force cannot be told from."""
-    return campaign.input.gain_free or campaign.input.offset_free or campaign.output.offset_free
 
 
 def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search: Search) -> Fit:

@@ -91,6 +91,17 @@ def _predict(
     return (*advance(model, RK4(), quantity, step, state[:-1], pushed), memory * state[-1])
 
 
+def _delayed(
+    model: Isolator, stages: tuple[Instant, ...], tabled: tuple[Array, Array]
+) -> tuple[Instant, ...]:
+    """Give what acts with the model's delay, from tables that were made with another, to first order."""
+    moved = []
+    for at in stages:
+        elapsed = at.channels.get("elapsed", 0.0)
+        moved.append(at.delayed(model.shift(elapsed) - tabled[0] - tabled[1] * elapsed))
+    return tuple(moved)
+
+
 def _correct(state: State, gain: State, error: Array) -> State:
     return tuple(one + k * error for one, k in zip(state, gain, strict=True))
 
@@ -159,6 +170,7 @@ def follow_records(
     batch: Batch,
     quantity: Quantity,
     step: float,
+    tabled: tuple[Array, Array],
     kept: int,
     spacing: float,
 ) -> Followed:
@@ -171,6 +183,7 @@ def follow_records(
         batch: the records.
         quantity: what the sensor measures.
         step: time between samples [s].
+        tabled: delay of the drive with which the records were tabulated, and its growth.
         kept: the first lanes, whose way is wanted; so many more follow for each size up, and down.
         spacing: by which the logarithm of a size differs there.
 
@@ -183,7 +196,7 @@ def follow_records(
     def body(carry: tuple, table: tuple) -> tuple[tuple, Trace]:
         state, covariance, deviance, square, slope, fisher = carry
         acting, measured, weight, used = table
-        stages = split_stages(acting)
+        stages = _delayed(present, split_stages(acting), tabled)
         gain, variance, ahead = _update(
             present, quantity, step, lanes, state, covariance, stages, measured, used
         )
@@ -229,6 +242,7 @@ def innovation_products(
     batch: Batch,
     quantity: Quantity,
     step: float,
+    tabled: tuple[Array, Array],
 ) -> Float[Array, "column column lanes"]:
     """Differentiate the innovations with the gains and their deviations held.
 
@@ -242,6 +256,7 @@ def innovation_products(
         batch: the records.
         quantity: what the sensor measures.
         step: time between samples [s].
+        tabled: delay of the drive with which the records were tabulated, and its growth.
 
     Returns:
         `A^T A` of each lane, with A the columns of de/dtheta and, last, e, over their deviations.
@@ -265,7 +280,7 @@ def innovation_products(
 
         def innovate(moved: tuple[Array, ...], state: State) -> tuple[State, Array]:
             current = with_moved(moved)
-            slowed = tuple(current.with_delay_slope(at) for at in stages)
+            slowed = _delayed(current, stages, tabled)
             error = measured - _read(current, quantity, state, slowed[0])
             after = _correct(state, gain, error)
             return _predict(current, quantity, step, memory, after, slowed), error

@@ -148,6 +148,10 @@ class RecordFilter:
         self.starts, self.spread = np.zeros((states, self.count)), np.zeros((states, self.count))
         self.starts[:2] = prepared.starts[:, : self.count]
         self.spread[:2] = prepared.spread[:, : self.count] ** 2
+        self._tabled = (
+            on_device(np.asarray(model.shift(), dtype=float)),
+            on_device(np.asarray(model.skew(), dtype=float)),
+        )
         self._numbers = [np.asarray(entry.value, dtype=float) for entry in list_parameters(model)]
         self._copied: dict[tuple[int, int], Batch] = {}
 
@@ -190,7 +194,15 @@ class RecordFilter:
             sampling, values = self.prepared.sampling, self._values(part, places, points)
             batch = self._batch(part, copies)
             return follow_records(
-                self.model, values, lanes, batch, sampling.quantity, sampling.time, width, SPACING
+                self.model,
+                values,
+                lanes,
+                batch,
+                sampling.quantity,
+                sampling.time,
+                self._tabled,
+                width,
+                SPACING,
             )
 
         found = self._in_parts(one)
@@ -244,6 +256,7 @@ class RecordFilter:
                 batch,
                 sampling.quantity,
                 sampling.time,
+                self._tabled,
             )
 
         return self._by_record(self._in_parts(one), copies)
