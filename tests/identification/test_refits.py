@@ -13,7 +13,7 @@ from isojax._parameters import list_parameters
 from isojax._results import is_successful
 from isojax.elements import CoulombFriction, DriveHarmonics, FractionalDamping, StribeckFriction
 from isojax.identification import Rules, classical_guess, read_campaign
-from isojax.identification.diagnosis._refit import _extended, is_determined, trace_error
+from isojax.identification.diagnosis._refit import extended_model, is_determined, trace_error
 from isojax.identification.diagnosis._score import Score
 from isojax.identification.fitting import Estimate
 from isojax.identification.fitting._covariance import invert_information
@@ -43,7 +43,7 @@ def test_a_step_moves_the_coefficients_that_it_is_of_where_an_element_makes_room
     nothing: Any = None
     fitted = Estimate(model, places, nothing, nothing, nothing, nothing, 0)
     step = np.array([0.1 * float(listed[place].value) for place in places])
-    moved = _extended(fitted, StribeckFriction(0.0, 0.5, 0.01, 1e-4), 1.0, step)
+    moved = extended_model(fitted, StribeckFriction(0.0, 0.5, 0.01, 1e-4), 1.0, step)
     expected = {"linear_stiffness.coefficient": 1.1e6, "linear_damping.coefficient": 1.1e4}
     expected |= {"drive_harmonics.share": 0.011, "drive_harmonics.phase": 0.33, "drive_harmonics.order": 2.0}
     # Coulomb friction is part of the new law, which keeps its force and has its own step on top.

@@ -42,7 +42,12 @@ ACCURACY = {
     "_lack_of_fit": {"HIGHEST", "HIGHEST_ORDER", "LINES_A_BAND", "LINES_BESIDE"},
     "_remainder": {"FEWEST_CELL_SAMPLES"},
     "_residual": {"MOST_LAGS"},
-    "_score_columns": {"ENTRIES", "LEAST_COLUMNS"},
+    "_score_columns": {"ENTRIES", "LEAST_COLUMNS", "NO_MEMORY"},
+    # What a filter follows, how much of it, and how large its covariance may grow.
+    "_fit": {"MOST_EVALUATIONS"},
+    "_fit_of_errors": {"LEAST_KEPT", "LOUDEST", "POWER", "SHORTEST_RECORD"},
+    "_effect_search": {"MOST_FOLDS", "SMALLER"},
+    "_by_innovations": {"MOST_INTERNAL"},
     "_segment_scatter": {"SAME_DRIVE_AND_RESPONSE", "SAME_FREQUENCY"},
     "_segments": {"DECAY_TIMES_A_WINDOW", "FEWEST_WINDOWS", "SHORTEST", "SHORTEST_WINDOW"},
     # What is drawn up and shown.

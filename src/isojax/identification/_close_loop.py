@@ -233,10 +233,7 @@ def _loop(
     extensions, (verdict, beside) = search_effects(before, search, max_iterations, excluded)
     if extensions:
         progress(Stage("search for separating experiments", _EXPERIMENT, (_LAWS, _RUNS)))
-        extensions = tuple(
-            step if step.after.innovations is not None else with_separating_experiment(step, rules)
-            for step in extensions
-        )
+        extensions = tuple(with_separating_experiment(step, rules) for step in extensions)
     after = extensions[-1].after if extensions else before
     if not is_successful(after.result):
         verdict = _without_evidence(after)

@@ -55,6 +55,24 @@ class Rules:
     """Share of an effect's trace that the fitted coefficients must leave; below it the records cannot show
     the effect."""
 
+    # Records that a filter follows.
+
+    dispersed: float = 1.5
+    """Variance of scores from piece to piece of the records, over that of independent innovations, from which
+    it takes the place of that: the error is then the model's."""
+
+    likeness: float = 0.95
+    """Likeness of two traces from which the records hardly distinguish their effects: both are refitted."""
+
+    clear_gain: float = 0.05
+    """Gain of -2 log-likelihood a sample from which an effect that leaves noise alone carries over."""
+
+    free_run_tie: float = 0.1
+    """Larger error of free runs, relative, up to which two models whose error is not noise are as good."""
+
+    near_noise: float = 1.3
+    """chi2/dof below which laws that are split where they jump explain what their rounding left."""
+
     # Which candidates are refitted.
 
     survivors: int = 4

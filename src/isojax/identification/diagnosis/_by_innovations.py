@@ -17,15 +17,6 @@ from ._separating_words import is_exact, separating_experiment
 MOST_INTERNAL = 4
 """Internal states of a model that is refitted: the filter's covariance grows with their square."""
 
-_CLEAR = 0.05
-"""Gain a sample from which an effect that leaves noise alone carries over: no imitation leaves so little."""
-
-_AS_GOOD = 0.1
-"""Larger error of free runs, relative, up to which two models of a model's error are as good."""
-
-_ALIKE = 0.95
-"""Likeness of two traces from which the records hardly distinguish their effects."""
-
 
 class Weighed(NamedTuple):
     """A candidate that nothing speaks against, and what it takes off records that its refit did not see.
@@ -69,7 +60,7 @@ def diagnose_innovations(
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
     for refit in usable:
-        if refit.fit.is_noise_of_output and _gain(found, refit) > _CLEAR * found.samples:
+        if refit.fit.is_noise_of_output and _gain(found, refit) > rules.clear_gain * found.samples:
             best = Weighed(refit, Transfer(_gain(found, refit), 1.0))
             break
         one = Weighed(refit, transfer(found, refit.fit, search))
@@ -110,7 +101,7 @@ def _refits(found: ErrorFit, scores: Scores, search: Search) -> list[Refit]:
     alike = _look_alikes(best.score.element.name)
     place = next(index for index, one in enumerate(scores.scores) if one is best.score)
     for index, score in enumerate(scores.scores):
-        near = score.element.name in alike or abs(best.score.likeness[index]) > _ALIKE
+        near = score.element.name in alike or abs(best.score.likeness[index]) > rules.likeness
         done = any(one.score is score for one in refits)
         few = found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
         if near and few and not done and index != place and score.admissible:
@@ -167,7 +158,7 @@ def _by_evidence(
     else:
         # The error is the model's: what a free run leaves counts, record by record over its size.
         usable = sorted(usable, key=lambda one: _free_error(one.fit))
-        tied = [one for one in usable if _as_good(one.fit, usable[0].fit)]
+        tied = [one for one in usable if _as_good(one.fit, usable[0].fit, rules)]
     if not usable:
         return []
     first = min(tied, key=lambda one: (len(one.fit.places), one.fit.model.internal_states))
@@ -268,7 +259,7 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         for one in refits
         if one is not refit
         and one.violation is None
-        and (one.fit.criterion <= limit if np.isfinite(limit) else _as_good(one.fit, refit.fit))
+        and (one.fit.criterion <= limit if np.isfinite(limit) else _as_good(one.fit, refit.fit, rules))
         and name not in CATALOGUE[one.score.element.name].absorbs
     )
     exact = tuple(
@@ -301,6 +292,6 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
     return Verdict(verdict, finding, ranking, together, 1.0 - explained, scores.hidden, {}, whole, reason)
 
 
-def _as_good(one: ErrorFit, best: ErrorFit) -> bool:
+def _as_good(one: ErrorFit, best: ErrorFit, rules: Rules) -> bool:
     """Say whether a model follows the records about as well as another, when nothing is fed back."""
-    return _free_error(one) <= _free_error(best) * (1.0 + _AS_GOOD)
+    return _free_error(one) <= _free_error(best) * (1.0 + rules.free_run_tie)

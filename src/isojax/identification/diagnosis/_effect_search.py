@@ -25,11 +25,14 @@ from ._score import absent_effects
 _SHARES = (1.0, 0.3, 0.1, 0.03)
 """Shares of the score's linear step at which a refit may start."""
 
+_SMALLER = 4.0
+"""How far below a first guess the random force of a refit may start [log of variance]."""
+
+_MOST_FOLDS = 4
+"""Parts of the records of which each is left out in turn, at most."""
+
 _ROUGH_STEPS = 16
 """Steps of a refit that is only ranked."""
-
-DISPERSED = 1.5
-"""Variance of scores over what independent innovations give, from which their error is the model's."""
 
 
 class Score(NamedTuple):
@@ -125,7 +128,7 @@ def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ())
     amount = np.where(seen, left[:-1, -1] / np.where(seen, size, 1.0) ** 2, 0.0)
     scatter = apart.var(axis=1, ddof=1) * apart.shape[1] / np.where(seen, size, 1.0) ** 2
     dispersion = float(np.median(scatter[seen])) if np.any(seen) else 1.0
-    factor = np.sqrt(np.maximum(1.0, scatter)) if dispersion > DISPERSED else np.ones_like(scatter)
+    factor = np.sqrt(np.maximum(1.0, scatter)) if dispersion > rules.dispersed else np.ones_like(scatter)
     z = np.where(seen, amount * size / factor, 0.0)
     physical = np.array([probe.signed for probe in probes], dtype=bool) | (amount > 0.0)
     pull = np.abs(amount * size)
@@ -177,7 +180,7 @@ def refit_effect(fit: ErrorFit, score: Score, search: Search) -> Refit:
         starts.append(np.array([float(listed[place].value) for place in places]))
     large = first_sizes(fit.filter)
     sizes = fit.sizes._replace(
-        force=max(fit.sizes.force, large.force - 4.0), memory=max(fit.sizes.memory, 1.0)
+        force=max(fit.sizes.force, large.force - _SMALLER), memory=max(fit.sizes.memory, 1.0)
     )
     found = fit_measured(
         model,
@@ -227,8 +230,8 @@ def transfer(fit: ErrorFit, found: ErrorFit, search: Search) -> Transfer:
     """
     count = fit.filter.count
     folds = [np.arange(count) == place for place in range(count)]
-    if count > 4:
-        folds = [np.arange(count) % 4 == place for place in range(4)]
+    if count > _MOST_FOLDS:
+        folds = [np.arange(count) % _MOST_FOLDS == place for place in range(_MOST_FOLDS)]
     gained, squares = 0.0, np.zeros(2)
     for unseen in folds:
         for place, one in enumerate((fit, found)):

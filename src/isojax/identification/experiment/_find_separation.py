@@ -145,7 +145,8 @@ def with_separating_experiment(extension: Extension, rules: Rules = Rules()) -> 
         The same extension; where nothing can be simulated, its finding keeps the advice in words.
     """
     finding = extension.verdict.finding
-    if finding is None or not finding.indistinguishable:
+    # Plans are simulated without the random force that a filter's fit has.
+    if finding is None or not finding.indistinguishable or extension.fit.innovations is not None:
         return extension
     separation = find_separating_experiment(extension, rules=rules)
     best, words = separation.best, separation.words

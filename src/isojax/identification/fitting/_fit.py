@@ -29,17 +29,14 @@ from ._saved_fit import Statistics
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
 from ._simulator import Simulator
 
+_WEIGHINGS = 4
+"""Times that a fit is weighted anew by less noise."""
+
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
 
 _FEW_STEPS = 20
 """Simulations with derivatives of a search that starts where a filter ended."""
-
-_NEAR = 1.3
-"""chi2/dof below which a search without a random force has explained the records."""
-
-_WEIGHINGS = 4
-"""Times that a fit is weighted anew by less noise."""
 
 
 @in_own_threads
@@ -141,7 +138,8 @@ def fit_by_output(
     """
     places = free_places(model, (), None, campaign.mass_free) if places is None else places
     noise = estimate_noise(campaign)
-    followed = integrator is None and suits_innovations(campaign)
+    whole = integrator is None and search.max_steps >= MOST_EVALUATIONS
+    followed = whole and suits_innovations(campaign)
     # Under base excitation the drive is as noisy as the response: both are readings of accelerometers.
     if followed and campaign.input.quantity == "base_acceleration":
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
@@ -195,14 +193,14 @@ def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search
     if is_successful(plain.result) and found.is_noise_of_output:
         return plain._replace(innovations=found)
     # The filter rounds laws that jump. Where these are split instead, its random force has nothing to say.
-    if is_successful(plain.result) and is_near(plain):
+    if is_successful(plain.result) and is_near(plain, search.rules):
         return plain
     return as_fit_of_errors(found, start, campaign)
 
 
-def is_near(found: Fit) -> bool:
+def is_near(found: Fit, rules: Rules) -> bool:
     """Say whether a fit leaves about as much as the noise that its output shows."""
-    return found.stats.chi2 < _NEAR * found.stats.dof
+    return found.stats.chi2 < rules.near_noise * found.stats.dof
 
 
 def _with_less_noise(found: Fit, search: Search) -> Fit:

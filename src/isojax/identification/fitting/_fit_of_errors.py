@@ -12,7 +12,6 @@ from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thin_record
 from ..innovations import ErrorFit, Measured, fit_measured, free_squares
-from ..jacobian import SHORTEST
 from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
@@ -30,14 +29,17 @@ _LOUDEST = 1.3
 _SMALL_NOISE = 0.05
 """Noise that any record may have, over its rms: a filtered record shows too little above its band."""
 
+_SHORTEST_RECORD = 64
+"""Samples of a record that a filter follows, at least."""
+
 _SHOWN = ("declared", "repeats", "periods", "cycle_scatter")
 """Methods that show the noise of the output itself."""
 
-_SAMPLES_A_CYCLE = 25.0
+_KEPT_A_CYCLE = 25.0
 _POWER = 0.999
 """Samples a cycle of the frequency below which so much of the output's power lies: fewer say as much."""
 
-_FEWEST_SAMPLES = 5000
+_LEAST_KEPT = 5000
 """Samples of all records below which none are left out."""
 
 
@@ -53,7 +55,7 @@ def suits_innovations(campaign: Campaign) -> bool:
     return all(
         not record.dwells
         and record.kind != "free_decay"
-        and record.output.size > 8 * SHORTEST
+        and record.output.size > _SHORTEST_RECORD
         and bool(np.any(record.input))
         for record in campaign.fit_records
     )
@@ -69,8 +71,8 @@ def _thinning(records: tuple[Record, ...], hold: Hold) -> int:
         share = np.cumsum(power) / max(power.sum(), 1e-300)
         highest = max(highest, float(np.searchsorted(share, _POWER)) * record.rate / record.output.size)
     samples = sum(record.output.size for record in records)
-    factor = records[0].rate / (_SAMPLES_A_CYCLE * highest) if highest > 0.0 else 1.0
-    return max(1, int(min(factor, samples / _FEWEST_SAMPLES)))
+    factor = records[0].rate / (_KEPT_A_CYCLE * highest) if highest > 0.0 else 1.0
+    return max(1, int(min(factor, samples / _LEAST_KEPT)))
 
 
 def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:

@@ -47,7 +47,7 @@ class Fit(NamedTuple):
         result: how the search ended.
         estimate: the equations at the solution.
         evaluation: the model compared with every record, fitted and held out, when first asked for.
-        innovations: the same model with the sizes of its errors, where records have no dwells; else None.
+        innovations: the same with the sizes of its errors, where a filter found it; else None.
     """
 
     model: Isolator
@@ -317,9 +317,8 @@ def _correlations(fit: Fit) -> list[str]:
         for j in range(i + 1, len(fit.free))
         if np.abs(correlation[i, j]) >= _STRONG
     ]
-    return [
-        f"C({one}, {other}) = {value:+.4f}" for value, one, other in sorted(pairs, key=lambda p: -abs(p[0]))
-    ]
+    ordered = sorted(pairs, key=lambda pair: -abs(pair[0]))
+    return [f"C({one}, {other}) = {value:+.4f}" for value, one, other in ordered]
 
 
 def warnings_of(fit: Fit) -> list[str]:
@@ -396,7 +395,6 @@ def _not_determined(fit: Fit) -> list[str]:
 
 def _touched_bound(entry: Parameter, error: float) -> float | None:
     """Give the bound that a value stands on: within its standard error, or exactly."""
-    value = float(entry.value)
-    near = error if math.isfinite(error) else 0.0
+    value, near = float(entry.value), error if math.isfinite(error) else 0.0
     bounds = (bound for bound in (entry.spec.lower, entry.spec.upper) if math.isfinite(bound))
     return next((bound for bound in bounds if abs(value - bound) <= near), None)

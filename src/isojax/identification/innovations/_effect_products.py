@@ -10,7 +10,14 @@ from jaxtyping import Array, Float, Int
 from ..._parameters import element_names, list_parameters
 from ...elements import AbstractElement
 from ...models import Isolator
-from ..jacobian import PIECES, Followed, Unknowns, has_stiffness_scale, internal_starts, score_information
+from ..jacobian import (
+    SCORE_PIECES,
+    Followed,
+    Unknowns,
+    has_stiffness_scale,
+    internal_starts,
+    score_information,
+)
 from ._error_fit import ErrorFit
 
 
@@ -81,4 +88,4 @@ def effect_products(
 def _pieces(deviation: Float[Array, "time lanes"]) -> Int[Array, "time lanes"]:
     """Cut the samples of each lane that count into pieces of equal length."""
     counted = jnp.cumsum(jnp.isfinite(deviation), axis=0)
-    return jnp.minimum(PIECES * counted // jnp.maximum(counted[-1:], 1), PIECES - 1)
+    return jnp.minimum(SCORE_PIECES * counted // jnp.maximum(counted[-1:], 1), SCORE_PIECES - 1)

@@ -15,10 +15,10 @@ from ...models import Isolator
 from ._filter import Trace
 from ._record_filter import COPIES, FURTHEST, RecordFilter, Sizes, Way, physical
 
-MOST_STEPS = 40
+MOST_SCORINGS = 40
 """Steps of a search at most."""
 
-CONVERGED = 0.05
+SETTLED_DEVIANCE = 0.05
 """Decrease of the deviance of a step below which a search is over."""
 
 _TRIED = np.array([1e-3, 0.03, 1.0, 30.0])
@@ -46,7 +46,7 @@ _LAGS = 20
 _WHITE_ENOUGH = 0.03
 """Share of an innovation's variance that those before it may foretell where the error is noise."""
 
-_ALIKE = 0.3
+_RECORDS_ALIKE = 0.3
 """Difference of the innovations' variance from that expected, relative, up to which records are alike."""
 
 _WHITE = -1.0
@@ -175,7 +175,7 @@ class ErrorFit:
             return True
         counted = np.array([max(own.size, 1) for own in self.innovations])
         levels = self.products[-1, -1] / counted
-        return self.colour < _WHITE_ENOUGH and bool(np.all(np.abs(levels - 1.0) < _ALIKE))
+        return self.colour < _WHITE_ENOUGH and bool(np.all(np.abs(levels - 1.0) < _RECORDS_ALIKE))
 
     @property
     def criterion(self) -> float:
@@ -212,7 +212,7 @@ def fit_errors(
     sizes: Sizes,
     *,
     loudest: Float[np.ndarray, " record"],
-    most_steps: int = MOST_STEPS,
+    most_steps: int = MOST_SCORINGS,
     starts: Sequence[Float[np.ndarray, " column"]] = (),
     judged: Float[np.ndarray, " record"] | None = None,
 ) -> ErrorFit:
@@ -285,7 +285,7 @@ def fit_errors(
             free, damping = free + tried[best], float(np.clip(damping * _TRIED[best], 1e-9, 1e9))
         else:
             damping = min(1e9, 1e3 * damping)
-        if deviance > last + CONVERGED:  # the last step of the sizes went too far
+        if deviance > last + SETTLED_DEVIANCE:  # the last step of the sizes went too far
             trust *= 0.25
             new = Sizes(
                 before.force + 0.25 * (sizes.force - before.force),
@@ -295,8 +295,8 @@ def fit_errors(
         else:
             trust, before, new = min(2.0 * trust, FURTHEST), sizes, sizes.moved(way, part, bounds, trust)
 
-        settled = step > 2 and abs(last - deviance) < CONVERGED and gain < CONVERGED
-        if settled and (promised < CONVERGED or damping >= 1e6):
+        settled = step > 2 and abs(last - deviance) < SETTLED_DEVIANCE and gain < SETTLED_DEVIANCE
+        if settled and (promised < SETTLED_DEVIANCE or damping >= 1e6):
             result = RESULTS.successful if promised < 1.0 else RESULTS.not_converged
             break
         sizes, last = new, deviance

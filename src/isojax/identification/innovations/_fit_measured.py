@@ -7,12 +7,12 @@ from jaxtyping import Float
 
 from ..._results import is_successful
 from ...models import Isolator
-from ._error_fit import MOST_STEPS, ErrorFit, first_sizes, fit_errors
+from ._error_fit import MOST_SCORINGS, ErrorFit, first_sizes, fit_errors
 from ._measured import Measured
 from ._record_filter import RecordFilter, Sizes
 
-FEWEST = 2
-FINEST = 16
+LEAST_SUBSTEPS = 2
+MOST_SUBSTEPS = 16
 """Integration steps a sample: at least, and at most."""
 
 SMALL = 0.1
@@ -27,7 +27,7 @@ def fit_measured(
     measured: Measured,
     sizes: Sizes | None = None,
     starts: Sequence[Float[np.ndarray, " column"]] = (),
-    most_steps: int = MOST_STEPS,
+    most_steps: int = MOST_SCORINGS,
 ) -> ErrorFit:
     """Fit a model to records, with more integration steps where the motion diverges.
 
@@ -43,7 +43,7 @@ def fit_measured(
     Returns:
         The fit.
     """
-    steps = FEWEST
+    steps = LEAST_SUBSTEPS
     while True:
         record_filter = RecordFilter(model, measured, steps)
         first = first_sizes(record_filter) if sizes is None else sizes
@@ -57,9 +57,9 @@ def fit_measured(
             starts=starts,
             most_steps=most_steps,
         )
-        if np.isfinite(found.deviance.sum()) or steps >= FINEST:
+        if np.isfinite(found.deviance.sum()) or steps >= MOST_SUBSTEPS:
             return found
-        steps = FINEST
+        steps = MOST_SUBSTEPS
 
 
 def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
@@ -84,7 +84,7 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
         )
     while not steps_are_fine(found):
         steps = 2 * found.filter.steps
-        if steps > FINEST:
+        if steps > MOST_SUBSTEPS:
             return found
         finer = RecordFilter(found.model, measured, steps)
         finer.spread = found.filter.spread

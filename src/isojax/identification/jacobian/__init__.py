@@ -22,7 +22,7 @@ from ._families import follow_motion as follow_motion
 from ._information import information as information
 from ._information import readings as readings
 from ._internal_states import internal_starts as internal_starts
-from ._score_columns import PIECES as PIECES
+from ._score_columns import SCORE_PIECES as SCORE_PIECES
 from ._score_columns import Followed as Followed
 from ._score_columns import score_information as score_information
 from ._segments import SHORTEST as SHORTEST

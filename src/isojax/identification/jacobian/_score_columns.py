@@ -41,11 +41,14 @@ _LEAST_COLUMNS = 160
 """Columns for which a table has room at least: absent effects and free force laws, however many, then share
 compiled code."""
 
-PIECES = 10
+SCORE_PIECES = 10
 """Pieces of a lane over which the scatter of scores is seen."""
 
 _BY_STAGE = ("drive", "drive_rate", "channels")
 """Fields of a batch that have a value at each stage of a sample's steps."""
+
+_NO_MEMORY = 1e-3
+"""Correlation of a random force from sample to sample that counts as none."""
 
 _TOGETHER = 24
 """Columns that one linear solve carries: the last one is filled up, so that all have one shape."""
@@ -222,7 +225,7 @@ def _block(
         return np.moveaxis(np.asarray(_weigh(rows, batch.weight, sampling.whitening)), -1, 0)
     other = np.swapaxes(table, 1, 2)
     if followed is not None:
-        piece = np.asarray(followed.piece).T[..., None] == np.arange(PIECES)
+        piece = np.asarray(followed.piece).T[..., None] == np.arange(SCORE_PIECES)
         other = np.concatenate([other, table[:, -1, :, None] * piece], axis=2)
     # Where an internal state of a probe diverged its products are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -297,7 +300,7 @@ def _with_random_force(slopes: Slopes, memory: float, step: float) -> tuple[Chan
     still = jnp.zeros_like(slopes.states[0].reading)
     pushed = slopes.inputs["recorded"]
     own = Change(
-        (*(still + rate for rate in pushed.rates), still + np.log(max(memory, 1e-3)) / step),
+        (*(still + rate for rate in pushed.rates), still + np.log(max(memory, _NO_MEMORY)) / step),
         still + pushed.reading,
     )
     return (*(Change((*one.rates, still), one.reading) for one in slopes.states), own)
