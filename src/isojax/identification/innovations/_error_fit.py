@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -264,7 +265,7 @@ def fit_errors(
         deviances = followed(frees, [sizes] * len(frees)).deviance @ part
         free = frees[int(np.argmin(deviances[: len(frees)]))]
     last, before, trust = np.inf, sizes, FURTHEST
-    result: RESULTS = RESULTS.not_converged
+    result: Any = RESULTS.not_converged
     for step in range(1, most_steps + 1):
         way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
