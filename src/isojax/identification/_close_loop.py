@@ -357,8 +357,9 @@ def doubt_of(
     """
     if final.innovations is not None:
         old, new = before.errors["holdout"], final.errors["holdout"]
-        judged = old is not None and new is not None and not final.innovations.is_noise
-        return "worse" if judged and not new.nrmse <= old.nrmse else ""
+        if old is None or new is None or final.innovations.is_noise:
+            return ""
+        return "" if new.nrmse <= old.nrmse else "worse"
     tone: Doubt = "" if unlocked_tone(final, rules) is None else "a tone"
     other: Doubt = tone if last.law is None else "a further law"
     if any(one.better is not None for one in alternatives):
