@@ -195,7 +195,10 @@ def write_records(
     if drive == "stepped":
         counts = np.array(dwells())
         starts = np.cumsum(counts) - counts
-        rows = [f"{s / rate!r},{CYCLES * rate / n!r},{CYCLES}" for s, n in zip(starts, counts, strict=True)]
+        rows = [
+            f"{float(s / rate)!r},{float(CYCLES * rate / n)!r},{CYCLES}"
+            for s, n in zip(starts, counts, strict=True)
+        ]
         (folder / "dwells.csv").write_text("\n".join(["start_s,frequency_hz,cycles", *rows]) + "\n")
     sections = {
         "campaign": {"title": f"strong effect, {drive}", "mass": units["mass"]},

@@ -57,6 +57,10 @@ class Rules:
 
     # Records that a filter follows.
 
+    contradicted: float = 100.0
+    """chi2/dof from which the noise that the output shows says nothing of the error: a random force stands
+    for the rest."""
+
     dispersed: float = 1.5
     """Variance of scores from piece to piece of the records, over that of independent innovations, from which
     it takes the place of that: the error is then the model's."""

@@ -1,5 +1,7 @@
 """How finely to integrate: the one place of steps and tolerances."""
 
+import dataclasses
+
 import diffrax
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -26,6 +28,8 @@ class Integrator(eqx.Module):
         steps_per_period: steps a drive period of period maps; elements with sharp laws multiply it. Maps over
             a grid use it as it is and report their error; a single orbit takes as many as its tolerance
             needs.
+        band_limited: whether a jump of the reading between two samples rings in these, as behind an
+            anti-aliasing filter, or each sample is the reading at its instant. A fit finds out which.
 
     Raises:
         ValueError: if `rtol` is given to a solver that estimates no error, or the steps a period are odd.
@@ -41,6 +45,7 @@ class Integrator(eqx.Module):
     atol: float = eqx.field(static=True, default=1e-12)
     max_steps: int = eqx.field(static=True, default=50_000_000)
     steps_per_period: int = eqx.field(static=True, default=128)
+    band_limited: bool = eqx.field(static=True, default=True)
 
     def __check_init__(self):
         """Refuse adaptive steps without an error estimate."""
@@ -132,7 +137,7 @@ class Integrator(eqx.Module):
         Returns:
             The integrator.
         """
-        return Integrator(self.solver, self.substeps, self.rtol, self.atol, self.max_steps, steps_per_period)
+        return dataclasses.replace(self, steps_per_period=steps_per_period)
 
     @property
     def orbit_tolerance(self) -> float:

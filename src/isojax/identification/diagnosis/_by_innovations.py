@@ -10,7 +10,16 @@ from .._rules import Rules
 from ..fitting import Fit, Search, fit_with_errors, magnitudes
 from ..innovations import ErrorFit, free_squares, refined
 from ._bounds import WIDTH_95, strength_unit
-from ._effect_search import Refit, Score, Scores, Transfer, refit_effect, score_effects, transfer
+from ._effect_search import (
+    Refit,
+    Score,
+    Scores,
+    Transfer,
+    coefficients,
+    refit_effect,
+    score_effects,
+    transfer,
+)
 from ._findings import Candidate, Finding, Verdict, VerdictWord
 from ._separating_words import is_exact, separating_experiment
 
@@ -55,12 +64,13 @@ def diagnose_innovations(
     level = rules.significance if significance is None else significance
     scores = score_effects(found, search, excluded)
     search.progress(f"score test of {len(scores.scores)} absent effects")
-    refits = _refits(found, scores, search)
+    refits = _refits(found, fit, scores, search)
     usable = _by_evidence(found, refits, scores, level, rules)
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
     for refit in usable:
-        if refit.fit.is_noise_of_output and _gain(found, refit) > rules.clear_gain * found.samples:
+        clear = _gain(found, refit) > rules.clear_gain * found.samples
+        if refit.plain is not None or (refit.fit.is_noise_of_output and clear):
             best = Weighed(refit, Transfer(_gain(found, refit), 1.0))
             break
         one = Weighed(refit, transfer(found, refit.fit, search))
@@ -74,13 +84,13 @@ def diagnose_innovations(
     return _finding(search, fit, scores, refits, best)
 
 
-def _refits(found: ErrorFit, scores: Scores, search: Search) -> list[Refit]:
+def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[Refit]:
     """Refit the effects that the scores ask for, strongest first; then what looks like the best of them."""
     rules, refits = search.rules, list[Refit]()
 
     def refit(score: Score) -> None:
         search.progress(f"refit with {score.element.name}")
-        refits.append(refit_effect(found, score, search))
+        refits.append(refit_effect(found, score, fit, search))
 
     asked = [
         score
@@ -91,7 +101,7 @@ def _refits(found: ErrorFit, scores: Scores, search: Search) -> list[Refit]:
     ]
     for score in asked[: rules.survivors]:
         refit(score)
-        if refits[-1].violation is None and refits[-1].fit.is_noise_of_output:
+        if refits[-1].violation is None and refits[-1].explains:
             break  # nothing can explain more, but another law may explain as much
     best = min(
         (one for one in refits if one.violation is None), key=lambda one: one.fit.criterion, default=None
@@ -104,7 +114,9 @@ def _refits(found: ErrorFit, scores: Scores, search: Search) -> list[Refit]:
         near = score.element.name in alike or abs(best.score.likeness[index]) > rules.likeness
         done = any(one.score is score for one in refits)
         few = found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
-        if near and few and not done and index != place and score.admissible:
+        # Where a law leaves nothing but noise one with more coefficients cannot be told from it.
+        simpler = not best.explains or coefficients(found, score) <= len(best.fit.places)
+        if near and few and simpler and not done and index != place and score.admissible:
             refit(score)
     return refits
 
@@ -151,7 +163,11 @@ def _by_evidence(
             and gain - extra * np.log(found.samples) > rules.close_bic
         ):
             usable.append(refit)
-    if any(one.fit.is_noise for one in usable):
+    sharp = [one for one in usable if one.plain is not None]
+    if sharp:
+        tied = _tied(sharp, rules)
+        usable = sorted(usable, key=lambda one: (one.plain is None, one.fit.criterion))
+    elif any(one.fit.is_noise for one in usable):
         usable = sorted(usable, key=lambda one: (not one.fit.is_noise, one.fit.criterion))
         lowest = usable[0].fit.criterion + rules.close_bic
         tied = [one for one in usable if one.fit.is_noise and one.fit.criterion <= lowest]
@@ -163,6 +179,21 @@ def _by_evidence(
         return []
     first = min(tied, key=lambda one: (len(one.fit.places), one.fit.model.internal_states))
     return [first, *(one for one in usable if one is not first)]
+
+
+def _tied(sharp: list[Refit], rules: Rules) -> list[Refit]:
+    """List the laws that explain the records as well as the best of those that are split where they jump.
+
+    Each may be weighed by a noise of its own: their errors are compared by the rms that they leave.
+    """
+    bics = {}
+    for one in sharp:
+        assert one.plain is not None
+        left = one.plain.stats
+        square = left.chi2 / left.dof * one.plain.noise.sigma**2
+        bics[id(one)] = left.samples * np.log(square) + len(one.fit.places) * np.log(left.samples)
+    lowest = min(bics.values())
+    return [one for one in sharp if bics[id(one)] <= lowest + rules.close_bic]
 
 
 def _free_error(fit: ErrorFit) -> float:
@@ -244,22 +275,21 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
     """Word a finding."""
     found, rules, refit = fit.innovations, search.rules, best.refit
     assert found is not None
-    sizes = magnitudes(refit.fit.model, refit.fit.places, search.scales)
-    search.progress("the finding, fitted to the end")
-    fine = refined(refit.fit, sizes)
-    whole = fit_with_errors(fine, fit.model, fit.campaign, search)
+    fine, whole = refit.fit, refit.plain
+    if whole is None:
+        sizes = magnitudes(fine.model, fine.places, search.scales)
+        search.progress("the finding, fitted to the end")
+        fine = refined(fine, sizes)
+        whole = fit_with_errors(fine, fit.model, fit.campaign, search)
     name = refit.score.element.name
     free = set(refit.fit.names)
     names = {one for one in CATALOGUE if f"{one}.{CATALOGUE[one].strength}" in free}
-    limit = refit.fit.criterion + max(rules.close_bic, rules.smallest_gain * found.samples)
-    if not refit.fit.is_noise:
-        limit = np.inf
     together = tuple(
         one.score.element.name
         for one in refits
         if one is not refit
         and one.violation is None
-        and (one.fit.criterion <= limit if np.isfinite(limit) else _as_good(one.fit, refit.fit, rules))
+        and _is_alike(one, refit, rules)
         and name not in CATALOGUE[one.score.element.name].absorbs
     )
     exact = tuple(
@@ -268,7 +298,8 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
     together += exact
     before, after = _free_error(found), _free_error(fine)
     explained = 1.0 - (after / before) ** 2 if np.isfinite(after) and before > 0.0 else 0.0
-    explained = 1.0 if fine.is_noise else explained
+    noise = fine.is_noise or refit.plain is not None
+    explained = 1.0 if noise else explained
     good = whole.innovations is None or whole.innovations.is_noise or whole.estimate.inflation < rules.good
     verdict: VerdictWord = "found" if good else "unexplained"
     if not good and explained >= 1.0 - rules.smallest_share:
@@ -286,10 +317,20 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
     reason = (
         f"Adding {refit.score.element.words} takes {100.0 * best.transfer.share:.3g} % off the squared error "
         "of free runs of records left out of its refit."
-        if not refit.fit.is_noise
+        if not noise
         else f"With {refit.score.element.words} what the model leaves is noise."
     )
     return Verdict(verdict, finding, ranking, together, 1.0 - explained, scores.hidden, {}, whole, reason)
+
+
+def _is_alike(one: Refit, best: Refit, rules: Rules) -> bool:
+    """Say whether the records do not tell a law from the best one."""
+    if best.plain is not None:
+        return one.plain is not None and one in _tied([one, best], rules)
+    if best.fit.is_noise:
+        tie = max(rules.close_bic, rules.smallest_gain * best.fit.samples)
+        return one.fit.criterion <= best.fit.criterion + tie
+    return _as_good(one.fit, best.fit, rules)
 
 
 def _as_good(one: ErrorFit, best: ErrorFit, rules: Rules) -> bool:

@@ -8,7 +8,7 @@ from scipy import stats
 
 from ..._parameters import list_parameters
 from ...elements import AbstractElement
-from ..fitting import Search, magnitudes
+from ..fitting import Fit, Search, fit_without_force, magnitudes
 from ..innovations import (
     ErrorFit,
     effect_products,
@@ -85,11 +85,18 @@ class Refit(NamedTuple):
         score: its score before.
         fit: the refit.
         violation: what speaks against it, or None.
+        plain: the refit without a random force, of laws that the filter rounds, where that leaves noise.
     """
 
     score: Score
     fit: ErrorFit
     violation: str | None
+    plain: Fit | None = None
+
+    @property
+    def explains(self) -> bool:
+        """Whether nothing but noise of the output is left."""
+        return self.plain is not None or self.fit.is_noise_of_output
 
 
 def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ()) -> Scores:
@@ -159,12 +166,18 @@ def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ())
     return Scores(scores, tuple(sorted({probe.name for probe in probes} - set(best))), dispersion)
 
 
-def refit_effect(fit: ErrorFit, score: Score, search: Search) -> Refit:
+def coefficients(fit: ErrorFit, score: Score) -> int:
+    """Give how many coefficients are free with an effect."""
+    return len(new_places(fit, extended_model(fit, score.element, score.strength, score.step)))
+
+
+def refit_effect(fit: ErrorFit, score: Score, whole: Fit, search: Search) -> Refit:
     """Fit the model with one absent effect, everything free, from where the score points.
 
     Args:
         fit: the model without it.
         score: the effect.
+        whole: the fit without it, and its campaign.
         search: the scales of the campaign.
 
     Returns:
@@ -191,7 +204,10 @@ def refit_effect(fit: ErrorFit, score: Score, search: Search) -> Refit:
         starts[1:],
         _ROUGH_STEPS,
     )
-    return Refit(score, found, _violation(fit, found, score))
+    violation, plain = _violation(fit, found, score), None
+    if violation is None and found.model.splits and not found.is_noise_of_output:
+        plain = fit_without_force(found, whole.model, whole.campaign, search)
+    return Refit(score, found, violation, plain)
 
 
 def _violation(fit: ErrorFit, found: ErrorFit, score: Score) -> str | None:

@@ -193,7 +193,7 @@ def trial_point(
         hold=old.hold,
         noise=(noise,) * len(made.records),
         # The step of `trial_run`, which made the records: another solver's error would pass for information.
-        integrator=Integrator(substeps=old.integrator.substeps),
+        integrator=Integrator(substeps=old.integrator.substeps, band_limited=old.integrator.band_limited),
         share=old.share,
         whitening=old.whitening,
     )

@@ -34,6 +34,7 @@ from ._fit import complete as complete
 from ._fit import fit as fit
 from ._fit import fit_by_output as fit_by_output
 from ._fit import fit_with_errors as fit_with_errors
+from ._fit import fit_without_force as fit_without_force
 from ._fit import weighted_by_output as weighted_by_output
 from ._fit import weighted_by_residual as weighted_by_residual
 from ._fit_result import Fit as Fit

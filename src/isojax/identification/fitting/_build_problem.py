@@ -1,9 +1,11 @@
 """Records made into a problem: cut into segments, each with a start of its own."""
 
+import itertools
+
 from ...excitations import Hold
 from ...models import Integrator, Isolator, Quantity
 from ...records import Record
-from ..jacobian import cut_segments, slowest_decay
+from ..jacobian import cut_segments, segments_between, slowest_decay
 from ._initial_states import head_segments
 from ._problem import Problem
 
@@ -21,6 +23,7 @@ def build_problem(
     integrator: Integrator,
     share: float = 1.0,
     whitening: tuple[float, ...] = (),
+    uncut: bool = False,
 ) -> Problem:
     """Cut records into segments for a model.
 
@@ -38,6 +41,7 @@ def build_problem(
         integrator: solver and steps.
         share: share of the samples of which the noise is independent.
         whitening: coefficients of the filter that whitens coloured noise; none where it is white.
+        uncut: whether records are left whole however fast the motion decays: the start is near.
 
     Returns:
         The problem.
@@ -51,7 +55,11 @@ def build_problem(
                 f"Argument `records` must share one sampling rate, but {records[0].name} has "
                 f"{records[0].rate:g} Hz and {record.name} {record.rate:g} Hz."
             )
-    segments = cut_segments(records, model)
+    if uncut:
+        ends = ((place, record, [(0, record.output.size)]) for place, record in enumerate(records))
+        segments = tuple(itertools.chain.from_iterable(segments_between(*one) for one in ends))
+    else:
+        segments = cut_segments(records, model)
     whole = slowest_decay(model) == 0.0 and not any(record.dwells for record in records)
     heads = head_segments(records) if whole else ()
     return Problem(

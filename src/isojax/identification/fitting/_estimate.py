@@ -20,7 +20,7 @@ from ..jacobian import STIFFNESS_SCALE_UNIT, has_stiffness_scale
 from ._covariance import Uncertainty, invert_information, unknown
 from ._descent import descend
 from ._elimination import Nuisances, Spread
-from ._initial_states import HELD, best_nuisances
+from ._initial_states import HELD, best_nuisances, may_start_wrong
 from ._problem import Point, Problem, one_hot
 from ._scatter_mixture import integrate_scatter, scatter_of_next
 from ._search import ROUGH, Search
@@ -270,6 +270,18 @@ def estimate(
     start = _start(simulator, model, nuisances, Spread(FIRST_SCATTER))
     found = descend(simulator, model, places, sizes, start, search._replace(tolerance=rough))
     steps = found.steps
+    if is_successful(found.result):
+        simulator, fits_better = _sampled_as_measured(simulator, found.point, places, search)
+        if fits_better:
+            own = search._replace(tolerance=rough)
+            found = descend(simulator, found.point.model, places, sizes, found.point.nuisances, own)
+            steps += found.steps
+    if is_successful(found.result) and not known and may_start_wrong(simulator, found.point):
+        settled = best_nuisances(simulator, found.point.model, HELD, places=places)
+        if settled.chi2 < found.point.chi2 - search.rules.close_bic:
+            start = settled.nuisances._replace(spread=Spread(FIRST_SCATTER))
+            found = descend(simulator, settled.model, places, sizes, start, search._replace(tolerance=rough))
+            steps += found.steps
     if is_successful(found.result) and scatters and (anew or not known):
         settled = _with_scatter(simulator, found.point, places, search, known)
         if settled is not None:
@@ -279,6 +291,29 @@ def estimate(
     model, nothing = found.point.model, unknown(len(places))
     whole = Estimate(model, places, simulator, found.point, nothing, found.result, steps)
     return whole._replace(uncertainty=_uncertainty(whole)) if is_successful(found.result) else whole
+
+
+def _sampled_as_measured(
+    simulator: Simulator, point: Point, places: tuple[int, ...], search: Search
+) -> tuple[Simulator, bool]:
+    """Find out whether the samples of a reading that jumps are band-limited.
+
+    Nothing in the records says whether an anti-aliasing filter stood before them. The fit does.
+
+    Returns:
+        The simulator that agrees with the records, and whether it is another one.
+    """
+    problem = simulator.problem
+    if not point.model.splits or problem.quantity != "acceleration" or not problem.integrator.is_locked:
+        return simulator, False
+    other = simulator.sampled_otherwise()
+    columns = one_hot(point.model, places, [1.0] * len(places))
+    chi2 = other.evaluate(point.model, columns, point.nuisances).chi2
+    if not chi2 < point.chi2 - search.rules.close_bic:
+        return simulator, False
+    words = "band-limited" if other.problem.integrator.band_limited else "taken at instants"
+    search.progress(f"samples beside a jump agree with readings {words}")
+    return other, True
 
 
 def _uncertainty(found: Estimate) -> Uncertainty:

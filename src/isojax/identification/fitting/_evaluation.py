@@ -68,6 +68,7 @@ class Evaluation:
             share=fitted.share,
             whitening=fitted.whitening,
             integrator=fitted.integrator,
+            uncut=fitted.is_uncut,
         )
 
     @cached_property

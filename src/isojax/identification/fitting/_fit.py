@@ -163,8 +163,8 @@ def fit_by_output(
         again = fit_from(linear)
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
-    if followed and not is_successful(found.result):
-        search.progress("the search fails: again, with a random force")
+    if followed and not (is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof):
+        search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     return _with_less_noise(complete(found, model, campaign, noise), search)
 
@@ -184,23 +184,39 @@ def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search
     Returns:
         The fit.
     """
+    plain = fit_without_force(found, start, campaign, search)
+    return as_fit_of_errors(found, start, campaign) if plain is None else plain
+
+
+def fit_without_force(found: ErrorFit, start: Isolator, campaign: Campaign, search: Search) -> Fit | None:
+    """Fit again without a random force, from where a filter ended; None where that leaves more than noise.
+
+    Args:
+        found: the model with the sizes of its errors.
+        start: the isolator that the search started from.
+        campaign: the measurements.
+        search: how to search.
+
+    Returns:
+        The fit, or None.
+    """
     if not (found.is_noise_of_output or found.model.splits):
-        return as_fit_of_errors(found, start, campaign)
-    noise = noise_of_errors(found, campaign, alone=True)
-    simulator = simulator_for(found.model, campaign, noise, None)
+        return None
+    noise = (
+        noise_of_errors(found, campaign, alone=True) if found.is_noise_of_output else estimate_noise(campaign)
+    )
+    if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
+        return None
+    simulator = simulator_for(found.model, campaign, noise, None, uncut=True)
     near = search._replace(max_steps=_FEW_STEPS)
     plain = complete(estimate(simulator, found.model, found.places, near), start, campaign, noise)
-    if is_successful(plain.result) and found.is_noise_of_output:
+    if not is_successful(plain.result):
+        return None
+    if found.is_noise_of_output:
         return plain._replace(innovations=found)
     # The filter rounds laws that jump. Where these are split instead, its random force has nothing to say.
-    if is_successful(plain.result) and is_near(plain, search.rules):
-        return plain
-    return as_fit_of_errors(found, start, campaign)
-
-
-def is_near(found: Fit, rules: Rules) -> bool:
-    """Say whether a fit leaves about as much as the noise that its output shows."""
-    return found.stats.chi2 < rules.near_noise * found.stats.dof
+    plain = _with_less_noise(plain, search)
+    return plain if plain.stats.chi2 < search.rules.near_noise * plain.stats.dof else None
 
 
 def _with_less_noise(found: Fit, search: Search) -> Fit:
@@ -298,7 +314,11 @@ def _check_excitation(model: Isolator, campaign: Campaign) -> None:
 
 
 def simulator_for(
-    model: Isolator, campaign: Campaign, noise: NoiseEstimate, integrator: Integrator | None
+    model: Isolator,
+    campaign: Campaign,
+    noise: NoiseEstimate,
+    integrator: Integrator | None,
+    uncut: bool = False,
 ) -> Simulator:
     """Give the simulator of a campaign's fitting records.
 
@@ -307,6 +327,7 @@ def simulator_for(
         campaign: the measurements.
         noise: the noise of the output.
         integrator: solver and steps, or None to choose them.
+        uncut: see `build_problem`.
 
     Returns:
         The simulator.
@@ -320,6 +341,7 @@ def simulator_for(
         share=noise.share,
         whitening=noise.whitening,
         integrator=Integrator() if integrator is None else integrator,
+        uncut=uncut,
     )
     if integrator is None:
         problem = find_integrator(problem, model)

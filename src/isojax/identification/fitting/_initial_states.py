@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from ...models import Isolator
 from ...records import Record, ringing_frequency
-from ..jacobian import SHORTEST, Segment
+from ..jacobian import SHORTEST, Segment, readings
 from ._elimination import Nuisances, Spread, step_nuisances
 from ._problem import Point, Problem, one_hot
 from ._simulator import Simulator
@@ -22,6 +22,9 @@ MOST_WORSENING = 1.1
 HALVINGS = 5
 """How often the step of a record is halved before it is given up."""
 
+_DOUBTFUL = 1.3
+"""chi2/dof above which initial states are sought further."""
+
 HELD = Spread(1e-9)
 """Spread of the linear stiffness between records that leaves it where it is."""
 
@@ -29,7 +32,12 @@ SETTLED = 1e-2
 """Change of chi2, per max(chi2/dof, 1), below which the nuisances stand."""
 
 FIRST_PERIODS = 1.0
-"""Periods after a release over which its state is sought first."""
+"""Periods at the start of a record over which its state is sought first."""
+
+_SHARES = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
+_TRIED = np.array([(place, speed) for place in _SHARES for speed in _SHARES])
+"""Displacements and velocities, over their rms, from which the first periods are followed beside the measured
+state: where laws jump, or a motion bends much, the nearest minimum is not the lowest."""
 
 SMALL_STEP = 1e-4
 """Step of a state, over its range, that no longer counts."""
@@ -59,12 +67,31 @@ def best_nuisances(
     start = simulator.settle(known, model, len(model.elements), spread)
     if released and known is None:
         start = _first_periods(simulator, model, start)
-    return _settle_from(simulator, model, start, released, places)
+    point = _settle_from(simulator, model, start, released, places)
+    if released or known is not None or not may_start_wrong(simulator, point):
+        return point
+    further = _settle_from(simulator, model, _first_periods(simulator, model, start), True, places)
+    return further if further.chi2 < point.chi2 else point
+
+
+def may_start_wrong(simulator: Simulator, point: Point) -> bool:
+    """Say whether what is left may come of the initial states: it is more than noise, and no dwells settle.
+
+    Args:
+        simulator: the records.
+        point: the equations at some coefficients.
+
+    Returns:
+        Whether to seek the states further.
+    """
+    stepped = any(record.dwells for record in simulator.problem.records)
+    return not stepped and not point.chi2 < _DOUBTFUL * max(1.0, point.free_samples)
 
 
 def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> Nuisances:
     """Find the initial states of the first periods of each segment: over them no phase error can grow."""
     problem, carried = simulator.problem, len(model.elements)
+    lanes = len(problem.segments)
 
     def first(segment: Segment) -> Segment:
         record = problem.records[segment.record]
@@ -73,20 +100,53 @@ def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> N
             stop=min(segment.stop, max(segment.start, segment.counted) + max(length, SHORTEST))
         )
 
-    short = Simulator(
-        problem._replace(segments=tuple(map(first, problem.segments)), heads=()), simulator.at_rest
+    segments = tuple(map(first, problem.segments))
+    short = Simulator(problem._replace(segments=segments, heads=()), simulator.at_rest)
+    begun = short.settle(None, model, carried, HELD)
+    begun.states[:lanes, :2] = _best_tried(
+        Simulator(short.problem._replace(segments=segments * (len(_TRIED) + 1)), simulator.at_rest),
+        model,
+        lanes,
     )
-    found = _settle_from(short, model, short.settle(None, model, carried, HELD), True)
+    found = _settle_from(short, model, begun, True)
     if not found.is_finite:
         return start
     own, scales = short.starts(model, short.prepared(model, carried))
     starts, units = simulator.starts(model, simulator.prepared(model, carried))
     states = own + scales * found.nuisances.states.T
     # Either simulator may carry lanes beyond the segments, which hold nothing.
-    used = slice(len(problem.segments))
+    used = slice(lanes)
     moved = start.states.copy()
     moved[used] = ((states[:, used] - starts[:, used]) / units[:, used]).T
     return start._replace(states=moved)
+
+
+def _best_tried(many: Simulator, model: Isolator, lanes: int) -> Float[np.ndarray, "lane 2"]:
+    """Give the start of each segment, of those tried, from which it is followed best.
+
+    Args:
+        many: the segments, as often as starts are tried.
+        model: the isolator.
+        lanes: count of the segments.
+
+    Returns:
+        Deviations from the measured start, in its scales.
+    """
+    carried = len(model.elements)
+    prepared = many.prepared(model, carried)
+    starts, scales = many.starts(model, prepared, carried)
+    own = (starts[:2, :lanes] / scales[:2, :lanes]).T
+    tried = np.concatenate([np.zeros((1, lanes, 2)), _TRIED[:, None] - own])
+    used = tried.size // 2
+    starts[:2, :used] += scales[:2, :used] * tried.reshape(-1, 2).T
+    simulated = readings(model, np.ones(prepared.record.size), starts, prepared)
+    weight, measured = (
+        prepared.in_lanes(np.asarray(getattr(batch, name)).T for batch in prepared.batches).T
+        for name in ("weight", "measured")
+    )
+    squares = np.sum((weight * (simulated - measured)) ** 2, axis=0)[:used]
+    best = np.argmin(np.nan_to_num(squares, nan=np.inf).reshape(-1, lanes), axis=0)
+    return tried[best, np.arange(lanes)]
 
 
 def _settle_from(

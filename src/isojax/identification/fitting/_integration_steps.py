@@ -1,5 +1,7 @@
 """The coarsest integration steps that the noise allows, by step doubling."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -37,7 +39,7 @@ def step_error(problem: Problem, model: Isolator, substeps: int) -> float:
     outcomes = []
     for steps in (substeps, 2 * substeps):
         # The model's own demand must not hide the difference, so that the steps are set for both runs alike.
-        integrator = Integrator(problem.integrator.solver, max(1, steps))
+        integrator = dataclasses.replace(problem.integrator, substeps=max(1, steps))
         simulator = Simulator(problem._replace(segments=few, integrator=integrator))
         prepared = simulator.prepared(model, len(model.elements))
         starts, _ = simulator.starts(model, prepared)
@@ -67,4 +69,5 @@ def find_integrator(problem: Problem, model: Isolator) -> Problem:
     while substeps < FINEST and error > SMALL_ERROR:
         substeps *= 2
         error = step_error(problem, model, substeps)
-    return problem._replace(integrator=Integrator(problem.integrator.solver, substeps), step_error=error)
+    integrator = dataclasses.replace(problem.integrator, substeps=substeps)
+    return problem._replace(integrator=integrator, step_error=error)

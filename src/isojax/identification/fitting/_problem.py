@@ -47,6 +47,12 @@ class Problem(NamedTuple):
     whitening: tuple[float, ...] = ()
     thinned: int = 1
 
+    @property
+    def is_uncut(self) -> bool:
+        """Whether each record is one segment from its first sample to its last."""
+        ends = [(one.record, one.start, one.stop) for one in self.segments]
+        return ends == [(place, 0, record.output.size) for place, record in enumerate(self.records)]
+
 
 @shown
 class Point(NamedTuple):

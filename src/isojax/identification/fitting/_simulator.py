@@ -1,5 +1,7 @@
 """A model simulated against records: everything that stays the same while coefficients are sought."""
 
+import dataclasses
+
 import numpy as np
 from jaxtyping import Float
 
@@ -47,6 +49,20 @@ class Simulator:
         self._tables.forget()
         if self._heads is not None:
             self._heads.forget()
+
+    def sampled_otherwise(self) -> "Simulator":
+        """Give the same records, taken for point samples in place of band-limited ones, or back.
+
+        Returns:
+            The simulator; deviations of initial states mean there what they mean here.
+        """
+        old = self.problem.integrator
+        integrator = dataclasses.replace(old, band_limited=not old.band_limited)
+        other = Simulator(self.problem._replace(integrator=integrator), self.at_rest)
+        other._internal = dict(self._internal)
+        if self._heads is not None and other._heads is not None:
+            other._heads._internal = dict(self._heads._internal)
+        return other
 
     def prepared(self, model: Isolator, carried: int) -> Prepared:
         """Give the batches for a model.
@@ -181,11 +197,14 @@ def _matrices(
     unknowns: Unknowns, carried: int, prepared: Prepared
 ) -> Float[np.ndarray, "lanes column column"]:
     """Give the information matrices, NaN where a simulation left every bound."""
+    sampling = prepared.sampling
 
     def compute() -> tuple[np.ndarray]:
         if carried == len(unknowns.model.elements):
             return (information(unknowns, prepared),)
         return (score_information(unknowns, carried, prepared),)
 
-    (matrices,) = recall("information", compute, unknowns, carried, prepared.sampling.time)
+    (matrices,) = recall(
+        "information", compute, unknowns, carried, sampling.time, sampling.integrator.band_limited
+    )
     return np.where(np.abs(matrices) < HUGE, matrices, np.nan)

@@ -76,7 +76,7 @@ def effect_products(
     ]
     products = score_information(unknowns, carried, prepared, followed)
     columns, last = directions.shape[1], products.shape[1] - 1
-    assert last == columns + int(has_stiffness_scale(fitted)) + 2 + fitted.internal_states
+    assert last == columns + int(has_stiffness_scale(whole)) + 2 + fitted.internal_states
     # Between coefficients and residual stand the stiffness scale and the initial states of a simulation.
     keep = np.r_[0:columns, last]
     unit = np.r_[1.0 / own, np.ones(len(absent)), 1.0]

@@ -29,7 +29,7 @@ _UNDETERMINED = 1e-10
 """Information of a combination of coefficients, each scaled to one, below which it is not determined."""
 
 _FAR = 3.0
-"""Largest step of an unbounded variable, in its magnitude."""
+"""Longest step of a variable that stands for a bounded number, beyond itself: it bends near its bound."""
 
 _LEAST_FORCE = 1e-5
 """Random force below which there is none [rms of the drive, or of the inertia where nothing drives]."""
@@ -243,6 +243,7 @@ def fit_errors(
     part = np.ones(record_filter.count) if judged is None else judged
     specs, scales = tuple(listed[place].spec for place in places), tuple(magnitudes)
     begun = [np.array([float(listed[place].value) for place in places]), *starts]
+    bounded = [bool(np.isfinite([spec.lower, spec.upper]).any()) for spec in specs]
     frees = [
         np.array([to_free(*each) for each in zip(values, specs, scales, strict=True)]) for values in begun
     ]
@@ -277,7 +278,9 @@ def fit_errors(
             break
         slopes = np.append(physical(free, specs, scales)[1], 1.0)
         products = products * np.outer(slopes, slopes)
-        tried, promised = _damped_steps(products, damping * _TRIED)
+        tried, promised = _damped_steps(
+            products, damping * _TRIED, np.where(bounded, _FAR + np.abs(free), np.inf)
+        )
         squares = record_filter.products(places, points([free + one for one in tried]), way, columns=False)
         squares = np.nan_to_num(squares[0, 0] @ part, nan=np.inf)
         best = int(np.argmin(squares)) if size else 0
@@ -320,7 +323,9 @@ def fit_errors(
 
 
 def _damped_steps(
-    products: Float[np.ndarray, "row row"], dampings: Float[np.ndarray, " try"]
+    products: Float[np.ndarray, "row row"],
+    dampings: Float[np.ndarray, " try"],
+    furthest: Float[np.ndarray, " column"],
 ) -> tuple[list[Float[np.ndarray, " column"]], float]:
     """Give Marquardt's steps of the unbounded variables, and what the longest promises."""
     inner, outer = products[:-1, :-1], products[:-1, -1]
@@ -331,7 +336,8 @@ def _damped_steps(
     along = vectors.T @ (outer / unit)
     steps = [-(vectors @ (along / (values + own))) / unit for own in dampings]
     promised = float(-steps[0] @ outer)
-    return [one * min(1.0, _FAR / max(np.abs(one).max(initial=0.0), 1e-300)) for one in steps], promised
+    shares = [np.min(furthest / np.maximum(np.abs(one), 1e-300), initial=1.0) for one in steps]
+    return [share * one for share, one in zip(shares, steps, strict=True)], promised
 
 
 def free_squares(fit: ErrorFit) -> Float[np.ndarray, " record"]:

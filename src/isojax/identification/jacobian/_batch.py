@@ -36,6 +36,7 @@ class Batch(eqx.Module):
         drive_rate: its time derivative.
         measured: measured output [its SI unit].
         weight: 1 where a sample counts, 0 where it does not (padding, settling).
+        ringing: share of the ringing of jumps that the samples hold: 1 where they are band-limited, else 0.
         channels: signals of the records at the same times as the drive, by name.
     """
 
@@ -44,6 +45,7 @@ class Batch(eqx.Module):
     drive_rate: Float[Array, "time stage lanes"]
     measured: Float[Array, "time lanes"]
     weight: Float[Array, "time lanes"]
+    ringing: Float[Array, ""]
     channels: dict[str, Float[Array, "time stage lanes"]] = eqx.field(default_factory=dict)
 
     @property
@@ -244,7 +246,11 @@ def prepare(
                 spread[state, lane] = max(extent, 1e-300)
         return Batch(
             on_device(np.asarray(sizes[order[first]])),
-            *(_turned(values) for values in (drive, rates, measured, weight)),
+            _turned(drive),
+            _turned(rates),
+            _turned(measured),
+            _turned(weight),
+            on_device(np.asarray(float(how.band_limited))),
             channels={name: _turned(values) for name, values in beside.items()},
         )
 

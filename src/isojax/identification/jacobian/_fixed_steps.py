@@ -29,7 +29,9 @@ from ._unknowns import Lanes, movable, scaled_model, unit_changes
 from ._whitening import whitened_products
 
 
-def _sampler(model: Isolator, sampling: Sampling) -> Callable[..., tuple[Array, State, Array | None]]:
+def _sampler(
+    model: Isolator, batch: Batch, sampling: Sampling
+) -> Callable[..., tuple[Array, State, Array | None]]:
     """Give the function that reads one sample and steps to the next, the model's numbers as arguments.
 
     Last it gives what jumps on the way leave in the next reading.
@@ -43,7 +45,9 @@ def _sampler(model: Isolator, sampling: Sampling) -> Callable[..., tuple[Array, 
         stages = tuple(current.with_delay_slope(at) for at in stages)
         reading = read_record(current, state, stages[0], quantity)
         ahead, ringing = advance_record(current, solver, quantity, sampling.time, state, stages)
-        return (reading, ahead, None) if ringing is None else (reading + ringing.before, ahead, ringing.after)
+        if ringing is None:
+            return reading, ahead, None
+        return reading + batch.ringing * ringing.before, ahead, batch.ringing * ringing.after
 
     return sample
 
@@ -87,7 +91,7 @@ def fixed_information(
     """
     model, scale, states = start
     known, with_moved = movable(model, moving)
-    sample = _sampler(model, sampling)
+    sample = _sampler(model, batch, sampling)
     changes = unit_changes(model, directions, state_scales)
     total, lanes = changes.scale.shape
 
@@ -130,7 +134,7 @@ def fixed_readings(start: Lanes, batch: Batch, sampling: Sampling) -> Float[Arra
     """Simulate; give what the sensor chain records."""
     model, scale, states = start
     values = tuple(entry.value for entry in list_parameters(model))
-    sample = _sampler(model, sampling)
+    sample = _sampler(model, batch, sampling)
 
     def body(carry: tuple[State, Array | None], table: Instant) -> tuple[tuple[State, Array | None], Array]:
         state, pending = carry
@@ -162,4 +166,6 @@ def fixed_path(start: Lanes, batch: Batch, sampling: Sampling) -> tuple[State, R
 
     numbers = jnp.tile(jnp.arange(steps), time)
     path, ringing = jax.lax.scan(body, states, (numbers, acting))[1]
-    return path, jax.tree_util.tree_map(lambda one: one.reshape(time, steps, -1).sum(axis=1), ringing)
+    return path, jax.tree_util.tree_map(
+        lambda one: batch.ringing * one.reshape(time, steps, -1).sum(axis=1), ringing
+    )

@@ -107,5 +107,7 @@ def readings(
         with ThreadPoolExecutor(workers()) as pool:
             return (prepared.in_lanes(pool.map(one, range(len(prepared.batches)))).T,)
 
-    (simulated,) = recall("readings", compute, model, stiffness_scale, states)
+    (simulated,) = recall(
+        "readings", compute, model, stiffness_scale, states, prepared.sampling.integrator.band_limited
+    )
     return simulated

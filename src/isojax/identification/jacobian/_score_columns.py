@@ -206,7 +206,7 @@ def _block(
 
     exact = None
     if ringing is not None:
-        exact = transitions_along(model, layout.moving, scale, path, own.acting, quantity, step)
+        exact = transitions_along(model, layout.moving, scale, path, own.acting, quantity, step, own.ringing)
     by_state = slopes.states
     if followed is not None:
         by_state = _with_random_force(slopes, followed.memory, step)

@@ -45,6 +45,7 @@ def transitions_along(
     acting: Instant,
     quantity: Quantity,
     sample_time: float,
+    ringing: Float[Array, ""],
 ) -> Transitions:
     """Differentiate each split step along a path.
 
@@ -56,6 +57,7 @@ def transitions_along(
         acting: what acts at the stages of each sample.
         quantity: what the sensor measures.
         sample_time: time between samples [s].
+        ringing: share of the ringing of jumps that the samples hold.
 
     Returns:
         The derivatives.
@@ -96,7 +98,7 @@ def transitions_along(
             )
             pushed = Step(step_time, tuple(current.with_delay_slope(at) for at in stages), pushes)
             ahead, jump = split_step(current, quantity, state, pushed)
-            return jnp.stack([*ahead, *find_ringing(jump, step_of_sample, steps)])
+            return jnp.stack([*ahead, *(ringing * one for one in find_ringing(jump, step_of_sample, steps))])
 
         here = known, jnp.broadcast_to(scale, still.shape), path, nothing[3]
         return jax.vmap(lambda seed: jax.jvp(step, here, seed)[1])(stacked)
