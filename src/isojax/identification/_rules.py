@@ -61,12 +61,19 @@ class Rules:
     """chi2/dof from which the noise that the output shows says nothing of the error: a random force stands
     for the rest."""
 
+    loudest: float = 0.2
+    """Noise over the rms of the output from which periods or repeats differ by more than noise: the motion
+    itself need not repeat."""
+
     dispersed: float = 1.5
     """Variance of scores from piece to piece of the records, over that of independent innovations, from which
     it takes the place of that: the error is then the model's."""
 
     likeness: float = 0.95
     """Likeness of two traces from which the records hardly distinguish their effects: both are refitted."""
+
+    about_as_large: float = 0.8
+    """Share of the largest score from which a plainer effect is refitted before it."""
 
     clear_gain: float = 0.05
     """Gain of -2 log-likelihood a sample from which an effect that leaves noise alone carries over."""

@@ -6,8 +6,10 @@ import numpy as np
 from scipy import stats
 
 from ...elements import CATALOGUE
+from ...models import Isolator
 from .._rules import Rules
 from ..fitting import Fit, Search, fit_with_errors, magnitudes
+from ..guess import balance_starts
 from ..innovations import ErrorFit, free_squares, refined
 from ._bounds import WIDTH_95, strength_unit
 from ._effect_search import (
@@ -22,6 +24,12 @@ from ._effect_search import (
 )
 from ._findings import Candidate, Finding, Verdict, VerdictWord
 from ._separating_words import is_exact, separating_experiment
+
+CHANNELS = ("The drive and the floor", "The response channel")
+"""Groups of effects that are no laws of the isolator: they have a share of the refits of their own."""
+
+_BALANCED = 2
+"""Effects that are refitted because the measured forces balance best with them."""
 
 MOST_INTERNAL = 4
 """Internal states of a model that is refitted: the filter's covariance grows with their square."""
@@ -88,9 +96,10 @@ def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[R
     """Refit the effects that the scores ask for, strongest first; then what looks like the best of them."""
     rules, refits = search.rules, list[Refit]()
 
-    def refit(score: Score) -> None:
+    def refit(score: Score, begin: Isolator | None = None) -> bool:
         search.progress(f"refit with {score.element.name}")
-        refits.append(refit_effect(found, score, fit, search))
+        refits.append(refit_effect(found, score, fit, search, begin))
+        return refits[-1].violation is None and refits[-1].explains
 
     asked = [
         score
@@ -99,9 +108,24 @@ def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[R
         and abs(score.pull) > _least_pull(scores)
         and found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
     ]
-    for score in asked[: rules.survivors]:
-        refit(score)
-        if refits[-1].violation is None and refits[-1].explains:
+    left = {True: rules.survivors // 2, False: rules.survivors}
+    held = {element.name for element in found.model.elements}
+    absent = tuple(one for one in scores.probes if one.group not in CHANNELS and held.isdisjoint(one.absorbs))
+    for start in [] if found.is_noise else balance_starts(fit.campaign, found.model, absent)[:_BALANCED]:
+        score = next((one for one in scores.scores if one.element.name == start.element.name), None)
+        if score is None:
+            continue
+        asked = [one for one in asked if one is not score]
+        if refit(score, start.model):
+            asked = []
+            break
+    while asked := [one for one in asked if left[one.element.group in CHANNELS]]:
+        # Of those that stand out about as much the plainest goes first: it may do.
+        near = [one for one in asked if abs(one.pull) > rules.about_as_large * abs(asked[0].pull)]
+        plainest = min(near, key=lambda one: (coefficients(found, one), one.element.internal_states))
+        asked = [one for one in asked if one is not plainest]
+        left[plainest.element.group in CHANNELS] -= 1
+        if refit(plainest):
             break  # nothing can explain more, but another law may explain as much
     best = min(
         (one for one in refits if one.violation is None), key=lambda one: one.fit.criterion, default=None
@@ -109,16 +133,22 @@ def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[R
     if best is None:
         return refits
     alike = _look_alikes(best.score.element.name)
-    place = next(index for index, one in enumerate(scores.scores) if one is best.score)
+    place = _place(scores, best)
     for index, score in enumerate(scores.scores):
         near = score.element.name in alike or abs(best.score.likeness[index]) > rules.likeness
-        done = any(one.score is score for one in refits)
+        done = any(_place(scores, one) == index for one in refits)
         few = found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
         # Where a law leaves nothing but noise one with more coefficients cannot be told from it.
         simpler = not best.explains or coefficients(found, score) <= len(best.fit.places)
         if near and few and simpler and not done and index != place and score.admissible:
             refit(score)
     return refits
+
+
+def _place(scores: Scores, refit: Refit) -> int:
+    """Give the place of a refitted effect among the scores, of which there is one a name."""
+    names = [one.element.name for one in scores.scores]
+    return names.index(refit.score.element.name)
 
 
 def _least_pull(scores: Scores) -> float:
@@ -203,7 +233,8 @@ def _free_error(fit: ErrorFit) -> float:
 
 
 def _candidate(score: Score, refits: list[Refit], best: Refit | None, scores: Scores) -> Candidate:
-    refit = next((one for one in refits if one.score is score), None)
+    name = score.element.name
+    refit = next((one for one in refits if one.score.element.name == name), None)
     strength, error, chi2, delta, admissible = score.strength, score.error, np.nan, np.nan, score.admissible
     element = score.element
     if refit is not None and np.isfinite(refit.fit.deviance.sum()):
@@ -216,7 +247,7 @@ def _candidate(score: Score, refits: list[Refit], best: Refit | None, scores: Sc
         chi2 = own.chi2 / max(1.0, own.samples - len(own.places))
         delta = np.nan if best is None else own.criterion - best.fit.criterion
         admissible = admissible and refit.violation is None
-    place = None if best is None else next(i for i, one in enumerate(scores.scores) if one is best.score)
+    place = None if best is None else _place(scores, best)
     return Candidate(
         element.name,
         element.words,
@@ -237,7 +268,8 @@ def _ranking(scores: Scores, refits: list[Refit], best: Refit | None) -> tuple[C
     first = [] if best is None else [best.score]
     others = sorted((one for one in refits if one is not best), key=lambda one: one.fit.criterion)
     order = [*first, *(one.score for one in others)]
-    order += [one for one in scores.scores if not any(one is other for other in order)]
+    done = {one.element.name for one in order}
+    order += [one for one in scores.scores if one.element.name not in done]
     return tuple(_candidate(score, refits, best, scores) for score in order)
 
 

@@ -7,7 +7,8 @@ from jaxtyping import Float
 from scipy import stats
 
 from ..._parameters import list_parameters
-from ...elements import AbstractElement
+from ...elements import CATALOGUE, AbstractElement
+from ...models import Isolator
 from ..fitting import Fit, Search, fit_without_force, magnitudes
 from ..innovations import (
     ErrorFit,
@@ -71,11 +72,13 @@ class Scores(NamedTuple):
         hidden: catalogue names that the records cannot show beside the fitted coefficients.
         dispersion: variance of the scores from piece to piece of the records, over that of independent
             innovations: about 1 where the error is noise.
+        probes: the absent effects, in all the shapes that were tried.
     """
 
     scores: tuple[Score, ...]
     hidden: tuple[str, ...]
     dispersion: float
+    probes: tuple[AbstractElement, ...]
 
 
 class Refit(NamedTuple):
@@ -163,7 +166,7 @@ def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ())
         )
         for place, column in enumerate(order)
     )
-    return Scores(scores, tuple(sorted({probe.name for probe in probes} - set(best))), dispersion)
+    return Scores(scores, tuple(sorted({probe.name for probe in probes} - set(best))), dispersion, probes)
 
 
 def coefficients(fit: ErrorFit, score: Score) -> int:
@@ -171,7 +174,9 @@ def coefficients(fit: ErrorFit, score: Score) -> int:
     return len(new_places(fit, extended_model(fit, score.element, score.strength, score.step)))
 
 
-def refit_effect(fit: ErrorFit, score: Score, whole: Fit, search: Search) -> Refit:
+def refit_effect(
+    fit: ErrorFit, score: Score, whole: Fit, search: Search, begin: Isolator | None = None
+) -> Refit:
     """Fit the model with one absent effect, everything free, from where the score points.
 
     Args:
@@ -179,11 +184,12 @@ def refit_effect(fit: ErrorFit, score: Score, whole: Fit, search: Search) -> Ref
         score: the effect.
         whole: the fit without it, and its campaign.
         search: the scales of the campaign.
+        begin: where else to start: the model with the effect, every coefficient from the measured forces.
 
     Returns:
         The refit, with what speaks against it whatever it gains.
     """
-    model = extended_model(fit, score.element, score.strength, score.step)
+    model = extended_model(fit, score.element, score.strength, score.step) if begin is None else begin
     places = new_places(fit, model)
     starts = []
     for share in _SHARES:
@@ -201,9 +207,14 @@ def refit_effect(fit: ErrorFit, score: Score, whole: Fit, search: Search) -> Ref
         magnitudes(model, places, search.scales),
         fit.filter.measured,
         sizes,
-        starts[1:],
+        starts[0 if begin is not None else 1 :],
         _ROUGH_STEPS,
     )
+    if begin is not None:
+        # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
+        drop, extra = fit.deviance.sum() - found.deviance.sum(), max(1, len(places) - len(fit.places))
+        p_value = float(min(1.0, len(CATALOGUE) * stats.chi2.sf(max(0.0, drop), extra)))
+        score = score._replace(element=begin.elements[-1], p_value=p_value, admissible=True)
     violation, plain = _violation(fit, found, score), None
     if violation is None and found.model.splits and not found.is_noise_of_output:
         plain = fit_without_force(found, whole.model, whole.campaign, search)

@@ -163,10 +163,16 @@ def fit_by_output(
         again = fit_from(linear)
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
-    if followed and not (is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof):
+    usual = is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof
+    if followed and not (usual and noise.sigma < search.rules.loudest * _loudness(campaign)):
         search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     return _with_less_noise(complete(found, model, campaign, noise), search)
+
+
+def _loudness(campaign: Campaign) -> float:
+    """Give the rms of the output over the records to fit."""
+    return float(np.sqrt(np.mean([np.var(record.output) for record in campaign.fit_records])))
 
 
 def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search: Search) -> Fit:

@@ -29,6 +29,9 @@ _LOUDEST = 1.3
 _SMALL_NOISE = 0.05
 """Noise that any record may have, over its rms: a filtered record shows too little above its band."""
 
+_MUCH_LESS = 0.5
+"""Share of the noise that periods or repeats show below which the motion itself does not repeat."""
+
 _SHORTEST_RECORD = 64
 """Samples of a record that a filter follows, at least."""
 
@@ -201,7 +204,9 @@ def noise_of_errors(found: ErrorFit, campaign: Campaign, alone: bool) -> NoiseEs
         The noise.
     """
     shown = estimate_noise(campaign)
-    if shown.method in _SHOWN:
+    quieter = float(np.exp(0.5 * np.median(found.sizes.noise))) < _MUCH_LESS * shown.sigma
+    # What a model explains is no noise, even where it differs from period to period.
+    if shown.method in _SHOWN and not (alone and quieter):
         return shown
     owners = np.array([one.record for one in found.filter.measured.segments])
     lengths = np.array([one.stop - one.counted for one in found.filter.measured.segments], dtype=float)

@@ -8,6 +8,7 @@ Read `_classical_guess.py` first, then `_start_coefficients.py` and the two bala
 """
 
 from ._as_campaign import as_campaign as as_campaign
+from ._balance_start import balance_starts as balance_starts
 from ._balance_start import find_balance_start as find_balance_start
 from ._circle_fit import CircleFit as CircleFit
 from ._circle_fit import fit_circle as fit_circle

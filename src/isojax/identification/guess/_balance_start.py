@@ -49,22 +49,42 @@ def find_balance_start(
 
     Source: Masri & Caughey 1979.
     """
+    guesses = [type(next(one for one in absent if one.name == name)).guess(scales) for name in _names(absent)]
+    return next(iter(balance_starts(campaign, model, tuple(guesses))), None)
+
+
+def balance_starts(
+    campaign: Campaign, model: Isolator, absent: tuple[AbstractElement, ...]
+) -> list[BalanceStart]:
+    """List the absent effects without which the measured forces balance less well, the best first.
+
+    Args:
+        campaign: the measurements; only records to fit are used.
+        model: the fitted model, for its structure.
+        absent: absent effects, of any shapes; those without internal states take part.
+
+    Returns:
+        One a name, of the shape that leaves the smallest unbalanced force.
+    """
     if any(element.internal_states for element in model.elements):
-        return None
+        return []
     balance, names = _balance(campaign, model), tuple(element.name for element in model.elements)
-    before = balance.fit(names).unexplained
-    found: list[BalanceStart] = []
-    for name in dict.fromkeys(probe.name for probe in absent):
-        probe = next(one for one in absent if one.name == name)
-        tried = balance.fit(names, type(probe).guess(scales))
-        if name in tried.fitted:
-            element = tried.model.elements[-1]
-            strength = float(getattr(element, element.strength))
-            lower = dict(own_parameters(element))[element.strength].lower
-            if (element.signed or strength > 0.0) and strength > lower:
-                found.append(BalanceStart(element, tried.model, tried.unexplained, before))
-    best = min(found, key=lambda one: one.unexplained, default=None)
-    return best if best is not None and best.unexplained < before else None
+    before, found = balance.fit(names).unexplained, dict[str, BalanceStart]()
+    for probe in absent:
+        tried = balance.fit(names, probe)
+        if probe.name not in tried.fitted:
+            continue
+        element = tried.model.elements[-1]
+        strength = float(getattr(element, element.strength))
+        lower = dict(own_parameters(element))[element.strength].lower
+        best = found[probe.name].unexplained if probe.name in found else before
+        if (element.signed or strength > 0.0) and strength > lower and tried.unexplained < best:
+            found[probe.name] = BalanceStart(element, tried.model, tried.unexplained, before)
+    return sorted(found.values(), key=lambda one: one.unexplained)
+
+
+def _names(absent: tuple[AbstractElement, ...]) -> dict[str, None]:
+    return dict.fromkeys(probe.name for probe in absent)
 
 
 def _balance(campaign: Campaign, model: Isolator) -> ForceBalance:

@@ -1,8 +1,8 @@
 """Coefficients and the sizes of the errors, by the likelihood of the innovations."""
 
 import dataclasses
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import jax.numpy as jnp
@@ -40,6 +40,12 @@ _LEAST_NOISE = 1e-4
 
 _NO_FORCE = 0.05
 """Share of the innovations' variance below which the random force does not matter."""
+
+_NO_WORSE = 10.0
+"""Rise of the deviance up to which there is no random force: Schwarz's criterion of one size less."""
+
+_NOISE_STEPS = 4
+"""Steps of Fisher's scoring of the noise alone."""
 
 _LAGS = 20
 """Samples back from which an innovation may be foretold."""
@@ -265,7 +271,7 @@ def fit_errors(
     if len(frees) > 1:
         deviances = followed(frees, [sizes] * len(frees)).deviance @ part
         free = frees[int(np.argmin(deviances[: len(frees)]))]
-    last, before, trust = np.inf, sizes, FURTHEST
+    last, before, trust, alone = np.inf, sizes, FURTHEST, False
     result: Any = RESULTS.not_converged
     for step in range(1, most_steps + 1):
         way = followed([free] * COPIES, sizes.around())
@@ -301,6 +307,13 @@ def fit_errors(
 
         settled = step > 2 and abs(last - deviance) < SETTLED_DEVIANCE and gain < SETTLED_DEVIANCE
         if settled and (promised < SETTLED_DEVIANCE or damping >= 1e6):
+            if record_filter.feeds_through and not alone:
+                alone = True
+                only = bounds[0], bounds[1]._replace(force=least.force, memory=least.memory)
+                noise = _noise_alone(partial(followed, [free] * COPIES), sizes, part, only)
+                if noise is not None and noise[1] < deviance + _NO_WORSE:
+                    sizes, bounds, last = noise[0], only, np.inf
+                    continue
             result = RESULTS.successful if promised < 1.0 else RESULTS.not_converged
             break
         sizes, last = new, deviance
@@ -320,6 +333,28 @@ def fit_errors(
         record_filter,
         way,
     )
+
+
+def _noise_alone(
+    follow: Callable[[Sequence[Sizes]], Way],
+    sizes: Sizes,
+    judged: Float[np.ndarray, " record"],
+    bounds: tuple[Sizes, Sizes],
+) -> tuple[Sizes, float] | None:
+    """Give the sizes without a random force, and the deviance with them; None where a filter diverges.
+
+    A force that is all but white, straight on an accelerometer, reads as noise of the output does. Nothing
+    but their names tells them apart then, and noise is the plainer one.
+    """
+    own, deviance = sizes._replace(force=bounds[1].force, memory=bounds[1].memory), np.inf
+    for _ in range(_NOISE_STEPS):
+        way = follow(own.around())
+        deviance = float(way.deviance[0] @ judged)
+        if not np.isfinite(deviance):
+            return None
+        own = own.moved(way, judged, bounds, FURTHEST)
+    deviance = float(follow(own.around()).deviance[0] @ judged)
+    return (own, deviance) if np.isfinite(deviance) else None
 
 
 def _damped_steps(

@@ -133,7 +133,10 @@ def _update(
     after = [[covariance[row][other] - gain[row] * seen[other] for other in every] for row in every]
     moved = _correct(state, gain, measured - predicted)
     # A covariance needs no more than the rates' derivatives in the middle of the sample, in a truncated
-    # exponential: those of the whole step take three times as long to compile.
+    # exponential: those of the whole step take three times as long to compile. Internal states that follow
+    # within a sample need it squared: as often as the step is halved.
+    halvings = (len(stages) // 2).bit_length() - 1 if model.internal_states else 0
+    part = step / 2**halvings
     ends = _predict(model, quantity, step, lanes.memory, moved, stages)
     middle = tuple(0.5 * (one + other) for one, other in zip(moved[:-1], ends[:-1], strict=True))
     half = stages[len(stages) // 2]
@@ -144,14 +147,20 @@ def _update(
     slope = [jax.jvp(rates, ((*middle, moved[-1]),), (unit,))[1] for unit in units]
     ahead = []
     for place in every:
-        column = [step * one + zero for one in slope[place]]
+        column = [part * one + zero for one in slope[place]]
         total = [one + float(to == place) for to, one in enumerate(column)]
         for order in range(2, _ORDERS + 1):
             column = [
-                step / order * sum(slope[row][to] * column[row] for row in range(last)) for to in range(last)
+                part / order * sum(slope[row][to] * column[row] for row in range(last)) for to in range(last)
             ]
             total = [one + more for one, more in zip(total, column, strict=True)]
-        ahead.append((*total, lanes.memory + zero if place == last else zero))
+        ahead.append((*total, zero + float(place == last)))
+    for _ in range(halvings):
+        ahead = [
+            tuple(sum((ahead[row][to] * column[row] for row in every), start=zero) for to in every)
+            for column in ahead
+        ]
+    ahead[last] = (*ahead[last][:last], lanes.memory + zero)
     mixed = [[sum(after[row][other] * ahead[other][to] for other in every) for row in every] for to in every]
     upper: dict[tuple[int, int], Array] = {
         (to, other): sum((ahead[row][other] * mixed[to][row] for row in every), start=zero)

@@ -9,15 +9,17 @@ from ..._results import is_successful
 from ...models import Isolator
 from ._error_fit import MOST_SCORINGS, ErrorFit, first_sizes, fit_errors
 from ._measured import Measured
-from ._record_filter import RecordFilter, Sizes
+from ._record_filter import COPIES, RecordFilter, Sizes
 
-LEAST_SUBSTEPS = 2
-MOST_SUBSTEPS = 16
-"""Integration steps a sample: at least, and at most."""
+SUBSTEPS = (2, 8, 16)
+"""Integration steps a sample that are tried in turn."""
 
 SMALL = 0.1
 SMALL_SHARE = 3e-5
 """Change of the deviance by twice as many steps below which their error does not matter: and a sample."""
+
+ROUGH_SHARE = 1e-3
+"""The same a sample where a fit is only ranked."""
 
 
 def fit_measured(
@@ -29,7 +31,10 @@ def fit_measured(
     starts: Sequence[Float[np.ndarray, " column"]] = (),
     most_steps: int = MOST_SCORINGS,
 ) -> ErrorFit:
-    """Fit a model to records, with more integration steps where the motion diverges.
+    """Fit a model to records, with as many integration steps as show which law it is.
+
+    A law that bends within a sample is another law where the steps are coarse. One that jumps is never
+    integrated well: it is split elsewhere.
 
     Args:
         model: start.
@@ -41,10 +46,10 @@ def fit_measured(
         most_steps: of the search, at most.
 
     Returns:
-        The fit.
+        The fit; that of the most steps where none suffice.
     """
-    steps = LEAST_SUBSTEPS
-    while True:
+    found = None
+    for steps in SUBSTEPS:
         record_filter = RecordFilter(model, measured, steps)
         first = first_sizes(record_filter) if sizes is None else sizes
         first = first._replace(noise=np.minimum(first.noise, measured.loudest))
@@ -57,9 +62,12 @@ def fit_measured(
             starts=starts,
             most_steps=most_steps,
         )
-        if np.isfinite(found.deviance.sum()) or steps >= MOST_SUBSTEPS:
-            return found
-        steps = MOST_SUBSTEPS
+        if np.isfinite(found.deviance.sum()):
+            if model.slides or steps == SUBSTEPS[-1] or steps_are_fine(found, ROUGH_SHARE):
+                break
+            starts = (found.values, *starts[: COPIES - 2])
+    assert found is not None
+    return found
 
 
 def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
@@ -84,7 +92,7 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
         )
     while not steps_are_fine(found):
         steps = 2 * found.filter.steps
-        if steps > MOST_SUBSTEPS:
+        if steps > SUBSTEPS[-1]:
             return found
         finer = RecordFilter(found.model, measured, steps)
         finer.spread = found.filter.spread
@@ -95,11 +103,12 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     return found
 
 
-def steps_are_fine(found: ErrorFit) -> bool:
+def steps_are_fine(found: ErrorFit, share: float = SMALL_SHARE) -> bool:
     """Say whether twice as many integration steps leave the innovations as they are.
 
     Args:
         found: a fit.
+        share: change of the deviance a sample that does not matter.
 
     Returns:
         Whether that is so.
@@ -108,4 +117,4 @@ def steps_are_fine(found: ErrorFit) -> bool:
     finer.starts, finer.spread = found.filter.starts, found.filter.spread
     squares = finer.products(found.places, found.values[None], found.way, columns=False)[0, 0, 0]
     change = float(np.sum(np.abs(squares - found.products[-1, -1])))
-    return change < max(SMALL, SMALL_SHARE * found.samples)
+    return change < max(SMALL, share * found.samples)
