@@ -192,22 +192,23 @@ def refit_effect(
     model = extended_model(fit, score.element, score.strength, score.step) if begin is None else begin
     places = new_places(fit, model)
     starts = []
-    for share in _SHARES:
+    for share in _SHARES[1:] if begin is None else ():
         listed = list_parameters(
             extended_model(fit, score.element, share * score.strength, share * score.step)
         )
         starts.append(np.array([float(listed[place].value) for place in places]))
     large = first_sizes(fit.filter)
-    sizes = fit.sizes._replace(
-        force=max(fit.sizes.force, large.force - _SMALLER), memory=max(fit.sizes.memory, 1.0)
-    )
+    sizes = large._replace(noise=np.minimum(fit.sizes.noise, large.noise))
+    if begin is None:
+        force = max(fit.sizes.force, large.force - _SMALLER)
+        sizes = sizes._replace(force=force, memory=max(fit.sizes.memory, 1.0))
     found = fit_measured(
         model,
         places,
         magnitudes(model, places, search.scales),
         fit.filter.measured,
         sizes,
-        starts[0 if begin is not None else 1 :],
+        starts,
         _ROUGH_STEPS,
     )
     if begin is not None:

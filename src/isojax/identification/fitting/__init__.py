@@ -30,11 +30,8 @@ from ._errors import run_freely as run_freely
 from ._estimate import Estimate as Estimate
 from ._estimate import estimate as estimate
 from ._estimate import magnitudes as magnitudes
-from ._fit import complete as complete
 from ._fit import fit as fit
 from ._fit import fit_by_output as fit_by_output
-from ._fit import fit_with_errors as fit_with_errors
-from ._fit import fit_without_force as fit_without_force
 from ._fit import weighted_by_output as weighted_by_output
 from ._fit import weighted_by_residual as weighted_by_residual
 from ._fit_result import Fit as Fit
@@ -73,3 +70,6 @@ from ._thinned import on_all_samples as on_all_samples
 from ._thinned import thinned as thinned
 from ._unlocked_tone import Tone as Tone
 from ._unlocked_tone import unlocked_tone as unlocked_tone
+from ._weighted_fits import complete as complete
+from ._weighted_fits import fit_with_errors as fit_with_errors
+from ._weighted_fits import fit_without_force as fit_without_force

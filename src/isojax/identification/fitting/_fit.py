@@ -1,7 +1,6 @@
 """The fit: coefficients linear from the time histories of all records together."""
 
 import dataclasses
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,29 +13,18 @@ from ..._progress import silent
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator, check_integrator
-from ...records import Campaign, NoiseEstimate, estimate_noise, refuse_contradictions
+from ...records import Campaign, estimate_noise, refuse_contradictions
 from .._rules import Rules
 from ..guess import as_campaign, classical_guess
-from ..innovations import ErrorFit
-from ._build_problem import build_problem
 from ._estimate import Estimate, estimate, free_places
-from ._evaluation import Evaluation
-from ._fit_of_errors import as_fit_of_errors, fit_errors_of, noise_of_errors, suits_innovations
+from ._fit_of_errors import (
+    fit_errors_of,
+    suits_innovations,
+)
 from ._fit_result import Fit
-from ._integration_steps import find_integrator
-from ._noise_left import less_noise, noise_left
-from ._saved_fit import Statistics
+from ._noise_left import noise_left
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
-from ._simulator import Simulator
-
-_WEIGHINGS = 4
-"""Times that a fit is weighted anew by less noise."""
-
-_OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
-"""Statistics that a search which failed does not have."""
-
-_FEW_STEPS = 20
-"""Simulations with derivatives of a search that starts where a filter ended."""
+from ._weighted_fits import complete, fit_with_errors, loudness, simulator_for, weighted_by, with_less_noise
 
 
 @in_own_threads
@@ -164,83 +152,10 @@ def fit_by_output(
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
     usual = is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof
-    if followed and not (usual and noise.sigma < search.rules.loudest * _loudness(campaign)):
+    if followed and not (usual and loudness(noise, campaign) < search.rules.loudest):
         search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
-    return _with_less_noise(complete(found, model, campaign, noise), search)
-
-
-def _loudness(campaign: Campaign) -> float:
-    """Give the rms of the output over the records to fit."""
-    return float(np.sqrt(np.mean([np.var(record.output) for record in campaign.fit_records])))
-
-
-def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search: Search) -> Fit:
-    """Make a fit of a model that was fitted together with the sizes of its errors.
-
-    Where noise of the output is the only error, a search without a random force ends it: initial states are
-    then exact, and laws that jump are split where they do.
-
-    Args:
-        found: the model with the sizes of its errors.
-        start: the isolator that the search started from.
-        campaign: the measurements.
-        search: how to search.
-
-    Returns:
-        The fit.
-    """
-    plain = fit_without_force(found, start, campaign, search)
-    return as_fit_of_errors(found, start, campaign) if plain is None else plain
-
-
-def fit_without_force(found: ErrorFit, start: Isolator, campaign: Campaign, search: Search) -> Fit | None:
-    """Fit again without a random force, from where a filter ended; None where that leaves more than noise.
-
-    Args:
-        found: the model with the sizes of its errors.
-        start: the isolator that the search started from.
-        campaign: the measurements.
-        search: how to search.
-
-    Returns:
-        The fit, or None.
-    """
-    if not (found.is_noise_of_output or found.model.splits):
-        return None
-    noise = (
-        noise_of_errors(found, campaign, alone=True) if found.is_noise_of_output else estimate_noise(campaign)
-    )
-    if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
-        return None
-    simulator = simulator_for(found.model, campaign, noise, None, uncut=True)
-    near = search._replace(max_steps=_FEW_STEPS)
-    plain = complete(estimate(simulator, found.model, found.places, near), start, campaign, noise)
-    if not is_successful(plain.result):
-        return None
-    if found.is_noise_of_output:
-        return plain._replace(innovations=found)
-    # The filter rounds laws that jump. Where these are split instead, its random force has nothing to say.
-    plain = _with_less_noise(plain, search)
-    return plain if plain.stats.chi2 < search.rules.near_noise * plain.stats.dof else None
-
-
-def _with_less_noise(found: Fit, search: Search) -> Fit:
-    """Fit again by the noise that a fit leaves, as long as that is less than what it was weighted by.
-
-    Noise that is taken for far too loud lets a fit end far from its best, so that one round may not do.
-    """
-    shown = found.noise
-    for _ in range(_WEIGHINGS):
-        less = less_noise(found.estimate, found.campaign, shown, found.noise)
-        if less is None:
-            return found
-        search.progress("the fit leaves less than the noise that the output shows: again, weighted by that")
-        again = _weighted_by(found, less, search)
-        if again is found:
-            return found
-        found = again
-    return found
+    return with_less_noise(complete(found, model, campaign, noise), search)
 
 
 def weighted_by_residual(found: Fit, search: Search) -> Fit:
@@ -259,7 +174,7 @@ def weighted_by_residual(found: Fit, search: Search) -> Fit:
     if left is None:
         return found
     search.progress("what the fit leaves is other noise than the output shows: again, weighted by that")
-    return _weighted_by(found, left, search)
+    return weighted_by(found, left, search)
 
 
 def weighted_by_output(found: Fit, search: Search) -> Fit:
@@ -272,27 +187,10 @@ def weighted_by_output(found: Fit, search: Search) -> Fit:
     Returns:
         The fit, as `fit_by_output` weighs it.
     """
-    if found.noise.method != "residual" or found.innovations is not None:
+    jumps = found.model.splits and found.estimate.problem.is_uncut  # in the output they look like noise
+    if found.noise.method != "residual" or found.innovations is not None or jumps:
         return found
-    return _with_less_noise(_weighted_by(found, estimate_noise(found.campaign), search), search)
-
-
-def _weighted_by(found: Fit, noise: NoiseEstimate, search: Search) -> Fit:
-    """Fit again by other noise; the fit itself where that fails."""
-    problem = found.estimate.problem._replace(
-        noise=_whites_fitted(noise, found.campaign), share=noise.share, whitening=noise.whitening
-    )
-    again = estimate(Simulator(problem), found.model, found.estimate.places, search)
-    if not is_successful(again.result):
-        return found
-    steps = found.stats.steps + again.steps
-    return complete(again._replace(steps=steps), found.start, found.campaign, noise)
-
-
-def _whites_fitted(noise: NoiseEstimate, campaign: Campaign) -> tuple[float, ...]:
-    return tuple(
-        own for own, record in zip(noise.whites, campaign.records, strict=True) if record.role == "fit"
-    )
+    return with_less_noise(weighted_by(found, estimate_noise(found.campaign), search), search)
 
 
 def _linear_part(model: Isolator, places: tuple[int, ...]) -> Isolator:
@@ -317,79 +215,3 @@ def _check_excitation(model: Isolator, campaign: Campaign) -> None:
             f'Argument `model` must have excitation "{wanted}", because the input of {campaign.file} is '
             f'"{campaign.input.quantity}", but has "{model.excitation}".'
         )
-
-
-def simulator_for(
-    model: Isolator,
-    campaign: Campaign,
-    noise: NoiseEstimate,
-    integrator: Integrator | None,
-    uncut: bool = False,
-) -> Simulator:
-    """Give the simulator of a campaign's fitting records.
-
-    Args:
-        model: the isolator.
-        campaign: the measurements.
-        noise: the noise of the output.
-        integrator: solver and steps, or None to choose them.
-        uncut: see `build_problem`.
-
-    Returns:
-        The simulator.
-    """
-    problem = build_problem(
-        campaign.fit_records,
-        model,
-        quantity=campaign.output.quantity,
-        hold=campaign.input.hold,
-        noise=_whites_fitted(noise, campaign),
-        share=noise.share,
-        whitening=noise.whitening,
-        integrator=Integrator() if integrator is None else integrator,
-        uncut=uncut,
-    )
-    if integrator is None:
-        problem = find_integrator(problem, model)
-    return Simulator(problem)
-
-
-def complete(found: Estimate, start: Isolator, campaign: Campaign, noise: NoiseEstimate) -> Fit:
-    """Make an estimate into a fit.
-
-    Args:
-        found: the estimate.
-        start: the isolator that the search started from.
-        campaign: the measurements.
-        noise: the noise.
-
-    Returns:
-        The fit; it is compared with every record when that is first asked for.
-    """
-    samples, count = int(found.point.samples.sum()), len(found.places)
-    stats = Statistics(
-        samples,
-        count,
-        found.chi2,
-        found.dof,
-        found.chi2 + 2.0 * count,
-        found.chi2 + count * float(np.log(samples)),
-        found.steps,
-        *found.point.nuisances.spread,
-        found.problem.step_error,
-        found.next_stiffness_scatter,
-    )
-    if not is_successful(found.result):
-        stats = stats._replace(**dict.fromkeys(_OF_A_SOLUTION, math.nan))
-    return Fit(
-        found.model,
-        start,
-        campaign,
-        found.names,
-        found.uncertainty.covariance,
-        stats,
-        noise,
-        found.result,
-        found,
-        Evaluation(found, campaign, noise.whites),
-    )

@@ -11,10 +11,11 @@ from ..._results import RESULTS, is_successful
 from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thin_record
-from ..innovations import ErrorFit, Measured, fit_measured, free_squares
+from ..innovations import WHITE_ENOUGH, ErrorFit, Measured, fit_measured, foretold, free_squares
 from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
+from ._errors import restarted_runs
 from ._estimate import SMALLEST_SCATTER, Estimate, magnitudes
 from ._evaluation import FreeEvaluation
 from ._fit_result import Fit
@@ -217,12 +218,42 @@ def noise_of_errors(found: ErrorFit, campaign: Campaign, alone: bool) -> NoiseEs
             for place in sorted(set(owners))
         ]
     )
-    pooled = float(np.sqrt(np.sum(squares) / np.sum(lengths)))
-    fitted = iter(own.tolist())
-    levels = tuple(next(fitted) if record.role == "fit" else pooled for record in campaign.records)
     note = (
         "" if alone else "the error is not noise of the output: errors are compared with those of free runs"
     )
+    return _with_levels(shown, campaign, own, note)
+
+
+def noise_beside_jumps(plain: Fit, shown: NoiseEstimate) -> NoiseEstimate:
+    """Give the noise that a fit leaves, by the median of its residual: jumps are few, and pass for noise.
+
+    Args:
+        plain: the fit.
+        shown: noise that the output shows.
+
+    Returns:
+        The noise.
+    """
+    found = plain.estimate
+    runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
+    own = [1.4826 * float(np.median(np.abs(run.residual[run.counted > 0.0]))) for run in runs]
+    return _with_levels(shown, plain.campaign, np.array(own), "")
+
+
+def leaves_white(plain: Fit) -> bool:
+    """Say whether earlier errors of a fit foretell none."""
+    found = plain.estimate
+    runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
+    return all(foretold(run.residual[run.counted > 0.0]) < WHITE_ENOUGH for run in runs)
+
+
+def _with_levels(
+    shown: NoiseEstimate, campaign: Campaign, own: Float[np.ndarray, " record"], note: str
+) -> NoiseEstimate:
+    """Give a noise that has these levels in the records to fit, and their rms in the others."""
+    pooled = float(np.sqrt(np.mean(np.square(own))))
+    fitted = iter(own.tolist())
+    levels = tuple(next(fitted) if record.role == "fit" else pooled for record in campaign.records)
     return dataclasses.replace(
         shown,
         sigma=pooled,

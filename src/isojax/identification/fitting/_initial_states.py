@@ -34,8 +34,8 @@ SETTLED = 1e-2
 FIRST_PERIODS = 1.0
 """Periods at the start of a record over which its state is sought first."""
 
-_SHARES = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
-_TRIED = np.array([(place, speed) for place in _SHARES for speed in _SHARES])
+_RMS_TRIED = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
+_FIRST_TRIED = np.array([(place, speed) for place in _RMS_TRIED for speed in _RMS_TRIED])
 """Displacements and velocities, over their rms, from which the first periods are followed beside the measured
 state: where laws jump, or a motion bends much, the nearest minimum is not the lowest."""
 
@@ -75,7 +75,9 @@ def best_nuisances(
 
 
 def may_start_wrong(simulator: Simulator, point: Point) -> bool:
-    """Say whether what is left may come of the initial states: it is more than noise, and no dwells settle.
+    """Say whether what is left may come of the initial states.
+
+    No dwells settle, and it is more than noise; or laws jump, which look like noise in the output themselves.
 
     Args:
         simulator: the records.
@@ -85,7 +87,7 @@ def may_start_wrong(simulator: Simulator, point: Point) -> bool:
         Whether to seek the states further.
     """
     stepped = any(record.dwells for record in simulator.problem.records)
-    return not stepped and not point.chi2 < _DOUBTFUL * max(1.0, point.free_samples)
+    return not stepped and (point.model.splits or not point.chi2 < _DOUBTFUL * max(1.0, point.free_samples))
 
 
 def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> Nuisances:
@@ -104,7 +106,7 @@ def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> N
     short = Simulator(problem._replace(segments=segments, heads=()), simulator.at_rest)
     begun = short.settle(None, model, carried, HELD)
     begun.states[:lanes, :2] = _best_tried(
-        Simulator(short.problem._replace(segments=segments * (len(_TRIED) + 1)), simulator.at_rest),
+        Simulator(short.problem._replace(segments=segments * (len(_FIRST_TRIED) + 1)), simulator.at_rest),
         model,
         lanes,
     )
@@ -136,7 +138,7 @@ def _best_tried(many: Simulator, model: Isolator, lanes: int) -> Float[np.ndarra
     prepared = many.prepared(model, carried)
     starts, scales = many.starts(model, prepared, carried)
     own = (starts[:2, :lanes] / scales[:2, :lanes]).T
-    tried = np.concatenate([np.zeros((1, lanes, 2)), _TRIED[:, None] - own])
+    tried = np.concatenate([np.zeros((1, lanes, 2)), _FIRST_TRIED[:, None] - own])
     used = tried.size // 2
     starts[:2, :used] += scales[:2, :used] * tried.reshape(-1, 2).T
     simulated = readings(model, np.ones(prepared.record.size), starts, prepared)

@@ -7,7 +7,8 @@ from jaxtyping import Float
 
 from ..._results import is_successful
 from ...models import Isolator
-from ._error_fit import MOST_SCORINGS, ErrorFit, first_sizes, fit_errors
+from ._error_fit import ErrorFit
+from ._fit_errors import MOST_SCORINGS, first_sizes, fit_errors
 from ._measured import Measured
 from ._record_filter import COPIES, RecordFilter, Sizes
 

@@ -22,6 +22,10 @@ SPACING = 0.05
 COPIES = 7
 """Points at which a filter runs side by side: one, and six with other sizes."""
 
+_RMS_OF_STARTS = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
+_STARTS_TRIED = np.array([(place, speed) for place in _RMS_OF_STARTS for speed in _RMS_OF_STARTS])
+"""Displacements and velocities, over their rms, from which records are tried to be followed."""
+
 _RIDGE = 1e-3
 """Share of its own information that each size has beside it: those that depend on each other stay apart."""
 
@@ -161,12 +165,21 @@ class RecordFilter:
         return self.measured.quantity == "acceleration" and self.model.excitation == "force"
 
     @property
+    def samples(self) -> float:
+        """Samples that count."""
+        return float(sum(np.asarray(batch.weight).sum() for batch in self.prepared.batches))
+
+    @property
     def steps(self) -> int:
         """Integration steps a sample."""
         return (self.prepared.batches[0].drive.shape[1] - 1) // 2
 
     def follow(
-        self, places: tuple[int, ...], points: Float[np.ndarray, "copy column"], sizes: Sequence[Sizes]
+        self,
+        places: tuple[int, ...],
+        points: Float[np.ndarray, "copy column"],
+        sizes: Sequence[Sizes],
+        starts: Float[np.ndarray, "copy state record"] | None = None,
     ) -> "Way":
         """Filter every record at several points.
 
@@ -174,6 +187,7 @@ class RecordFilter:
             places: parameters that are given.
             points: their values, `COPIES` of them.
             sizes: of the errors at each point: those of `around`, where slopes with them are wanted.
+            starts: means of the first states at each point; those of the filter if omitted.
 
         Returns:
             The deviance at each, and the way at the first.
@@ -188,7 +202,7 @@ class RecordFilter:
                 repeated,
                 on_device(np.repeat([one.correlation for one in sizes], width)),
                 on_device(np.exp([one.noise[known] for one in sizes]).ravel()),
-                self._start(part, copies),
+                self._start(part, copies, starts),
                 (*(on_device(np.tile(row[known], copies)) for row in self.spread), repeated),
             )
             sampling, values = self.prepared.sampling, self._values(part, places, points)
@@ -273,10 +287,40 @@ class RecordFilter:
         width = self.prepared.order.size // len(self.prepared.batches)
         return np.minimum(self.prepared.order[part * width : (part + 1) * width], self.count - 1), width
 
-    def _start(self, part: int, copies: int) -> State:
+    def seek_starts(self, places: tuple[int, ...], point: Float[np.ndarray, " column"], sizes: Sizes) -> None:
+        """Begin each record at the displacement and velocity, of many, from which it is followed best.
+
+        A filter is linear about its mean. Where the first mean is far off and the motion bends, it never
+        finds the records.
+
+        Args:
+            places: parameters that are given.
+            point: their values.
+            sizes: of the errors.
+        """
+        scale = np.sqrt(self.spread[:2])
+        tried = np.concatenate([self.starts[None, :2], _STARTS_TRIED[:, :, None] * scale])
+        found = np.full((tried.shape[0], self.count), np.inf)
+        for first in range(0, tried.shape[0], COPIES):
+            part = np.minimum(np.arange(first, first + COPIES), tried.shape[0] - 1)
+            starts = np.repeat(self.starts[None], COPIES, axis=0)
+            starts[:, :2] = tried[part]
+            way = self.follow(places, np.repeat(point[None], COPIES, axis=0), (sizes,) * COPIES, starts)
+            found[part] = way.deviance
+        best = np.argmin(found, axis=0)
+        self.starts[:2] = tried[best, :, np.arange(self.count)].T
+
+    def _start(
+        self, part: int, copies: int, starts: Float[np.ndarray, "copy state record"] | None = None
+    ) -> State:
         known, width = self._known(part)
+        rows = (
+            np.tile(self.starts[:, known], copies)
+            if starts is None
+            else np.concatenate(list(starts[:, :, known]), axis=1)
+        )
         return (
-            *(on_device(np.tile(row[known], copies)) for row in self.starts),
+            *(on_device(row) for row in rows),
             on_device(np.zeros(copies * width)),
         )
 
