@@ -57,7 +57,7 @@ class Rules:
 
     # Records that a filter follows.
 
-    contradicted: float = 100.0
+    contradicted: float = 10.0
     """chi2/dof from which the noise that the output shows says nothing of the error: a random force stands
     for the rest."""
 
