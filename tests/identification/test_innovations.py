@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from isojax import Isolator, read_campaign
-from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness
+from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
 from isojax.identification import close_loop
 from isojax.identification.innovations import Measured, RecordFilter, Sizes, fit_measured, refined
 from isojax.records import Record
@@ -66,6 +66,48 @@ def test_the_likelihood_is_that_of_a_kalman_filter():
         )
         # The covariance goes on by an exponential that is cut off after its fourth term.
         assert way.deviance[0, place] == pytest.approx(wanted, rel=1e-4)
+
+
+def branch_deviance(drive, output, start, spread, branch, force, noise):
+    """As `kalman_deviance`, with a Maxwell branch of that stiffness and time constant in the state."""
+    stiffness, time_constant = branch
+    rates = np.array(
+        [
+            [0.0, 1.0, 0.0],
+            [-STIFFNESS / MASS, -DAMPING / MASS, -stiffness / MASS],
+            [0.0, 1.0, -1.0 / time_constant],
+        ]
+    )
+    whole = np.zeros((5, 5))
+    whole[:3, :3], whole[1, 3], whole[3, 4] = rates / RATE, 1.0 / MASS / RATE, 1.0
+    whole = expm(whole)
+    ahead, held, ramp = whole[:3, :3], whole[:3, 3], whole[:3, 4]
+    mean, covariance, deviance = start.copy(), np.diag(spread), 0.0
+    for k, measured in enumerate(output):
+        variance = covariance[0, 0] + noise
+        error, gain = measured - mean[0], covariance[:, 0] / variance
+        deviance += np.log(variance) + error**2 / variance
+        mean, covariance = mean + gain * error, covariance - np.outer(gain, covariance[0])
+        if k + 1 < output.size:
+            mean = ahead @ mean + held * drive[k] + ramp * (drive[k + 1] - drive[k])
+            covariance = ahead @ covariance @ ahead.T + force * np.outer(held, held)
+    return deviance
+
+
+def test_the_likelihood_holds_for_a_state_that_follows_within_a_sample():
+    rng = np.random.default_rng(5)
+    drive, output = smooth_noise(rng, 900), 1e-3 * smooth_noise(rng, 900)
+    records = record(drive, output), record(drive[::-1], output[::-1], "two")
+    branch = 800.0, 0.12 / RATE
+    model = linear().with_elements(MaxwellBranch(*branch))
+    own = RecordFilter(model, Measured(records, "displacement", "linear", np.full(2, 1.0)), 16)
+    own.spread[2] = 1e-8
+    force, noise = 0.3**2, 2e-5**2
+    way = own.follow((), np.zeros((7, 0)), Sizes(np.log(force), -30.0, np.log(np.full(2, noise))).around())
+    for place, one in enumerate(records):
+        start, spread = own.starts[:, place], own.spread[:, place]
+        wanted = branch_deviance(one.input, one.output, start, spread, branch, force, noise)
+        assert way.deviance[0, place] == pytest.approx(wanted, rel=1e-3)
 
 
 def test_slopes_with_the_sizes_are_those_of_the_likelihood():
@@ -125,6 +167,22 @@ def test_a_start_that_is_far_off_is_not_lost():
     assert np.all(errors < [4.0, 4e5, 0.1])
     assert found.is_noise_of_output
     np.testing.assert_allclose(np.exp(0.5 * found.sizes.noise), 0.01, rtol=0.05)
+
+
+@pytest.mark.slow
+def test_records_that_start_in_a_large_motion_and_do_not_repeat_are_followed():
+    # A spring force of several times the linear one, recorded from the middle of the motion on.
+    whole = [driven_cubic(seed, level, 0.01, cubic=1e9) for seed, level in enumerate((10.0, 30.0))]
+    records = tuple(record(one.input[700:], one.output[700:], one.name) for one in whole)
+    measured = Measured(records, "acceleration", "band_limited", np.full(2, 5.0))
+    start = Isolator(
+        MASS, (LinearStiffness(1.1 * STIFFNESS), CubicStiffness(0.95e9), LinearDamping(1.2 * DAMPING))
+    )
+    sizes = (STIFFNESS, 1e9, DAMPING)
+    found = refined(fit_measured(start, (1, 2, 3), sizes, measured), sizes)
+    errors = np.sqrt(np.diag(np.linalg.inv(found.information)))
+    assert np.all(np.abs(found.values / [STIFFNESS, 1e9, DAMPING] - 1.0) < 0.01)
+    assert np.all(np.abs(found.values - [STIFFNESS, 1e9, DAMPING]) < 5.0 * errors)
 
 
 BUILDING = """\

@@ -26,6 +26,9 @@ _RMS_OF_STARTS = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
 _STARTS_TRIED = np.array([(place, speed) for place in _RMS_OF_STARTS for speed in _RMS_OF_STARTS])
 """Displacements and velocities, over their rms, from which records are tried to be followed."""
 
+_FINER = (1.0, 0.3, 0.1)
+"""How far apart they are, over that, in turn."""
+
 _RIDGE = 1e-3
 """Share of its own information that each size has beside it: those that depend on each other stay apart."""
 
@@ -298,17 +301,21 @@ class RecordFilter:
             point: their values.
             sizes: of the errors.
         """
-        scale = np.sqrt(self.spread[:2])
-        tried = np.concatenate([self.starts[None, :2], _STARTS_TRIED[:, :, None] * scale])
-        found = np.full((tried.shape[0], self.count), np.inf)
-        for first in range(0, tried.shape[0], COPIES):
-            part = np.minimum(np.arange(first, first + COPIES), tried.shape[0] - 1)
-            starts = np.repeat(self.starts[None], COPIES, axis=0)
-            starts[:, :2] = tried[part]
-            way = self.follow(places, np.repeat(point[None], COPIES, axis=0), (sizes,) * COPIES, starts)
-            found[part] = way.deviance
-        best = np.argmin(found, axis=0)
-        self.starts[:2] = tried[best, :, np.arange(self.count)].T
+        scale, center = np.sqrt(self.spread[:2]), np.zeros((2, self.count))
+        for finer in _FINER:
+            tried = np.concatenate(
+                [self.starts[None, :2], center + finer * _STARTS_TRIED[:, :, None] * scale]
+            )
+            found = np.full((tried.shape[0], self.count), np.inf)
+            for first in range(0, tried.shape[0], COPIES):
+                part = np.minimum(np.arange(first, first + COPIES), tried.shape[0] - 1)
+                starts = np.repeat(self.starts[None], COPIES, axis=0)
+                starts[:, :2] = tried[part]
+                way = self.follow(places, np.repeat(point[None], COPIES, axis=0), (sizes,) * COPIES, starts)
+                found[part] = way.deviance
+            best = np.argmin(found, axis=0)
+            self.starts[:2] = center = tried[best, :, np.arange(self.count)].T
+            self.spread[:2] = (finer * scale) ** 2
 
     def _start(
         self, part: int, copies: int, starts: Float[np.ndarray, "copy state record"] | None = None
