@@ -101,6 +101,7 @@ class AbstractEffect(eqx.Module):
         absorbs: catalogue names of effects that this one contains; it takes their place in a model.
         needs: catalogue names of effects without which this one means nothing.
         group: where the list of effects in the documentation shows it.
+        seldom: whether a commoner effect has the same force, and goes first where records show either.
         freed_by: field of campaign.toml, as `section.field`, that puts the effect into the first model.
         look_alikes: effects that records can confuse with this one; each pair is declared once.
     """
@@ -113,5 +114,6 @@ class AbstractEffect(eqx.Module):
     absorbs: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[tuple[str, ...]] = ()
     group: ClassVar[Group]
+    seldom: ClassVar[bool] = False
     freed_by: ClassVar[str] = ""
     look_alikes: ClassVar[tuple[LookAlike, ...]] = ()

@@ -37,6 +37,7 @@ class Freeplay(AbstractElement):
     strength: ClassVar[str] = "lost_stiffness"
     needs: ClassVar[tuple[str, ...]] = ("linear_stiffness",)
     substeps: ClassVar[int] = 4
+    seldom: ClassVar[bool] = True
     group: ClassVar[Group] = "Springs"
     look_alikes: ClassVar[tuple[LookAlike, ...]] = (
         LookAlike(

@@ -28,7 +28,7 @@ from ._separating_words import is_exact, separating_experiment
 CHANNELS = ("The drive and the floor", "The response channel")
 """Groups of effects that are no laws of the isolator: they have a share of the refits of their own."""
 
-_BALANCED = 2
+_BALANCED = 3
 """Effects that are refitted because the measured forces balance best with them."""
 
 MOST_INTERNAL = 4
@@ -179,7 +179,7 @@ def _by_evidence(
     """List the refits that are significant and physical, best first.
 
     Of those that are as good the one with the fewest coefficients goes first, then the one with the fewest
-    internal states.
+    internal states, then the commoner one.
     """
     dispersion, tests = max(1.0, scores.dispersion), max(1, len(scores.scores))
     usable = []
@@ -207,7 +207,10 @@ def _by_evidence(
         tied = [one for one in usable if _as_good(one.fit, usable[0].fit, rules)]
     if not usable:
         return []
-    first = min(tied, key=lambda one: (len(one.fit.places), one.fit.model.internal_states))
+    first = min(
+        tied,
+        key=lambda one: (len(one.fit.places), one.fit.model.internal_states, one.score.element.seldom),
+    )
     return [first, *(one for one in usable if one is not first)]
 
 

@@ -124,7 +124,7 @@ def physical(
     numbers, slopes = np.empty(len(specs)), np.empty(len(specs))
     for place, (value, spec, scale) in enumerate(zip(free, specs, scales, strict=True)):
         low, high = np.isfinite(spec.lower), np.isfinite(spec.upper)
-        rising = 1.0 / (1.0 + np.exp(-value))
+        rising = np.exp(-np.logaddexp(0.0, -value))
         if low and high:
             numbers[place] = spec.lower + (spec.upper - spec.lower) * rising
             slopes[place] = (spec.upper - spec.lower) * rising * (1.0 - rising)
