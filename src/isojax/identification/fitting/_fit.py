@@ -152,7 +152,8 @@ def fit_by_output(
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
     usual = is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof
-    if followed and not (usual and loudness(noise, campaign) < search.rules.loudest):
+    lost = whole and not is_successful(found.result) and suits_innovations(campaign, stepped=True)
+    if lost or (followed and not (usual and loudness(noise, campaign) < search.rules.loudest)):
         search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     return with_less_noise(complete(found, model, campaign, noise), search)

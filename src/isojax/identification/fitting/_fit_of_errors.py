@@ -47,17 +47,18 @@ _LEAST_KEPT = 5000
 """Samples of all records below which none are left out."""
 
 
-def suits_innovations(campaign: Campaign) -> bool:
+def suits_innovations(campaign: Campaign, stepped: bool = False) -> bool:
     """Say whether a campaign's records are followed by a filter from their first sample to their last.
 
     Args:
         campaign: the measurements.
+        stepped: whether records may have dwells.
 
     Returns:
-        False where a record has dwells, or is the decay after a release.
+        False where a record has dwells, unless they may, or is the decay after a release.
     """
     return all(
-        not record.dwells
+        (stepped or not record.dwells)
         and record.kind != "free_decay"
         and record.output.size > _SHORTEST_RECORD
         and bool(np.any(record.input))

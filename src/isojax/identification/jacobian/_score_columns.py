@@ -170,7 +170,7 @@ def score_information(
 
 def _some_lanes(values: Array, begin: int, width: int) -> Array:
     """Give a few lanes of a table, by a function that is compiled once for all places of a shape."""
-    return jax.lax.dynamic_slice_in_dim(values, begin, width, axis=-1) if values.ndim else values
+    return jax.lax.dynamic_slice_in_dim(values, begin, width, axis=-1) if np.ndim(values) else values
 
 
 def _block(
