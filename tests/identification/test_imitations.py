@@ -103,7 +103,7 @@ def test_a_superfluous_finding_is_dropped_where_the_search_without_it_finds_noth
     assert asked[-1][2:] == (2, ("maxwell_branch",))
     final = extensions[-1].after
     assert [one.effect for one in findings_in(final.model, extensions)] == ["cubic_stiffness"]
-    assert final.stats.chi2 == pytest.approx(second.after.stats.chi2, abs=10.0)
+    assert final.stats.chi2 < second.after.stats.chi2 + 10.0
     assert float(final.model["coulomb_friction.force_level"]) == pytest.approx(4.0, rel=0.05)
 
 

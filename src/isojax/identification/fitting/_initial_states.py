@@ -119,7 +119,8 @@ def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> N
     # Either simulator may carry lanes beyond the segments, which hold nothing.
     used = slice(lanes)
     moved = start.states.copy()
-    moved[used] = ((states[:, used] - starts[:, used]) / units[:, used]).T
+    # What starts at rest has no unit and does not move.
+    moved[used] = ((states[:, used] - starts[:, used]) / np.where(units > 0.0, units, np.inf)[:, used]).T
     return start._replace(states=moved)
 
 
