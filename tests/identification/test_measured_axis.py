@@ -34,7 +34,7 @@ def test_dry_friction_is_found_and_the_axis_followed_without_a_spring_to_hold_it
     assert float(model.mass) == pytest.approx(95.11, rel=0.01)
     assert float(model["linear_damping.coefficient"]) == pytest.approx(203.5, rel=0.05)
     assert float(model["coulomb_friction.force_level"]) == pytest.approx(20.39, rel=0.05)
-    # The random force takes up what makes a free run drift. Fitted to the free run, four coefficients reach the
-    # published error.
+    # The random force takes up what makes a free run drift. Fitted to the free run, four coefficients reach
+    # the published error.
     assert loop.before.errors["fit"].rmse > loop.after.errors["fit"].rmse
     assert fit(model, campaign, integrator=Integrator()).errors["fit"].rmse <= 2.55e-3

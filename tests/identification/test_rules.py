@@ -29,7 +29,7 @@ ACCURACY = {
     # Where a search stands still, or goes astray.
     "_descent": {"IDLE", "KEPT", "REFUSALS_A_STEP", "SHRINKS", "STALLED"},
     "_estimate": {"ROUGH", "SMALLEST_SCATTER"},
-    "_initial_states": {"HALVINGS", "MOST_WORSENING", "SETTLED", "SHORTEST", "SMALL_STEP"},
+    "_initial_states": {"BAD_START", "HALVINGS", "MOST_WORSENING", "SETTLED", "SHORTEST", "SMALL_STEP"},
     # Draws and intervals.
     "_scatter_mixture": {"LEAST_TAIL"},
     "_valley": {"SAME_RISE", "WELL_KNOWN"},
@@ -45,7 +45,9 @@ ACCURACY = {
     "_score_columns": {"ENTRIES", "LEAST_COLUMNS", "NO_MEMORY"},
     # What a filter follows, how much of it, and how large its covariance may grow.
     "_fit": {"MOST_EVALUATIONS"},
-    "_fit_of_errors": {"LEAST_KEPT", "LOUDEST", "POWER", "SHORTEST_RECORD"},
+    "_fit_of_errors": {"LEAST_KEPT", "LOUDEST", "MUCH_LESS", "POWER", "SHORTEST_RECORD"},
+    # When what a fit leaves is the noise by which it was weighted.
+    "_weighted_fits": {"SAME_NOISE"},
     "_effect_search": {"MOST_FOLDS", "SMALLER"},
     "_by_innovations": {"MOST_INTERNAL"},
     "_segment_scatter": {"SAME_DRIVE_AND_RESPONSE", "SAME_FREQUENCY"},

@@ -214,7 +214,8 @@ def refit_effect(
     if begin is not None:
         # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
         drop, extra = fit.deviance.sum() - found.deviance.sum(), max(1, len(places) - len(fit.places))
-        p_value = float(min(1.0, len(CATALOGUE) * stats.chi2.sf(max(0.0, drop), extra)))
+        chance = len(CATALOGUE) * stats.chi2.sf(max(0.0, drop), extra)
+        p_value = float(min(1.0, chance))
         score = score._replace(element=begin.elements[-1], p_value=p_value, admissible=True)
     violation, plain = _violation(fit, found, score), None
     if violation is None and found.model.splits and not found.is_noise_of_output:

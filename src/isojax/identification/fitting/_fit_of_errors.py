@@ -11,7 +11,7 @@ from ..._results import RESULTS, is_successful
 from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thin_record
-from ..innovations import WHITE_ENOUGH, ErrorFit, Measured, fit_measured, foretold, free_squares
+from ..innovations import ErrorFit, Measured, fit_measured, free_squares, is_white
 from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
@@ -245,7 +245,7 @@ def leaves_white(plain: Fit) -> bool:
     """Say whether earlier errors of a fit foretell none."""
     found = plain.estimate
     runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
-    return all(foretold(run.residual[run.counted > 0.0]) < WHITE_ENOUGH for run in runs)
+    return all(is_white(run.residual[run.counted > 0.0]) for run in runs)
 
 
 def _with_levels(

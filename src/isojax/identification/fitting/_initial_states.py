@@ -22,7 +22,7 @@ MOST_WORSENING = 1.1
 HALVINGS = 5
 """How often the step of a record is halved before it is given up."""
 
-_DOUBTFUL = 1.3
+_BAD_START = 1.3
 """chi2/dof above which initial states are sought further."""
 
 HELD = Spread(1e-9)
@@ -87,7 +87,7 @@ def may_start_wrong(simulator: Simulator, point: Point) -> bool:
         Whether to seek the states further.
     """
     stepped = any(record.dwells for record in simulator.problem.records)
-    return not stepped and (point.model.splits or not point.chi2 < _DOUBTFUL * max(1.0, point.free_samples))
+    return not stepped and (point.model.splits or not point.chi2 < _BAD_START * max(1.0, point.free_samples))
 
 
 def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> Nuisances:

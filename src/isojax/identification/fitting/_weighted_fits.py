@@ -22,7 +22,7 @@ from ._simulator import Simulator
 _WEIGHINGS = 4
 """Times that a fit is weighted anew by less noise."""
 
-_SETTLED = 0.9
+_SAME_NOISE = 0.9
 """Share of the noise by which a fit was weighted from which what it leaves is the same."""
 
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
@@ -84,7 +84,7 @@ def fit_without_force(found: ErrorFit, start: Isolator, campaign: Campaign, sear
     # The filter rounds laws that jump. Where these are split instead, its random force has nothing to say.
     for _ in range(_WEIGHINGS):
         left = noise_beside_jumps(plain, shown)
-        if all(new > _SETTLED * old for new, old in zip(left.levels, plain.noise.levels, strict=True)):
+        if all(new > _SAME_NOISE * old for new, old in zip(left.levels, plain.noise.levels, strict=True)):
             break
         again = weighted_by(plain, left, search)
         if again is plain:

@@ -8,10 +8,9 @@ Read `_filter` (innovations of records side by side, and their derivatives), `_m
 
 from ._effect_products import EffectProducts as EffectProducts
 from ._effect_products import effect_products as effect_products
-from ._error_fit import WHITE_ENOUGH as WHITE_ENOUGH
 from ._error_fit import ErrorFit as ErrorFit
-from ._error_fit import foretold as foretold
 from ._error_fit import free_squares as free_squares
+from ._error_fit import is_white as is_white
 from ._fit_errors import first_sizes as first_sizes
 from ._fit_errors import fit_errors as fit_errors
 from ._fit_measured import fit_measured as fit_measured

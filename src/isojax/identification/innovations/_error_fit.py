@@ -19,7 +19,7 @@ _NO_FORCE = 0.05
 _LAGS = 20
 """Samples back from which an innovation may be foretold."""
 
-WHITE_ENOUGH = 0.03
+_WHITE_ENOUGH = 0.03
 """Share of an innovation's variance that those before it may foretell where the error is noise."""
 
 _RECORDS_ALIKE = 0.3
@@ -135,12 +135,24 @@ class ErrorFit:
             return True
         counted = np.array([max(own.size, 1) for own in self.innovations])
         levels = self.products[-1, -1] / counted
-        return self.colour < WHITE_ENOUGH and bool(np.all(np.abs(levels - 1.0) < _RECORDS_ALIKE))
+        return self.colour < _WHITE_ENOUGH and bool(np.all(np.abs(levels - 1.0) < _RECORDS_ALIKE))
 
     @property
     def criterion(self) -> float:
         """Schwarz's criterion."""
         return float(self.deviance.sum()) + len(self.places) * float(np.log(self.samples))
+
+
+def is_white(errors: Float[np.ndarray, " time"]) -> bool:
+    """Say whether earlier errors hardly foretell one.
+
+    Args:
+        errors: sample by sample.
+
+    Returns:
+        Whether that is so.
+    """
+    return foretold(errors) < _WHITE_ENOUGH
 
 
 def foretold(errors: Float[np.ndarray, " time"]) -> float:

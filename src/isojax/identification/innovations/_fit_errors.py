@@ -34,7 +34,7 @@ _LEAST_FORCE = 1e-5
 _LEAST_NOISE = 1e-4
 """Noise below which the output has none but rounding and the error of the steps [rms of the output]."""
 
-_LOST = 10.0
+_ASTRAY = 10.0
 """Deviance a sample from which a filter may have begun in a wrong state."""
 
 _NO_WORSE = 10.0
@@ -138,7 +138,7 @@ def fit_errors(
     result: Any = RESULTS.not_converged
     for step in range(1, most_steps + 1):
         way = followed([free] * COPIES, sizes.around())
-        if step == 1 and not way.deviance[0] @ part < _LOST * record_filter.samples:
+        if step == 1 and not way.deviance[0] @ part < _ASTRAY * record_filter.samples:
             record_filter.seek_starts(places, points([free])[0], sizes)
             way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
