@@ -15,6 +15,9 @@ from ._record_filter import COPIES, RecordFilter, Sizes
 SUBSTEPS = (2, 8, 16)
 """Integration steps a sample that are tried in turn."""
 
+MOST_ROUNDS = 3
+"""Searches of full length that end a rough one: large records creep along a valley."""
+
 SMALL = 0.1
 SMALL_SHARE = 3e-5
 """Change of the deviance by twice as many steps below which their error does not matter: and a sample."""
@@ -82,7 +85,9 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
         The fit; that of the most steps where none suffice.
     """
     measured = found.filter.measured
-    if not is_successful(found.result):
+    for _ in range(MOST_ROUNDS):
+        if is_successful(found.result):
+            break
         found = fit_errors(
             found.filter,
             found.places,
