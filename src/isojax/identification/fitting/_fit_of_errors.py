@@ -55,8 +55,11 @@ def suits_innovations(campaign: Campaign, stepped: bool = False) -> bool:
         stepped: whether records may have dwells.
 
     Returns:
-        False where a record has dwells, unless they may, or is the decay after a release.
+        False where a record has dwells, unless they may, or is the decay after a release; and where records
+        were made under other conditions: the filter has no stiffness of each record.
     """
+    if len({record.conditions for record in campaign.fit_records}) > 1:
+        return False
     return all(
         (stepped or not record.dwells)
         and record.kind != "free_decay"
