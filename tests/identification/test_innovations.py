@@ -34,13 +34,20 @@ def smooth_noise(rng, size):
     return scipy.signal.sosfiltfilt(scipy.signal.butter(4, 0.2, output="sos"), rng.standard_normal(size))
 
 
-def kalman_deviance(drive, output, start, spread, force, noise):
-    """-2 log-likelihood but for a constant: the drive is straight between samples, its random force held."""
-    rates, push = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]]), np.array([0.0, 1.0 / MASS])
-    whole = np.zeros((4, 4))
-    whole[:2, :2], whole[:2, 2], whole[2, 3] = rates / RATE, push / RATE, 1.0
+def kalman_deviance(drive, output, start, spread, force, noise, branch=None):
+    """-2 log-likelihood but for a constant: the drive is straight between samples, its random force held.
+
+    `branch` is stiffness and time constant of a Maxwell branch, whose displacement is a third state.
+    """
+    rates = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]])
+    if branch is not None:
+        rates = np.pad(rates, (0, 1))
+        rates[1, 2], rates[2] = -branch[0] / MASS, [0.0, 1.0, -1.0 / branch[1]]
+    size = len(rates)
+    whole = np.zeros((size + 2, size + 2))
+    whole[:size, :size], whole[1, size], whole[size, size + 1] = rates / RATE, 1.0 / MASS / RATE, 1.0
     whole = expm(whole)
-    ahead, held, ramp = whole[:2, :2], whole[:2, 2], whole[:2, 3]
+    ahead, held, ramp = whole[:size, :size], whole[:size, size], whole[:size, size + 1]
     mean, covariance, deviance = start.copy(), np.diag(spread), 0.0
     for k, measured in enumerate(output):
         variance = covariance[0, 0] + noise
@@ -68,32 +75,6 @@ def test_the_likelihood_is_that_of_a_kalman_filter():
         assert way.deviance[0, place] == pytest.approx(wanted, rel=1e-4)
 
 
-def branch_deviance(drive, output, start, spread, branch, force, noise):
-    """As `kalman_deviance`, with a Maxwell branch of that stiffness and time constant in the state."""
-    stiffness, time_constant = branch
-    rates = np.array(
-        [
-            [0.0, 1.0, 0.0],
-            [-STIFFNESS / MASS, -DAMPING / MASS, -stiffness / MASS],
-            [0.0, 1.0, -1.0 / time_constant],
-        ]
-    )
-    whole = np.zeros((5, 5))
-    whole[:3, :3], whole[1, 3], whole[3, 4] = rates / RATE, 1.0 / MASS / RATE, 1.0
-    whole = expm(whole)
-    ahead, held, ramp = whole[:3, :3], whole[:3, 3], whole[:3, 4]
-    mean, covariance, deviance = start.copy(), np.diag(spread), 0.0
-    for k, measured in enumerate(output):
-        variance = covariance[0, 0] + noise
-        error, gain = measured - mean[0], covariance[:, 0] / variance
-        deviance += np.log(variance) + error**2 / variance
-        mean, covariance = mean + gain * error, covariance - np.outer(gain, covariance[0])
-        if k + 1 < output.size:
-            mean = ahead @ mean + held * drive[k] + ramp * (drive[k + 1] - drive[k])
-            covariance = ahead @ covariance @ ahead.T + force * np.outer(held, held)
-    return deviance
-
-
 def test_the_likelihood_holds_for_a_state_that_follows_within_a_sample():
     rng = np.random.default_rng(5)
     drive, output = smooth_noise(rng, 900), 1e-3 * smooth_noise(rng, 900)
@@ -106,7 +87,7 @@ def test_the_likelihood_holds_for_a_state_that_follows_within_a_sample():
     way = own.follow((), np.zeros((7, 0)), Sizes(np.log(force), -30.0, np.log(np.full(2, noise))).around())
     for place, one in enumerate(records):
         start, spread = own.starts[:, place], own.spread[:, place]
-        wanted = branch_deviance(one.input, one.output, start, spread, branch, force, noise)
+        wanted = kalman_deviance(one.input, one.output, start, spread, force, noise, branch)
         assert way.deviance[0, place] == pytest.approx(wanted, rel=1e-3)
 
 

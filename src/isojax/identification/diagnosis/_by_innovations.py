@@ -93,7 +93,7 @@ def diagnose_innovations(
 
 
 def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[Refit]:
-    """Refit the effects that the scores ask for, strongest first; then what looks like the best of them."""
+    """Refit the effects that the balance of forces and the scores ask for; then what looks like the best."""
     rules, refits = search.rules, list[Refit]()
 
     def refit(score: Score, begin: Isolator | None = None) -> bool:

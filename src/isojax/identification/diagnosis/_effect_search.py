@@ -274,6 +274,6 @@ def transfer(fit: ErrorFit, found: ErrorFit, search: Search) -> Transfer:
                 starts=(one.values,),
                 loudest=fit.filter.measured.loudest,
             )
-            gained += (1 - 2 * place) * float(part.deviance @ unseen)
-            squares[place] += float(free_squares(part) @ unseen)
+            gained += (1 - 2 * place) * float(part.deviance[unseen].sum())
+            squares[place] += float(free_squares(part)[unseen].sum())
     return Transfer(gained, float(1.0 - squares[1] / squares[0]) if squares[0] > 0.0 else 0.0)

@@ -17,10 +17,7 @@ from ...records import Campaign, estimate_noise, refuse_contradictions
 from .._rules import Rules
 from ..guess import as_campaign, classical_guess
 from ._estimate import Estimate, estimate, free_places
-from ._fit_of_errors import (
-    fit_errors_of,
-    suits_innovations,
-)
+from ._fit_of_errors import fit_errors_of, suits_innovations
 from ._fit_result import Fit
 from ._noise_left import noise_left
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of

@@ -5,13 +5,14 @@ import math
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import median_abs_deviation, norm
 
 from ..._parameters import element_names, list_parameters
 from ..._results import RESULTS, is_successful
 from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thin_record
-from ..innovations import ErrorFit, Measured, fit_measured, free_squares, is_white
+from ..innovations import ErrorFit, Measured, fit_measured, free_squares
 from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
@@ -238,24 +239,23 @@ def noise_beside_jumps(plain: Fit, shown: NoiseEstimate) -> NoiseEstimate:
     Returns:
         The noise.
     """
-    found = plain.estimate
-    runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
-    own = [1.4826 * float(np.median(np.abs(run.residual[run.counted > 0.0]))) for run in runs]
+    own = [median_abs_deviation(left, scale=float(norm.ppf(0.75))) for left in left_by_record(plain)]
     return _with_levels(shown, plain.campaign, np.array(own), "")
 
 
-def leaves_white(plain: Fit) -> bool:
-    """Say whether earlier errors of a fit foretell none."""
+def left_by_record(plain: Fit) -> list[Float[np.ndarray, " time"]]:
+    """Give what a fit leaves of each of its records, where samples count."""
     found = plain.estimate
     runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
-    return all(is_white(run.residual[run.counted > 0.0]) for run in runs)
+    return [run.residual[run.counted > 0.0] for run in runs]
 
 
 def _with_levels(
     shown: NoiseEstimate, campaign: Campaign, own: Float[np.ndarray, " record"], note: str
 ) -> NoiseEstimate:
     """Give a noise that has these levels in the records to fit, and their rms in the others."""
-    pooled = float(np.sqrt(np.mean(np.square(own))))
+    lengths = [record.output.size - record.settle for record in campaign.fit_records]
+    pooled = float(np.sqrt(np.average(np.square(own), weights=lengths)))
     fitted = iter(own.tolist())
     levels = tuple(next(fitted) if record.role == "fit" else pooled for record in campaign.records)
     return dataclasses.replace(

@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from ...models import Isolator
 from ...records import Record, ringing_frequency
-from ..jacobian import SHORTEST, Segment, readings
+from ..jacobian import FIRST_STATES, SHORTEST, Segment, readings
 from ._elimination import Nuisances, Spread, step_nuisances
 from ._problem import Point, Problem, one_hot
 from ._simulator import Simulator
@@ -33,11 +33,6 @@ SETTLED = 1e-2
 
 FIRST_PERIODS = 1.0
 """Periods at the start of a record over which its state is sought first."""
-
-_RMS_TRIED = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
-_FIRST_TRIED = np.array([(place, speed) for place in _RMS_TRIED for speed in _RMS_TRIED])
-"""Displacements and velocities, over their rms, from which the first periods are followed beside the measured
-state: where laws jump, or a motion bends much, the nearest minimum is not the lowest."""
 
 SMALL_STEP = 1e-4
 """Step of a state, over its range, that no longer counts."""
@@ -106,7 +101,7 @@ def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> N
     short = Simulator(problem._replace(segments=segments, heads=()), simulator.at_rest)
     begun = short.settle(None, model, carried, HELD)
     begun.states[:lanes, :2] = _best_tried(
-        Simulator(short.problem._replace(segments=segments * (len(_FIRST_TRIED) + 1)), simulator.at_rest),
+        Simulator(short.problem._replace(segments=segments * (len(FIRST_STATES) + 1)), simulator.at_rest),
         model,
         lanes,
     )
@@ -139,7 +134,7 @@ def _best_tried(many: Simulator, model: Isolator, lanes: int) -> Float[np.ndarra
     prepared = many.prepared(model, carried)
     starts, scales = many.starts(model, prepared, carried)
     own = (starts[:2, :lanes] / scales[:2, :lanes]).T
-    tried = np.concatenate([np.zeros((1, lanes, 2)), _FIRST_TRIED[:, None] - own])
+    tried = np.concatenate([np.zeros((1, lanes, 2)), FIRST_STATES[:, None] - own])
     used = tried.size // 2
     starts[:2, :used] += scales[:2, :used] * tried.reshape(-1, 2).T
     simulated = readings(model, np.ones(prepared.record.size), starts, prepared)

@@ -7,11 +7,11 @@ import numpy as np
 from ..._results import is_successful
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, estimate_noise
-from ..innovations import ErrorFit
+from ..innovations import ErrorFit, is_white
 from ._build_problem import build_problem
 from ._estimate import Estimate, estimate
 from ._evaluation import Evaluation
-from ._fit_of_errors import as_fit_of_errors, leaves_white, noise_beside_jumps, noise_of_errors
+from ._fit_of_errors import as_fit_of_errors, left_by_record, noise_beside_jumps, noise_of_errors
 from ._fit_result import Fit
 from ._integration_steps import find_integrator
 from ._noise_left import less_noise
@@ -91,7 +91,7 @@ def fit_without_force(found: ErrorFit, start: Isolator, campaign: Campaign, sear
             break
         plain = again
     near = plain.stats.chi2 < search.rules.near_noise * plain.stats.dof
-    near = near and leaves_white(plain)
+    near = near and all(map(is_white, left_by_record(plain)))
     return plain if near and plain.noise.sigma < search.rules.near_noise * shown.sigma else None
 
 

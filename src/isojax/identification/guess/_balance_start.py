@@ -49,8 +49,9 @@ def find_balance_start(
 
     Source: Masri & Caughey 1979.
     """
-    guesses = [type(next(one for one in absent if one.name == name)).guess(scales) for name in _names(absent)]
-    return next(iter(balance_starts(campaign, model, tuple(guesses))), None)
+    kinds = dict.fromkeys(type(probe) for probe in absent)
+    starts = balance_starts(campaign, model, tuple(kind.guess(scales) for kind in kinds))
+    return starts[0] if starts else None
 
 
 def balance_starts(
@@ -81,10 +82,6 @@ def balance_starts(
         if (element.signed or strength > 0.0) and strength > lower and tried.unexplained < best:
             found[probe.name] = BalanceStart(element, tried.model, tried.unexplained, before)
     return sorted(found.values(), key=lambda one: one.unexplained)
-
-
-def _names(absent: tuple[AbstractElement, ...]) -> dict[str, None]:
-    return dict.fromkeys(probe.name for probe in absent)
 
 
 def _balance(campaign: Campaign, model: Isolator) -> ForceBalance:

@@ -110,6 +110,11 @@ def fit_errors(
     """
     listed = list_parameters(record_filter.model)
     part = np.ones(record_filter.count) if judged is None else judged
+
+    def over(values: Float[np.ndarray, "*any record"]) -> Float[np.ndarray, "*any"]:
+        """Sum over the records that are fitted: another may have diverged."""
+        return np.asarray(values[..., part > 0.0].sum(axis=-1))
+
     specs, scales = tuple(listed[place].spec for place in places), tuple(magnitudes)
     begun = [np.array([float(listed[place].value) for place in places]), *starts]
     bounded = [bool(np.isfinite([spec.lower, spec.upper]).any()) for spec in specs]
@@ -132,19 +137,19 @@ def fit_errors(
 
     free, damping = frees[0], 1e-3
     if len(frees) > 1:
-        deviances = followed(frees, [sizes] * len(frees)).deviance @ part
+        deviances = over(followed(frees, [sizes] * len(frees)).deviance)
         free = frees[int(np.argmin(deviances[: len(frees)]))]
     last, before, trust, alone = np.inf, sizes, FURTHEST, False
     result: Any = RESULTS.not_converged
     for step in range(1, most_steps + 1):
         way = followed([free] * COPIES, sizes.around())
-        if step == 1 and not way.deviance[0] @ part < _ASTRAY * record_filter.samples:
+        if step == 1 and not over(way.deviance[0]) < _ASTRAY * record_filter.samples:
             record_filter.seek_starts(places, points([free])[0], sizes)
             way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
             record_filter.spread[2:] = np.where(np.isfinite(way.squares), way.squares, 0.0)
-        deviance = float(way.deviance[0] @ part)
-        products = record_filter.products(places, points([free]), way, columns=True)[:, :, 0] @ part
+        deviance = float(over(way.deviance[0]))
+        products = over(record_filter.products(places, points([free]), way, columns=True)[:, :, 0])
         if not (np.isfinite(deviance) and np.all(np.isfinite(products))):
             result = RESULTS.not_finite
             break
@@ -154,7 +159,7 @@ def fit_errors(
             products, damping * _TRIED, np.where(bounded, _FAR + np.abs(free), np.inf)
         )
         squares = record_filter.products(places, points([free + one for one in tried]), way, columns=False)
-        squares = np.nan_to_num(squares[0, 0] @ part, nan=np.inf)
+        squares = np.nan_to_num(over(squares[0, 0]), nan=np.inf)
         best = int(np.argmin(squares)) if size else 0
         gain = float(products[-1, -1] - squares[best]) if size else 0.0
         if gain > 0.0:
@@ -215,11 +220,11 @@ def _noise_alone(
     own, deviance = sizes._replace(force=bounds[1].force, memory=bounds[1].memory), np.inf
     for _ in range(_NOISE_STEPS):
         way = follow(own.around())
-        deviance = float(way.deviance[0] @ judged)
+        deviance = float(way.deviance[0, judged > 0.0].sum())
         if not np.isfinite(deviance):
             return None
         own = own.moved(way, judged, bounds, FURTHEST)
-    deviance = float(follow(own.around()).deviance[0] @ judged)
+    deviance = float(follow(own.around()).deviance[0, judged > 0.0].sum())
     return (own, deviance) if np.isfinite(deviance) else None
 
 

@@ -100,8 +100,7 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
         steps = 2 * found.filter.steps
         if steps > SUBSTEPS[-1]:
             return found
-        finer = RecordFilter(found.model, measured, steps)
-        finer.spread = found.filter.spread
+        finer = found.filter.with_steps(steps, found.model)
         again = fit_errors(finer, found.places, magnitudes, found.sizes, loudest=measured.loudest)
         if not np.isfinite(again.deviance.sum()):
             return found
@@ -119,8 +118,7 @@ def steps_are_fine(found: ErrorFit, share: float = SMALL_SHARE) -> bool:
     Returns:
         Whether that is so.
     """
-    finer = RecordFilter(found.model, found.filter.measured, 2 * found.filter.steps)
-    finer.starts, finer.spread = found.filter.starts, found.filter.spread
+    finer = found.filter.with_steps(2 * found.filter.steps, found.model)
     squares = finer.products(found.places, found.values[None], found.way, columns=False)[0, 0, 0]
     change = float(np.sum(np.abs(squares - found.products[-1, -1])))
     return change < max(SMALL, share * found.samples)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 from ..._parameters import ParameterSpec, list_parameters
 from ..._types import on_device
 from ...models import Isolator, State
-from ..jacobian import Batch, workers
+from ..jacobian import FIRST_STATES, Batch, workers
 from ._filter import Followed, Lanes, Trace, follow_records, innovation_products
 from ._measured import Measured
 
@@ -22,12 +22,8 @@ SPACING = 0.05
 COPIES = 7
 """Points at which a filter runs side by side: one, and six with other sizes."""
 
-_RMS_OF_STARTS = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
-_STARTS_TRIED = np.array([(place, speed) for place in _RMS_OF_STARTS for speed in _RMS_OF_STARTS])
-"""Displacements and velocities, over their rms, from which records are tried to be followed."""
-
 _FINER = (1.0, 0.3, 0.1)
-"""How far apart they are, over that, in turn."""
+"""Spacing of the first states that are tried in turn, over that of `FIRST_STATES`."""
 
 _RIDGE = 1e-3
 """Share of its own information that each size has beside it: those that depend on each other stay apart."""
@@ -81,13 +77,15 @@ class Sizes(NamedTuple):
             The sizes, within their bounds.
         """
         count = judged.size
+        # A record that takes no part may have diverged.
+        slopes, information = (np.where(np.isfinite(one), one, 0.0) for one in (way.slope, way.fisher))
         here, lower, upper = (np.r_[one.force, one.memory, one.noise] for one in (self, *bounds))
-        slope = np.concatenate([(way.slope[:2] * judged).sum(axis=1), way.slope[2]])
+        slope = np.concatenate([(slopes[:2] * judged).sum(axis=1), slopes[2]])
         fisher = np.zeros((2 + count, 2 + count))
-        fisher[:2, :2] = (way.fisher[:2, :2] * judged).sum(axis=-1)
-        fisher[:2, 2:] = way.fisher[:2, 2] * judged
+        fisher[:2, :2] = (information[:2, :2] * judged).sum(axis=-1)
+        fisher[:2, 2:] = information[:2, 2] * judged
         fisher[2:, :2] = fisher[:2, 2:].T
-        fisher[range(2, 2 + count), range(2, 2 + count)] = way.fisher[2, 2]
+        fisher[range(2, 2 + count), range(2, 2 + count)] = information[2, 2]
         fisher += _RIDGE * np.diag(np.diag(fisher)) + np.eye(2 + count)
         # What stands at a bound and pushes against it stays there, and the others do not count on it.
         held = ((here <= lower) & (slope >= 0.0)) | ((here >= upper) & (slope <= 0.0))
@@ -176,6 +174,20 @@ class RecordFilter:
     def steps(self) -> int:
         """Integration steps a sample."""
         return (self.prepared.batches[0].drive.shape[1] - 1) // 2
+
+    def with_steps(self, steps: int, model: Isolator) -> "RecordFilter":
+        """Give the same filter with other steps a sample; the first states are those that it has.
+
+        Args:
+            steps: integration steps a sample, at least.
+            model: the isolator, at other numbers.
+
+        Returns:
+            The filter.
+        """
+        other = RecordFilter(model, self.measured, steps)
+        other.starts, other.spread = self.starts.copy(), self.spread.copy()
+        return other
 
     def follow(
         self,
@@ -301,11 +313,9 @@ class RecordFilter:
             point: their values.
             sizes: of the errors.
         """
-        scale, center = np.sqrt(self.spread[:2]), np.zeros((2, self.count))
+        scale, center = self.prepared.spread[:, : self.count], np.zeros((2, self.count))
         for finer in _FINER:
-            tried = np.concatenate(
-                [self.starts[None, :2], center + finer * _STARTS_TRIED[:, :, None] * scale]
-            )
+            tried = np.concatenate([self.starts[None, :2], center + finer * FIRST_STATES[:, :, None] * scale])
             found = np.full((tried.shape[0], self.count), np.inf)
             for first in range(0, tried.shape[0], COPIES):
                 part = np.minimum(np.arange(first, first + COPIES), tried.shape[0] - 1)

@@ -25,6 +25,7 @@ from ._internal_states import internal_starts as internal_starts
 from ._score_columns import SCORE_PIECES as SCORE_PIECES
 from ._score_columns import Followed as Followed
 from ._score_columns import score_information as score_information
+from ._segments import FIRST_STATES as FIRST_STATES
 from ._segments import SHORTEST as SHORTEST
 from ._segments import Segment as Segment
 from ._segments import cut_evenly as cut_evenly

@@ -23,6 +23,11 @@ SHORTEST_WINDOW = 400
 FEWEST_WINDOWS = 4
 """Windows below which a record stays whole."""
 
+_OF_RMS = (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5)
+FIRST_STATES = np.array([(place, speed) for place in _OF_RMS for speed in _OF_RMS])
+"""Displacements and velocities, over their rms, at which a record is tried to begin beside the measured one:
+where laws jump, or a motion bends much, the nearest minimum is not the lowest."""
+
 SHORTEST = 8
 """Samples below which a piece of a record says nothing."""
 
