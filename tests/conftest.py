@@ -77,7 +77,7 @@ _MOST_MAPPINGS = 40_000
 """Memory mappings of the process from which compiled code is let go; Linux allows 65530, and every compiled
 function takes several. Beyond that limit the compiler does not raise, it crashes."""
 
-_MOST_MEMORY = 9e9
+_MOST_MEMORY = 5e9
 """Resident memory of the process [B] from which compiled code is let go: there is one process a core."""
 
 _compiled_since: list[str] = []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import jaxlib.version
 
-_UNTRIED = (0, 11)
+UNTRIED = (0, 11)
 """First jaxlib that was not tried: a flag that XLA does not know ends the process."""
 
 _FLAG = "--xla_cpu_use_fusion_emitters"
@@ -29,7 +29,7 @@ def compile_quickly() -> bool:
         True
     """
     flags = os.environ.get("XLA_FLAGS", "")
-    if _FLAG in flags or jaxlib.version.__version_info__ >= _UNTRIED:
+    if _FLAG in flags or jaxlib.version.__version_info__ >= UNTRIED:
         return f"{_FLAG}=false" in flags
     os.environ["XLA_FLAGS"] = f"{flags} {_FLAG}=false".strip()
     return True
@@ -41,7 +41,7 @@ def quick_options() -> dict[str, bool]:
     Returns:
         The options; none where the user has set the flag, and where jaxlib is newer than was tried.
     """
-    if _FLAG in os.environ.get("XLA_FLAGS", "") or jaxlib.version.__version_info__ >= _UNTRIED:
+    if _FLAG in os.environ.get("XLA_FLAGS", "") or jaxlib.version.__version_info__ >= UNTRIED:
         return {}
     return {_FLAG.lstrip("-"): False}
 

@@ -99,7 +99,7 @@ class Refit(NamedTuple):
     @property
     def explains(self) -> bool:
         """Whether nothing but noise of the output is left."""
-        return self.plain is not None or self.fit.is_noise_of_output
+        return self.plain is not None or (self.fit.is_noise_of_output and not self.fit.has_force)
 
 
 def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ()) -> Scores:

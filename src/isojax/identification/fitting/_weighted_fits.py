@@ -71,7 +71,9 @@ def fit_without_force(found: ErrorFit, start: Isolator, campaign: Campaign, sear
     """
     alone, shown = found.is_noise_of_output, estimate_noise(campaign)
     known = 0.0 < shown.sigma < np.inf and loudness(shown, campaign) < search.rules.loudest
-    if not (alone or (found.model.splits and known)):
+    # Whatever the filter foretells worse by far than the noise allows no simulation follows.
+    floor = shown.sigma * np.sqrt(search.rules.contradicted)
+    if not (alone or (found.model.splits and known and float(np.median(found.misses)) < floor)):
         return None
     noise = noise_of_errors(found, campaign, alone=True) if alone else shown
     simulator = simulator_for(found.model, campaign, noise, None, uncut=True)

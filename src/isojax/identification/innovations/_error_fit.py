@@ -16,6 +16,10 @@ from ._record_filter import RecordFilter, Sizes, Way
 _NO_FORCE = 0.05
 """Share of the innovations' variance below which the random force does not matter."""
 
+_DETERMINED = 10.0
+"""Information of the logarithm of the random force's variance from which there is a force: chance gives one
+that is as large in one of a thousand records."""
+
 _LAGS = 20
 """Samples back from which an innovation may be foretold."""
 
@@ -89,6 +93,18 @@ class ErrorFit:
                 found[int(prepared.order[part * width + lane])] = white[counted, lane]
         return [found[place] for place in range(self.filter.count)]
 
+    @property
+    def misses(self) -> Float[np.ndarray, " record"]:
+        """Rms of the innovations of each record [SI unit of the output]; 0 where no sample counts."""
+        prepared, found = self.filter.prepared, np.zeros(self.filter.prepared.order.size)
+        width = prepared.order.size // len(prepared.batches)
+        for part, trace in enumerate(self.way.traces):
+            counted = np.isfinite(np.asarray(trace.deviation))
+            squares = np.where(counted, np.asarray(trace.error), 0.0) ** 2
+            own = np.sqrt(squares.sum(axis=0) / np.maximum(counted.sum(axis=0), 1))
+            found[prepared.order[part * width : (part + 1) * width]] = own
+        return found[: self.filter.count]
+
     @cached_property
     def force_share(self) -> float:
         """Share of the innovations' variance that the random force causes, at most over the records."""
@@ -120,6 +136,13 @@ class ErrorFit:
                 1.0 + 2.0 * sum(float(own[:-lag] @ own[lag:]) / power for lag in range(1, _LAGS + 1))
             )
         return max(times)
+
+    @cached_property
+    def has_force(self) -> bool:
+        """Whether the records determine a random force beside the noise of the output, however small."""
+        fisher = np.where(np.isfinite(self.way.fisher), self.way.fisher, 0.0)
+        noise = np.maximum(fisher[2, 2], 1e-300)
+        return float(np.sum(fisher[0, 0] - fisher[0, 2] ** 2 / noise)) > _DETERMINED
 
     @property
     def is_noise_of_output(self) -> bool:

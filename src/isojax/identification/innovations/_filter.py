@@ -16,10 +16,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._kernel_scan import kernel_scan
 from ..._parameters import replace_parameters
 from ..._quick_jit import quick_jit
 from ...models import RK4, Instant, Isolator, Quantity, State, advance, split_stages
 from ..jacobian import Batch
+
+_IN_A_KERNEL = 4
+"""Internal states up to which the loop is one kernel: to compile it takes long where it is large."""
 
 _ORDERS = 4
 """Terms of the exponential that carries the covariance over a sample."""
@@ -233,7 +237,8 @@ def follow_records(
     tables = batch.acting, batch.measured, batch.weight, used
     differing = (nothing.size // kept - 1) // 2
     flat = jnp.zeros((differing, kept)), jnp.zeros((differing, differing, kept))
-    (_, _, deviance, square, slope, fisher), trace = jax.lax.scan(
+    scan = kernel_scan if model.internal_states <= _IN_A_KERNEL else jax.lax.scan
+    (_, _, deviance, square, slope, fisher), trace = scan(
         body, (start, begun, nothing, tuple(nothing for _ in every), *flat), tables
     )
     counted = jnp.maximum(batch.weight.sum(axis=0), 1.0)
@@ -308,4 +313,5 @@ def innovation_products(
     tangents = tuple(jnp.zeros((columns, count)) for _ in start)
     empty = jnp.zeros((columns + 1, columns + 1, count))
     tables = batch.acting, batch.measured, trace.gains, trace.deviation
-    return jax.lax.scan(body, (begun, tangents, empty), tables)[0][2]
+    scan = kernel_scan if model.internal_states <= _IN_A_KERNEL else jax.lax.scan
+    return scan(body, (begun, tangents, empty), tables)[0][2]

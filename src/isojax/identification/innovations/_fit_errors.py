@@ -188,7 +188,7 @@ def fit_errors(
             result = RESULTS.successful if promised < 1.0 else RESULTS.not_converged
             break
         sizes, last = new, deviance
-    way = followed([free], [sizes])
+    way = followed([free] * COPIES, sizes.around())
     numbers = [entry.value for entry in listed]
     for place, value in zip(places, physical(free, specs, scales)[0], strict=True):
         numbers[place] = on_device(np.asarray(value))
