@@ -43,7 +43,7 @@ def read_measurements(declared: Declaration) -> Campaign:
     reader_filter = None if sections["filter"] is None else Filter(**sections["filter"])
     names = _record_names(declared)
     read = [_read_record(declared, i, names[i], reader_filter) for i in range(len(declared.records))]
-    records, units = tuple(record for record, _ in read), read[0][1]
+    records, units = tuple(record for record, _ in read), read[0][1].units
     drive = InputChannel(**{**sections["input"], "unit": units["input"]})
     response = OutputChannel(**{**sections["output"], "unit": units["output"]})
     floor = (
@@ -102,8 +102,8 @@ def _read_record(
     number: int,
     name: str,
     reader_filter: Filter | None,
-) -> tuple[Record, Mapping[str, str]]:
-    """Gives a record, and the units of its channels in the file."""
+) -> tuple[Record, RecordChannels]:
+    """Gives a record, and its channels as they were read."""
     entry = declared.records[number]
     where = f"{declared.file}: [[record]] number {number + 1}"
     file = declared.file.parent / entry["file"]
@@ -136,10 +136,11 @@ def _read_record(
         start=channels.start,
         floor=channels.floor_acceleration(declared),
         time_jitter=channels.time_jitter,
+        resampled=channels.resampled,
         removed_spikes=channels.removed_spikes,
         **{name: entry[name] for name in CONDITIONS},
     )
-    return record, channels.units
+    return record, channels
 
 
 def _excitation(

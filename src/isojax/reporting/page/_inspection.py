@@ -74,7 +74,12 @@ def _flaws(one: ChannelInspection) -> str:
 def _rate(file: FileInspection) -> str:
     if file.rate is None:
         return f"{file.size} samples; the rate is not known: no time column, and none is stated (--rate HZ)"
-    return f"{file.size} samples at {file.rate:.7g} Hz ({file.rate_from}), {file.size / file.rate:.4g} s"
+    scatter = ""
+    if file.time_jitter:
+        share = 100.0 * file.time_jitter * file.rate
+        scatter = f"; the times scatter by {1e3 * file.time_jitter:.2g} ms rms, {share:.2g} % of a step"
+    rate = f"{file.size} samples at {file.rate:.7g} Hz ({file.rate_from}), {file.size / file.rate:.4g} s"
+    return f"{rate}{scatter}"
 
 
 def _excitation(file: FileInspection) -> str:
