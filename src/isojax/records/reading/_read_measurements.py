@@ -15,6 +15,7 @@ from ._channel_factor import check_units
 from ._declaration import Declaration
 from ._excitation_kind import detect_kind
 from ._find_dwells import check_dwells, segment_dwells
+from ._leaks import refuse_leaks
 from ._reader_filter import filter_channels
 from ._record_channels import RecordChannels, read_channels
 from ._schedule import read_schedule, scheduled_dwells
@@ -50,6 +51,7 @@ def read_measurements(declared: Declaration) -> Campaign:
         None if sections["floor"] is None else FloorChannel(**{**sections["floor"], "unit": units["floor"]})
     )
     _check_apart(declared, records)
+    refuse_leaks(file, records, [channels.rounding for _, channels in read])
     rate = records[0].rate
     for record in records:
         if abs(record.rate / rate - 1.0) > RATE_TOLERANCE:
