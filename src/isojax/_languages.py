@@ -34,8 +34,13 @@ def printable(text: str, keep: str = "") -> str:
     Returns:
         One line, unless line breaks are kept.
     """
-    hidden = lambda one: one not in keep and unicodedata.category(one) in _HIDDEN  # noqa: E731
-    return "".join(one.encode("unicode_escape").decode() if hidden(one) else one for one in text)
+    shown = (one if one in keep or not _is_hidden(one) else ascii(one)[1:-1] for one in text)
+    return "".join(shown)
+
+
+def _is_hidden(one: str) -> bool:
+    """Whether a character cannot be seen."""
+    return unicodedata.category(one) in _HIDDEN
 
 
 def as_mathtext(text: str) -> str:
@@ -77,4 +82,5 @@ def as_code(text: str) -> str:
 
 def as_toml(text: str) -> str:
     """Give a text as a string of TOML, in its quotes."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    written = json.dumps(text, ensure_ascii=False)
+    return "".join(f"\\U{ord(one):08x}" if _is_hidden(one) else one for one in written)

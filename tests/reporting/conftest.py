@@ -5,7 +5,6 @@ import os
 import shutil
 
 import pytest
-from chromium import Browser
 
 from isojax import CoulombFriction, read_campaign, write_report
 from isojax.demo import campaign_folder
@@ -89,6 +88,8 @@ def browser(tmp_path_factory):
         if os.environ.get("CI") == "true":
             pytest.fail("CI needs Chromium: apt-get install chromium")
         pytest.skip("no Chromium here")
+    from chromium import Browser  # tests of other folders import this module, from where that one is not seen
+
     opened = Browser(command, tmp_path_factory.mktemp("chromium"))
     yield opened
     opened.close()

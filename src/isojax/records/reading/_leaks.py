@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 
 from .._record import Record
 
@@ -27,13 +27,12 @@ _EXACT = 1e-6
 
 
 class _Prepared(NamedTuple):
-    """The counted output of a record about its mean, its spectrum, running sums of it and of its square."""
+    """The counted output of a record about its mean, and running sums of it and of its square."""
 
     number: int
     record: Record
     output: Float[np.ndarray, " time"]
     rounding: float
-    spectrum: Complex[np.ndarray, " frequency"]
     sums: Float[np.ndarray, "2 place"]
 
 
@@ -54,29 +53,26 @@ def refuse_leaks(file: Path, records: Sequence[Record], rounding: Sequence[float
     """
     if len({record.role for record in records}) < 2:
         return
-    length = scipy.fft.next_fast_len(2 * max(record.raw_output.size for record in records), real=True)
-    prepared = [
-        _prepare(number, *one, length)
-        for number, one in enumerate(zip(records, rounding, strict=True), start=1)
-    ]
+    rounded = zip(records, rounding, strict=True)
+    prepared = [_prepare(number, *one) for number, one in enumerate(rounded, start=1)]
     for held in (one for one in prepared if one.record.role == "holdout"):
         for fitted in (one for one in prepared if one.record.role == "fit"):
-            _refuse_leak(file, held, fitted, length)
+            _refuse_leak(file, held, fitted)
 
 
-def _prepare(number: int, record: Record, rounding: float, length: int) -> _Prepared:
+def _prepare(number: int, record: Record, rounding: float) -> _Prepared:
     # Settle samples of a held-out record only set its state.
     output = record.raw_output[record.settle if record.role == "holdout" else 0 :]
     output = output - np.mean(output)
     sums = np.cumsum([np.append(0.0, output), np.append(0.0, output**2)], axis=1)
-    return _Prepared(number, record, output, rounding, scipy.fft.rfft(output, length), sums)
+    return _Prepared(number, record, output, rounding, sums)
 
 
-def _best_lag(held: _Prepared, fitted: _Prepared, length: int) -> int:
+def _best_lag(held: _Prepared, fitted: _Prepared) -> int:
     """Gives how many samples later the held-out output stands in the fitted one, by Pearson's correlation."""
     shortest = int(np.ceil(_SHARED * min(held.output.size, fitted.output.size)))
     lags = np.arange(shortest - held.output.size, fitted.output.size - shortest + 1)
-    products = scipy.fft.irfft(held.spectrum.conj() * fitted.spectrum, length)[lags]
+    products = scipy.signal.oaconvolve(fitted.output, held.output[::-1])[lags + held.output.size - 1]
     low, high = np.maximum(0, -lags), np.minimum(held.output.size, fitted.output.size - lags)
     (one, one_square), (other, other_square) = (
         sums[:, high + shift] - sums[:, low + shift] for sums, shift in ((held.sums, 0), (fitted.sums, lags))
@@ -88,8 +84,8 @@ def _best_lag(held: _Prepared, fitted: _Prepared, length: int) -> int:
     return int(lags[np.argmax(correlation)])
 
 
-def _refuse_leak(file: Path, held: _Prepared, fitted: _Prepared, length: int) -> None:
-    lag = _best_lag(held, fitted, length)
+def _refuse_leak(file: Path, held: _Prepared, fitted: _Prepared) -> None:
+    lag = _best_lag(held, fitted)
     low, high = max(0, -lag), min(held.output.size, fitted.output.size - lag)
     one, other = held.output[low:high], fitted.output[low + lag : high + lag]
     one, other = one - np.mean(one), other - np.mean(other)
