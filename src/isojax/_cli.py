@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from ._arguments import MAP_STEPS, command_line, in_options
 from ._interrupt import INTERRUPTED, prompt_interrupt
+from ._languages import printable
 from ._output_folder import KeptElsewhereError, check_folder, discard, kept_file, output_folder
 from ._progress import LOOP_SHARES, Counted, KeyFigure, Notice, Stage, before, silent, watched
 from ._quantities import CONDITIONS
@@ -56,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with prompt_interrupt(lambda: f"interrupted; {asked.kept()}"):
             return asked.run(asked)
     except (ValueError, OSError) as error:
-        print(f"isojax: {in_options(' '.join(str(error).split()), asked)}", file=sys.stderr)
+        print(printable(f"isojax: {in_options(' '.join(str(error).split()), asked)}"), file=sys.stderr)
         return _WRITTEN_ELSEWHERE if isinstance(error, KeptElsewhereError) else 2
     except KeyboardInterrupt:
         print(f"isojax: interrupted; {asked.kept()}", file=sys.stderr)
@@ -152,9 +153,9 @@ def _inspect(asked: argparse.Namespace) -> int:
 
 
 def _say(console: "Console", words: str) -> None:
-    from rich.text import Text
+    from ._languages import as_rich
 
-    console.print(Text(words), soft_wrap=True)
+    console.print(as_rich(words, keep="\n"), soft_wrap=True)
 
 
 def _close_loop(asked: argparse.Namespace) -> int:

@@ -14,7 +14,6 @@ Hooks read numbers that are there, with NumPy: nothing is simulated and nothing 
 
 import dataclasses
 import functools
-import html
 import inspect
 import os
 import re
@@ -24,6 +23,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from ._languages import as_html, printable
 from ._quantities import typeset_unit, typeset_with_error
 
 LINES = 30
@@ -101,7 +101,9 @@ def sheet_of(one: Any) -> Sheet:
         Head, rows and lines, of any length.
     """
     rows = _asked(one, "_rows", lambda: _field_names(one))
-    return Sheet(headline(one), tuple(_as_row(one, row) for row in rows), tuple(_asked(one, "_lines", tuple)))
+    shown = (Row(*map(printable, _as_row(one, row))) for row in rows)
+    lines = (printable(line, keep="\n") for line in _asked(one, "_lines", tuple))
+    return Sheet(printable(headline(one)), tuple(shown), tuple(lines))
 
 
 def declared_numbers(one: Any) -> str:
@@ -222,7 +224,7 @@ def _wrapped(line: str, indent: str) -> list[str]:
 def _html(self: Any) -> str:
     """Give the result as a table for notebooks."""
     sheet = sheet_of(self)
-    head, *rows = ([html.escape(word) for word in row] for row in ((sheet.head,), *sheet.rows[:LINES]))
+    head, *rows = ([as_html(word) for word in row] for row in ((sheet.head,), *sheet.rows[:LINES]))
     cells = ('style="text-align:left"', 'style="text-align:left"', 'style="text-align:left;color:gray"')
     body = "".join(
         f"<tr>{''.join(f'<td {how}>{word}</td>' for how, word in zip(cells, row, strict=True))}</tr>"
@@ -230,7 +232,7 @@ def _html(self: Any) -> str:
     )
     left_out = max(len(sheet.rows) - LINES, 0)
     more = f"<tr><td>… and {left_out} more</td></tr>" if left_out else ""
-    below = html.escape("\n".join(sheet.lines[:LINES]))
+    below = as_html("\n".join(sheet.lines[:LINES]))
     under = f'<pre style="white-space:pre-wrap">{below}</pre>' if below else ""
     return f"<div><b>{head[0]}</b><table>{body}{more}</table>{under}</div>"
 
@@ -254,7 +256,7 @@ def brief(value: Any) -> str:
     if isinstance(value, int | float | complex):
         return number(value)
     if isinstance(value, str):
-        return _cut(" ".join(value.split()), WIDTH)
+        return _cut(printable(" ".join(value.split())), WIDTH)
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if hasattr(value, "shape") and hasattr(value, "dtype"):

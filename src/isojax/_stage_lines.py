@@ -10,6 +10,7 @@ from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextCol
 from rich.table import Column
 from rich.text import Text
 
+from ._languages import as_rich, printable
 from ._progress import Counted, KeyFigure, Notice, Resumed, Stage
 
 _SILENCE = 4.0
@@ -167,7 +168,7 @@ class Beat:
         self._begun = False
 
     def _write(self, words: str, end: str) -> None:
-        self._console.print(Text(words, style="dim"), soft_wrap=True, end=end)
+        self._console.print(as_rich(words, "dim"), soft_wrap=True, end=end)
 
 
 @contextmanager
@@ -204,7 +205,7 @@ def stage_lines(
 
     def leave(line: str) -> None:
         if beat is None:
-            console.print(Text(line, style="dim"), soft_wrap=True)
+            console.print(as_rich(line, "dim"), soft_wrap=True)
         else:
             beat.say(line)
 
@@ -238,7 +239,7 @@ def stage_lines(
                         pace.forget()
                     if isinstance(line, Counted):
                         pace.count(line.done)
-                    live.update(task, step=line, refresh=True)
+                    live.update(task, step=printable(line), refresh=True)
                 if steps or isinstance(line, Notice):
                     leave(f"{_seconds(time.perf_counter() - begin)}  {line}")
 

@@ -329,9 +329,9 @@ def test_scattered_sample_times_are_a_doubt_and_rounded_ones_are_not(right, spoi
     clock = ("^rate = .*", 'time = "t"')
     folder = right("sweep", "acceleration")
     assert find_suspicions(read_campaign(spoiled(folder, clock, data=timed(0.0, 3)))) == ()
-    (doubt,) = find_suspicions(read_campaign(spoiled(folder, clock, data=timed(3e-4, 7))))
+    (doubt,) = find_suspicions(read_campaign(spoiled(folder, clock, data=timed(7e-5, 7))))
     assert (doubt.check, doubt.contradicts) == ("sample times", False)
-    assert "0.3 ms" in doubt.figure
+    assert "0.071 ms" in doubt.figure
 
 
 def test_noise_as_large_as_the_response_is_not_taken_for_a_mistake(tmp_path):

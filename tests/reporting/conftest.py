@@ -1,6 +1,8 @@
 """Closed loops on a cut of the demo: one that found dry friction, one without dwells that found nothing."""
 
 import dataclasses
+import os
+import shutil
 
 import pytest
 
@@ -77,3 +79,17 @@ def plain(campaign):
     only = fit(guess.model, alone)
     last = Verdict("none", None, (), (), 0.0, (), {}, None, "Nothing is significant.")
     return Loop(alone, guess, only, (), only, "none", last, last.bounds, 3.0)
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    command = shutil.which("chromium")
+    if command is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("CI needs Chromium: apt-get install chromium")
+        pytest.skip("no Chromium here")
+    from chromium import Browser  # tests of other folders import this module, from where that one is not seen
+
+    opened = Browser(command, tmp_path_factory.mktemp("chromium"))
+    yield opened
+    opened.close()

@@ -1,13 +1,25 @@
 import base64
+import contextlib
 import dataclasses
+import json
 import re
 import shutil
 from html.parser import HTMLParser
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from users_names import NAMES, WORST, drawn, seen
 
+import isojax
 from isojax import ClosedLoop
-from isojax.reporting import render_page, result_dict, write_report
+from isojax.reporting import loop_summary, png_bytes, render_page, render_text, result_dict, write_report
+from isojax.reporting.page import _page
+from isojax.reporting.page._identified_response import IdentifiedResponse
 from isojax.reporting.plots import telling_slice
 
 
@@ -207,3 +219,110 @@ def test_closed_loop_shows_its_parts_and_prints_them(found):
     text = str(loop)
     assert "coulomb_friction.force_level" in text
     assert "held out" in text
+
+
+@contextlib.contextmanager
+def named(loop, names):
+    """The kept loop under other names, which its frozen objects hold; its answers stay."""
+    held = [(loop.campaign, "title"), *((record, "name") for record in loop.campaign.records)]
+    kept = [getattr(one, field) for one, field in held]
+    try:
+        for (one, field), name in zip(held, names, strict=True):
+            object.__setattr__(one, field, name)
+        yield loop
+    finally:
+        for (one, field), name in zip(held, kept, strict=True):
+            object.__setattr__(one, field, name)
+
+
+@pytest.fixture(scope="module")
+def pages(found, page):
+    """Gives the pages of the kept loop under other names, with blank pictures of the names that it has."""
+    health, response = ClosedLoop(found).health, IdentifiedResponse(("Not asked here.",))
+    blank = png_bytes(Figure(figsize=(0.5, 0.5)))
+    pictures = tuple(_page.Picture(name, "as drawn", blank) for name in read(page).pictures)
+    sections = ("lead", "response", "error", "evidence", "remainder", "record", "force", "health")
+    drawn_once = {f"{section}_pictures": () for section in sections} | {"lead_pictures": pictures}
+
+    def under(names):
+        dwells = tuple(one._replace(record=names[1]) for one in health.dwells)
+        with named(found, names):
+            return _page.render_pages(
+                _page.page_content(found, health._replace(dwells=dwells)), markdown=True
+            )
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_page, "draw_pictures", lambda *_: drawn_once)
+        patch.setattr(_page, "identified_response", lambda _: response)
+        yield under
+
+
+@pytest.fixture(scope="module")
+def plain_parts(pages):
+    """Tags of the page and parts of its Markdown under names without a meaning."""
+    plain = pages(["plain", "a", "b", "c"])
+    return read(plain["report.html"]).tags, markdown_parts(plain["report.md"])[0]
+
+
+def markdown_parts(text):
+    """Kinds of the blocks of a Markdown text, and of what stands in each; its first heading."""
+    blocks = MarkdownIt("commonmark").enable("table").parse(text)
+    kinds = [(one.type, {part.type for part in one.children or ()} - {"text"}) for one in blocks]
+    return kinds, " ".join("".join(part.content for part in blocks[1].children).split())
+
+
+@drawn(15)
+@example(names=list(WORST))
+@given(names=st.lists(NAMES, min_size=4, max_size=4))
+def test_any_names_are_shown_letter_by_letter_in_the_browser_and_in_markdown(
+    names, pages, plain_parts, browser, tmp_path
+):
+    one = pages(names)
+    assert read(one["report.html"]).tags == plain_parts[0]
+    kinds, heading = markdown_parts(one["report.md"])
+    assert kinds == plain_parts[1]
+    assert heading == seen(names[0])
+    path = tmp_path / "report.html"
+    path.write_text(one["report.html"], encoding="utf-8")
+    browser.open(path, 1280)
+    heading, tab, body, pictures, scripts = browser.value(
+        """(() => { document.querySelectorAll("details").forEach((one) => { one.open = true; });
+        const drawn = [...document.images].filter((one) => one.naturalWidth).length;
+        return [document.querySelector("h1").innerText, document.title, document.body.innerText,
+                drawn, document.scripts.length]; })()"""
+    )
+    title = " ".join(names[0].split("\n"))
+    assert " ".join(heading.split()) == seen(title)
+    assert " ".join(tab.split()) == f"{seen(title)}: found"
+    assert seen(" ".join(names[1].split("\n"))) in " ".join(body.split())
+    assert pictures >= 16
+    assert scripts == 0
+    assert not re.search("[\x1b\u200e\u200f\u202a-\u202e\u2066-\u2069]", body)
+    assert [address for address in browser.requests if not address.startswith(("data:", "file:"))] == []
+
+
+@drawn(4)
+@example(names=list(WORST))
+@given(names=st.lists(NAMES, min_size=4, max_size=4))
+def test_any_names_stand_in_pictures_tables_and_json(names, found):
+    with named(found, names):
+        records = [names[1] in record.name for record in found.campaign.records]
+        assert records[0]
+        figures = [
+            isojax.plot.record(found.campaign.records[0], found.campaign),
+            isojax.plot.time_history(found.before, found.after, record=0),
+            isojax.plot.residual(found.before, found.after, record=1),
+            isojax.plot.cycle_residual(found.before, found.after),
+            isojax.plot.stiffness_scatter(found.before, found.after),
+        ]
+        assert json.loads(json.dumps(result_dict(found)))["campaign"] == names[0]
+        for text in (render_text(loop_summary(found)), str(found.after), str(found.campaign)):
+            assert not re.search("[\x1b\u202a-\u202e\u2066-\u2069]", text)
+        assert seen(names[0]) in " ".join(str(found.campaign).split())
+    for figure in figures:
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        for text in figure.findobj(Text):
+            text.get_window_extent(renderer)
+    for figure, name in zip(figures[:3], (names[1], names[1], names[2]), strict=True):
+        shown = figure.axes[0].get_title(loc="left")
+        assert seen(name) in " ".join(shown.replace("\\$", "$").split())

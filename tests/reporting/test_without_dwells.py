@@ -165,6 +165,18 @@ def test_the_numbers_are_written_before_anything_is_drawn(plain, tmp_path, monke
     assert names(tmp_path) == seen[0]
 
 
+def test_what_is_known_is_written_whatever_fails_after_it(plain, tmp_path, monkeypatch):
+    """The health of the data, then words of result.json: each leaves what was found before it."""
+    with pytest.raises(RuntimeError, match="the ink"):
+        write_report(plain, tmp_path / "health", health=fails)
+    assert names(tmp_path / "health") == ["fit.json", "model.json", "result.json"]
+    assert "health" not in json.loads((tmp_path / "health" / "result.json").read_text(encoding="utf-8"))
+    monkeypatch.setattr("isojax.reporting.page._result.check_first_dicts", fails)
+    with pytest.raises(RuntimeError, match="the ink"):
+        write_report(plain, tmp_path / "words")
+    assert names(tmp_path / "words") == ["fit.json", "model.json"]
+
+
 def test_without_a_single_picture_the_verdict_gives_the_exit_code(plain, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("isojax.reporting.close_loop", lambda *_, **__: ClosedLoop(plain))
     monkeypatch.setattr("isojax.reporting.page._pictures.png_bytes", fails)

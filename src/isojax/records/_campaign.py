@@ -163,7 +163,17 @@ class Campaign:
         """The rate, and the frequencies of the dwells, which a wrong rate makes others than those driven."""
         driven = [dwell.frequency for record in self.records for dwell in record.dwells]
         dwells = f", dwells of {number(min(driven))} to {number(max(driven))} Hz" if driven else ""
-        return f"{number(self.rate)} samples/s{dwells}"
+        return f"{number(self.rate)} samples/s{dwells}{self._scatter}"
+
+    @property
+    def _scatter(self) -> str:
+        """How far the times scatter about an even grid at most, in words; "" where they do not."""
+        worst = max(self.records, key=lambda record: record.time_jitter)
+        if worst.time_jitter == 0.0:
+            return ""
+        share = 100.0 * worst.time_jitter * worst.rate
+        how = "resampled" if worst.resampled else "taken as even"
+        return f", {how} from times that scatter by {share:.2g} % of a step"
 
     def _headline(self) -> str:
         fitted, held_out = len(self.fit_records), len(self.holdout_records)

@@ -70,6 +70,7 @@ class Record:
         floor: Measured acceleration of the floor about its mean [m/s^2], or None.
         time_jitter: rms by which its time column departs from the even grid, beyond its rounding [s]; 0 where
             it has none.
+        resampled: Whether its channels were brought from such times to the even grid, as campaign.toml asks.
         removed_spikes: Samples of both channels that the reader replaced, as campaign.toml asks for.
         pressure: Absolute pressure in the chamber during the record [Pa], or None.
         temperature: Absolute temperature during the record [K], or None.
@@ -95,6 +96,7 @@ class Record:
     start: int = 0
     floor: Float[np.ndarray, " time"] | None = None
     time_jitter: float = 0.0
+    resampled: bool = False
     removed_spikes: int = 0
     pressure: float | None = None
     temperature: float | None = None

@@ -81,7 +81,7 @@ class ClosedLoop:
             ValueError: if something else than a folder is in the way, or a model that was found is not
                 finite.
         """
-        write_report(self.loop, folder, self.health, markdown=markdown)
+        write_report(self.loop, folder, lambda: self.health, markdown=markdown)
 
     def __str__(self) -> str:
         """Give the summary that the terminal shows."""

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from ..._parameters import Parameter, list_parameters
 from ..._quantities import CONDITIONS
 from ..._results import RESULTS, is_successful, name_of_result
-from ..._show import LINES, Row, shown
+from ..._show import LINES, Row, brief, shown
 from ...models import Isolator, NormalMixture
 from ...records import Campaign, NoiseEstimate, brief_blows
 from ..innovations import ErrorFit
@@ -238,7 +238,7 @@ def _model(fit: Fit) -> list[str]:
     driven = "its base" if fit.model.excitation == "base_acceleration" else "a force"
     fitted, held_out = len(campaign.fit_records), len(campaign.holdout_records)
     return [
-        f"{campaign.title}: {fitted} records fitted, {held_out} held out",
+        f"{brief(campaign.title)}: {fitted} records fitted, {held_out} held out",
         f"{float(fit.model.mass):g} kg driven by {driven}, output {campaign.output.quantity}",
         f"elements: {', '.join(element.name for element in fit.model.elements) or 'none'}",
     ]

@@ -2,7 +2,8 @@
 
 In: a file and the names of columns, or None for all. Out: a `Column` per name, float64 samples in the file's
 own unit, with the unit, rate and start time that the file states.
-Read `_samples.py` first, and `_limits.py`: what a file may hold at most. Tables: `_units.py`, `_heading.py`,
+Read `_samples.py` first, and `_limits.py`: what a file may hold at most. `_time_steps.py` judges a time
+column, `_last_digit.py` how numbers were rounded. Tables: `_units.py`, `_heading.py`,
 `_layout.py`, `_clock.py`, then `_text.py`, `_sheet.py`, `_parquet.py`, `_lvm.py`. Trees of arrays:
 `_leaves.py`, then `_npz.py`, `_hdf5.py`, `_mat.py`. Both: `_in_memory.py`. Lists of channels:
 `_tdms.py`, `_universal_file.py`.
@@ -11,6 +12,7 @@ Read `_samples.py` first, and `_limits.py`: what a file may hold at most. Tables
 from ._hdf5 import read_hdf5_columns as read_hdf5_columns
 from ._heading import split_heading as split_heading
 from ._in_memory import columns_of as columns_of
+from ._last_digit import last_digit as last_digit
 from ._lvm import read_lvm_columns as read_lvm_columns
 from ._mat import read_mat_columns as read_mat_columns
 from ._npz import read_npz_columns as read_npz_columns
@@ -21,6 +23,7 @@ from ._tdms import read_tdms_columns as read_tdms_columns
 from ._text import TextTable as TextTable
 from ._text import read_table as read_table
 from ._text import read_text_columns as read_text_columns
+from ._time_steps import time_jitter as time_jitter
 from ._time_steps import uniform_rate as uniform_rate
 from ._units import SI_UNITS as SI_UNITS
 from ._units import ChannelUnit as ChannelUnit

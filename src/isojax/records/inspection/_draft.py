@@ -1,12 +1,13 @@
 """A campaign.toml drafted from inspected files, with every guess marked."""
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..._languages import as_toml, printable
 from .._campaign import OutputQuantity
 from ..formats import channel_unit, split_heading
+from ..reading import UNEVEN
 from ._arrangement import Place, arrange
 from ._channel import ChannelInspection
 from ._guess import is_base, is_exciter, is_nameless
@@ -46,7 +47,7 @@ def draft_campaign(
         "# Drafted from the data files. Check every line that says `guessed`, and delete the remark.",
         "",
         "[campaign]",
-        f"title = {json.dumps(title)}",
+        f"title = {as_toml(title)}",
         _mass_line(files, drive, response),
         "",
         "[input]",
@@ -168,21 +169,23 @@ def _unit_line(channel: ChannelInspection, quantity: str) -> str:
 
 
 def _sampling_lines(file: FileInspection) -> list[str]:
-    lines = [f"rate = {file.rate!r}      # from: {file.rate_from}"]
+    lines = [f"rate = {file.rate!r}      # from: {printable(file.rate_from)}"]
     if file.time is not None and not file.time_fault:
         guessed = "# guessed: it increases evenly" if is_nameless(file.time) else ""
         lines.append(_field("time", split_heading(file.time)[0], guessed))
         if file.time_unit is not None or guessed:
             lines.append(_field("unit", file.time_unit or "s", guessed and "# guessed"))
+        if file.time_jitter * (file.rate or 0.0) > UNEVEN:
+            lines.append("resample = true      # guessed: the samples were taken when their times say")
     elif file.time is not None:
-        lines.append(f"# the time column is not used: {file.time_fault}")
+        lines.append(f"# the time column is not used: {printable(file.time_fault)}")
     return lines
 
 
 def _record_lines(file: FileInspection, place: Place, folder: Path, schedule: Path | None) -> list[str]:
-    lines = [f"file = {json.dumps(_relative(file.file, folder))}"]
+    lines = [f"file = {as_toml(_relative(file.file, folder))}"]
     if schedule is not None:
-        lines.append(f"schedule = {json.dumps(_relative(schedule, folder))}")
+        lines.append(f"schedule = {as_toml(_relative(schedule, folder))}")
     elif file.dwells:
         low, high = min(one.frequency for one in file.dwells), max(one.frequency for one in file.dwells)
         lines.append(f"# guessed: stepped sine, {len(file.dwells)} dwells from {low:.4g} to {high:.4g} Hz")
@@ -190,7 +193,7 @@ def _record_lines(file: FileInspection, place: Place, folder: Path, schedule: Pa
         lines.append(f"# guessed: {file.kind.replace('_', ' ')}")
     if file.period is not None:
         lines.append(f"period = {file.period}      # guessed: samples, the input repeats itself")
-    lines.append(f"level = {place.level!r}      # guessed: {place.level_from}")
+    lines.append(f"level = {place.level!r}      # guessed: {printable(place.level_from)}")
     if place.direction != "none":
         lines.append(_field("direction", place.direction, f"# guessed: {place.direction_from}"))
     lines.append(_field("role", place.role, f"# guessed: {place.role_from}"))
@@ -202,8 +205,8 @@ def _relative(file: Path, folder: Path) -> str:
 
 
 def _column(channel: ChannelInspection) -> str:
-    return json.dumps(channel.name, ensure_ascii=False)
+    return as_toml(channel.name)
 
 
 def _field(name: str, value: str, remark: str) -> str:
-    return f"{name} = {json.dumps(value, ensure_ascii=False)}" + (f"      {remark}" if remark else "")
+    return f"{name} = {as_toml(value)}" + (f"      {printable(remark)}" if remark else "")

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from ..._show import shown
 from .._record import Direction, Dwell, ExcitationKind
-from ..formats import Column, channel_unit, columns_of, split_heading, uniform_rate
+from ..formats import Column, channel_unit, columns_of, split_heading, time_jitter, uniform_rate
 from ..reading import RATE_TOLERANCE, detect_kind, find_reader
 from ..spectrum import ringing_frequency
 from ._channel import ChannelInspection, inspect_channel
@@ -37,6 +37,7 @@ class FileInspection:
         time: Name of the time column, or None.
         time_unit: Unit of the time column that the file states, or None.
         time_fault: What is wrong with the time column, such as a gap and its row, or "".
+        time_jitter: rms by which its times scatter about an even grid, beyond their rounding [s].
         drive: Name of the channel that seems to drive, or None where there is only one channel.
         response: Name of the channel that seems to respond, or None.
         kind: What the excitation is, or None where it cannot be seen.
@@ -60,6 +61,7 @@ class FileInspection:
     period: int | None
     direction: Direction
     left_out: tuple[str, ...]
+    time_jitter: float = 0.0
 
     def channel(self, name: str | None) -> ChannelInspection | None:
         """Gives the channel of a name, or None."""
@@ -106,7 +108,8 @@ def inspect_file(file: str | Path, rate: float | None = None, data: Any = None) 
     time = next(
         (name for name, one in held.items() if is_time(split_heading(name)[0], one.unit, one.samples)), None
     )
-    found, origin, fault = _rate(path, rate, time, held)
+    seconds = None if time is None else _seconds(held[time])
+    found, origin, fault = _rate(path, rate, time, seconds, held)
     channels = tuple(
         inspect_channel(name, one.unit, guess_quantity(split_heading(name)[0], one.unit), one.samples)
         for name, one in held.items()
@@ -131,18 +134,27 @@ def inspect_file(file: str | Path, rate: float | None = None, data: Any = None) 
         period,
         direction,
         tuple(name for name in columns if name not in held),
+        0.0 if seconds is None or fault else time_jitter(seconds),
     )
 
 
+def _seconds(column: Column) -> Float[np.ndarray, " time"]:
+    """Gives a time column in seconds, whose unit the file states or is one."""
+    unit = channel_unit(column.unit or "s")
+    return column.samples * (unit.factor if unit is not None else 1.0)
+
+
 def _rate(
-    file: Path, given: float | None, time: str | None, held: Mapping[str, Column]
+    file: Path,
+    given: float | None,
+    time: str | None,
+    seconds: Float[np.ndarray, " time"] | None,
+    held: Mapping[str, Column],
 ) -> tuple[float | None, str, str]:
     """Gives the rate, where it comes from, and what is wrong with the time column."""
     stated = next((one.rate for one in held.values() if one.rate is not None), None)
     measured, fault = None, ""
-    if time is not None:
-        unit = channel_unit(held[time].unit or "s")
-        seconds = held[time].samples * (unit.factor if unit is not None else 1.0)
+    if time is not None and seconds is not None:
         try:
             measured = uniform_rate(file, seconds, time, 0)
         except ValueError as error:

@@ -122,7 +122,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "unit": _text(),
         "gain": _factor(),
     },
-    "sampling": {"rate": _positive(), "time": _text(), "unit": _text()},
+    "sampling": {"rate": _positive(), "time": _text(), "unit": _text(), "resample": _flag()},
     "filter": {
         "kind": _choice("butterworth", default="butterworth"),
         "order": _count(at_least=1, required=True),
@@ -308,6 +308,10 @@ def _check_together(file: Path, sections: Mapping[str, Any], records: tuple[Mapp
         raise ValueError(
             f"{file}: [sampling] unit = {sections['sampling']['unit']!r} is that of the time column, but the "
             "field `time`, its name, is missing; a rate is always in Hz"
+        )
+    if sections["sampling"]["resample"] and sections["sampling"]["time"] is None:
+        raise ValueError(
+            f"{file}: [sampling] resample = true needs the field `time`, the column with the times of samples"
         )
     for number, record in enumerate(records, start=1):
         _check_kind(f"{file}: [[record]] number {number}", record)

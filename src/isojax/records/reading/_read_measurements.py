@@ -15,6 +15,7 @@ from ._channel_factor import check_units
 from ._declaration import Declaration
 from ._excitation_kind import detect_kind
 from ._find_dwells import check_dwells, segment_dwells
+from ._leaks import refuse_leaks
 from ._reader_filter import filter_channels
 from ._record_channels import RecordChannels, read_channels
 from ._schedule import read_schedule, scheduled_dwells
@@ -43,13 +44,14 @@ def read_measurements(declared: Declaration) -> Campaign:
     reader_filter = None if sections["filter"] is None else Filter(**sections["filter"])
     names = _record_names(declared)
     read = [_read_record(declared, i, names[i], reader_filter) for i in range(len(declared.records))]
-    records, units = tuple(record for record, _ in read), read[0][1]
+    records, units = tuple(record for record, _ in read), read[0][1].units
     drive = InputChannel(**{**sections["input"], "unit": units["input"]})
     response = OutputChannel(**{**sections["output"], "unit": units["output"]})
     floor = (
         None if sections["floor"] is None else FloorChannel(**{**sections["floor"], "unit": units["floor"]})
     )
     _check_apart(declared, records)
+    refuse_leaks(file, records, [channels.rounding for _, channels in read])
     rate = records[0].rate
     for record in records:
         if abs(record.rate / rate - 1.0) > RATE_TOLERANCE:
@@ -102,8 +104,8 @@ def _read_record(
     number: int,
     name: str,
     reader_filter: Filter | None,
-) -> tuple[Record, Mapping[str, str]]:
-    """Gives a record, and the units of its channels in the file."""
+) -> tuple[Record, RecordChannels]:
+    """Gives a record, and its channels as they were read."""
     entry = declared.records[number]
     where = f"{declared.file}: [[record]] number {number + 1}"
     file = declared.file.parent / entry["file"]
@@ -136,10 +138,11 @@ def _read_record(
         start=channels.start,
         floor=channels.floor_acceleration(declared),
         time_jitter=channels.time_jitter,
+        resampled=channels.resampled,
         removed_spikes=channels.removed_spikes,
         **{name: entry[name] for name in CONDITIONS},
     )
-    return record, channels.units
+    return record, channels
 
 
 def _excitation(

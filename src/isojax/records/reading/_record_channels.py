@@ -10,14 +10,20 @@ from jaxtyping import Float
 
 from .._spikes import without_spikes
 from .._wording import row
+from ..formats import last_digit, time_jitter
 from ._channel_factor import channel_factor
 from ._data_file import read_columns
 from ._declaration import Declaration
 from ._floor_channel import floor_acceleration
-from ._time_base import find_rate, time_jitter
+from ._resample import on_even_grid
+from ._time_base import find_rate
 
 FEWEST_SAMPLES = 16
 """Samples without which a record is refused."""
+
+UNEVEN = 0.02
+"""rms by which times may scatter about an even grid, over its step. A sine of ten samples a cycle is then off
+by 1 %, about what a good sensor is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +44,8 @@ class RecordChannels:
         units: Units of the columns of input, output and floor in the file, as far as they are channels.
         time_jitter: rms by which the time column departs from the even grid, beyond its rounding [s].
         removed_spikes: Samples that were replaced, of both channels.
+        resampled: Whether the channels were brought from scattered times to the even grid.
+        rounding: rms error that the digits of the output in the file leave, in SI.
     """
 
     start: int
@@ -53,6 +61,8 @@ class RecordChannels:
     units: Mapping[str, str]
     time_jitter: float = 0.0
     removed_spikes: int = 0
+    resampled: bool = False
+    rounding: float = 0.0
 
     def floor_acceleration(self, declared: Declaration) -> Float[np.ndarray, " time"] | None:
         """Gives the acceleration of the floor [m/s^2], or None."""
@@ -89,7 +99,7 @@ def read_channels(
     columns = read_columns(file, list(dict.fromkeys(wanted)), declared.given(entry))
     total = columns[named["input"]].samples.size
     start, stop = _checked_span(where, file, entry, total)
-    measured, units, removed = {}, {}, 0
+    measured, units, removed, rounding = {}, {}, 0, 0.0
     for name, column in named.items():
         unit, factor = channel_factor(declared, name, columns[column], file)
         units[name] = unit
@@ -97,6 +107,9 @@ def read_channels(
         if sections[name].get("remove_spikes"):
             measured[name], count = without_spikes(measured[name])
             removed += count
+        if name == "output":
+            digits = last_digit(columns[column].samples[start:stop])
+            rounding = abs(factor) * float(np.sqrt(np.mean(digits**2) / 12.0))
     raw_input, raw_output, floor = measured["input"], measured["output"], measured.get("floor")
     if floor is not None:
         _check_not_constant(file, named["floor"], floor)
@@ -109,9 +122,22 @@ def read_channels(
     _check_not_constant(file, named["output"], raw_output)
     if np.ptp(raw_input) == 0.0 and raw_input[0] != 0.0:
         _check_not_constant(file, named["input"], raw_input)
+    jitter, resampled = (0.0 if time is None else time_jitter(time)), False
+    if time is not None and jitter > 0.0 and sections["sampling"]["resample"]:
+        present = [one for one in (raw_input, raw_output, floor) if one is not None]
+        first, (raw_input, raw_output, *rest) = on_even_grid(time, rate, *present)
+        floor, start, resampled = (rest[0] if rest else None), start + first, True
+        stop = start + raw_output.size
+    elif jitter * rate > UNEVEN:
+        raise ValueError(
+            f"{file}: the times of column `{clock}` scatter by {1e3 * jitter:.3g} ms rms about an even grid, "
+            f"{100.0 * jitter * rate:.3g} % of its step; expected at most {100.0 * UNEVEN:.2g} %. If the "
+            "samples were taken at these times, set [sampling] resample = true; if only the time stamps "
+            "scatter, give their rate in place of time"
+        )
     channels = raw_input, raw_output, raw_input, raw_output, floor
-    jitter = 0.0 if time is None else time_jitter(time)
-    return RecordChannels(start, stop, total, entry["settle"], rate, *channels, units, jitter, removed)
+    told = units, jitter, removed, resampled, rounding
+    return RecordChannels(start, stop, total, entry["settle"], rate, *channels, *told)
 
 
 def _checked_span(where: str, file: Path, entry: Mapping[str, Any], total: int) -> tuple[int, int]:

@@ -10,15 +10,6 @@ from ..formats import uniform_rate
 RATE_TOLERANCE = 1e-3
 """Relative difference of equal rates: a written time column is rounded, and a wrong rate differs by more."""
 
-_MOST_DECIMALS = 9
-"""Decimals of a written time at most."""
-
-_WHOLE_DIGIT = 1e-3
-"""Distance from a whole number, in units of the last decimal, within which a time ends there."""
-
-_ROUNDED = 1.5
-"""Rounding errors, by rms, that a time column may depart from an even grid by rounding alone."""
-
 
 def find_rate(
     file: Path,
@@ -63,17 +54,3 @@ def find_rate(
                 f"{file}: {first_name} says {chosen:.9g} Hz, but {name} says {rate:.9g} Hz; they must agree"
             )
     return chosen
-
-
-def time_jitter(time: Float[np.ndarray, " time"]) -> float:
-    """Gives the rms by which times depart from an even grid, beyond the rounding of their digits [s]."""
-    place = np.arange(time.size) - 0.5 * (time.size - 1)
-    about = time - np.mean(time)
-    scatter = float(np.sqrt(np.mean((about - place * (place @ about) / (place @ place)) ** 2)))
-    # Times written with so many decimals scatter by a rounding error that is spread evenly.
-    for decimals in range(_MOST_DECIMALS + 1):
-        scaled = time * 10.0**decimals
-        if np.all(np.abs(scaled - np.round(scaled)) < _WHOLE_DIGIT):
-            rounding = 10.0**-decimals / np.sqrt(12.0)
-            return scatter if scatter > _ROUNDED * rounding else 0.0
-    return scatter

@@ -280,7 +280,8 @@ def _size_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
 
 def _jitter_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
     """Gives that the samples were not taken evenly, where this shows: every record counts as even."""
-    worst = max(campaign.records, key=lambda record: record.time_jitter)
+    even = [record for record in campaign.records if not record.resampled]
+    worst = max(even, key=lambda record: record.time_jitter, default=campaign.records[0])
     error = float(np.sqrt(np.mean(rows.omega**2))) * worst.time_jitter
     if error <= _JITTERED:
         return []
@@ -288,9 +289,7 @@ def _jitter_suspicions(campaign: Campaign, rows: Rows) -> list[Suspicion]:
         f"the times scatter by {1e3 * worst.time_jitter:.2g} ms rms about an even grid, which is "
         f"{100.0 * error:.2g} % of the response"
     )
-    cause = Cause(
-        "sampling jitter", "the samples were not taken evenly", "resample the records to an even grid"
-    )
+    cause = Cause("sampling jitter", "the samples were not taken evenly", "set [sampling] resample = true")
     return [Suspicion("sample times", worst.name, figure, "even times", (cause,), False)]
 
 

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from rich.console import RenderableType
-from rich.markup import escape
-from rich.text import Text
 
+from ..._languages import as_rich, printable
 from ...records import ChannelInspection, FileInspection
-from ._summary import PlainGroup, _table
+from ._summary import PlainGroup, add_row, new_table
 
 _CLIPPED_SHARE = 1e-4
 """Share of clipped samples from which it is worth a word."""
@@ -27,8 +26,8 @@ def inspection_summary(files: Sequence[FileInspection]) -> RenderableType:
 
 
 def _of_file(file: FileInspection) -> tuple[RenderableType, ...]:
-    table = _table(
-        escape(str(file.file)),
+    table = new_table(
+        str(file.file),
         "channel",
         "measures",
         "unit",
@@ -41,10 +40,11 @@ def _of_file(file: FileInspection) -> tuple[RenderableType, ...]:
         "flaws",
     )
     for one in file.channels:
-        table.add_row(
-            escape(one.name),  # `Acc [g]` has no markup in it
+        add_row(
+            table,
+            one.name,
             one.quantity or "?",
-            escape(one.unit or "?"),
+            one.unit or "?",
             *(f"{value:.4g}" for value in (one.low, one.high, one.mean, one.rms)),
             f"{one.noise:.2g}",
             f"{100.0 * one.drift:+.1f} %",
@@ -55,7 +55,7 @@ def _of_file(file: FileInspection) -> tuple[RenderableType, ...]:
         lines.append(f"  {file.time_fault}")
     if file.left_out:
         lines.append(f"  shorter than the channels, so left out: {', '.join(file.left_out[:8])}")
-    return table, Text("\n".join(lines) + "\n")
+    return table, as_rich("\n".join(map(printable, lines)) + "\n", keep="\n")
 
 
 def _flaws(one: ChannelInspection) -> str:
@@ -74,7 +74,12 @@ def _flaws(one: ChannelInspection) -> str:
 def _rate(file: FileInspection) -> str:
     if file.rate is None:
         return f"{file.size} samples; the rate is not known: no time column, and none is stated (--rate HZ)"
-    return f"{file.size} samples at {file.rate:.7g} Hz ({file.rate_from}), {file.size / file.rate:.4g} s"
+    scatter = ""
+    if file.time_jitter:
+        share = 100.0 * file.time_jitter * file.rate
+        scatter = f"; the times scatter by {1e3 * file.time_jitter:.2g} ms rms, {share:.2g} % of a step"
+    rate = f"{file.size} samples at {file.rate:.7g} Hz ({file.rate_from}), {file.size / file.rate:.4g} s"
+    return f"{rate}{scatter}"
 
 
 def _excitation(file: FileInspection) -> str:

@@ -1,12 +1,14 @@
 """report.html, one page that holds everything, pictures included; report.md with its pictures beside it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
 
 import jinja2
+from markupsafe import Markup
 
+from ..._languages import as_code, as_html, as_markdown
 from ..._parameters import list_parameters
 from ...health import CampaignHealth, campaign_health
 from ...identification import OUTPUT_UNITS, Candidate, Fit, Loop, plain_unit
@@ -79,9 +81,22 @@ def render_pages(content: Mapping[str, Any], *, markdown: bool = False) -> dict[
     return pages
 
 
+_LANGUAGES: Mapping[str, Callable[[str], str]] = {
+    "report.html.jinja": as_html,
+    "report.md.jinja": as_markdown,
+}
+"""What each template writes its texts with."""
+
+
 def _rendered(template: str, content: Mapping[str, Any]) -> str:
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters["cell"] = lambda words: str(words).replace("|", "\\|")
+    language = _LANGUAGES[template]
+    environment = jinja2.Environment(
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        finalize=lambda one: one if hasattr(one, "__html__") else Markup(language(str(one))),
+    )
+    environment.filters["code"] = lambda words: Markup(as_code(words))
     source = files("isojax.reporting").joinpath(template).read_text(encoding="utf-8")
     return environment.from_string(source).render(content)
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
-from rich.text import Text
 
+from ..._languages import as_rich
 from ..._parameters import list_parameters, own_parameters
 from ...elements import CATALOGUE
 from ...identification import OUTPUT_UNITS, Candidate, Finding, Fit, Loop, Verdict, plain_unit
@@ -66,13 +66,19 @@ class PlainGroup(Group):
     __repr__ = __str__
 
 
-def _table(title: str, *columns: str) -> Table:
+def new_table(title: str, *columns: str) -> Table:
+    """Give a table without rows; its title and headings are shown letter by letter."""
     table = PlainTable(
-        title=title, title_justify="left", title_style="bold", header_style="dim", box=SIMPLE_HEAD
+        title=as_rich(title), title_justify="left", title_style="bold", header_style="dim", box=SIMPLE_HEAD
     )
     for place, column in enumerate(columns):
-        table.add_column(column, justify="right" if place else "left", no_wrap=place == 0)
+        table.add_column(as_rich(column), justify="right" if place else "left", no_wrap=place == 0)
     return table
+
+
+def add_row(table: Table, *cells: str) -> None:
+    """Add a row whose cells are shown letter by letter."""
+    table.add_row(*map(as_rich, cells))
 
 
 class ErrorRow(NamedTuple):
@@ -140,9 +146,11 @@ def error_table(before: Fit, after: Fit | None = None) -> Table:
         A table for rich.
     """
     unit = typeset_unit(OUTPUT_UNITS[before.campaign.output.quantity])
-    table = _table("Error", "records", "", f"free-run RMSE [{unit}]", "NRMSE", "NRMSE, restarted", "χ²/dof")
+    table = new_table(
+        "Error", "records", "", f"free-run RMSE [{unit}]", "NRMSE", "NRMSE, restarted", "χ²/dof"
+    )
     for row in error_rows(before, after):
-        table.add_row(*row)
+        add_row(table, *row)
     return table
 
 
@@ -158,9 +166,9 @@ def parameter_table(before: Fit, after: Fit | None = None) -> Table:
         A table for rich.
     """
     fits = _labelled(before, after)
-    table = _table("Coefficients", "name", *(label or "fitted" for label, _ in fits))
+    table = new_table("Coefficients", "name", *(label or "fitted" for label, _ in fits))
     for entry in list_parameters(fits[-1][1].model):
-        table.add_row(entry.name, *(parameter_words(fit, entry.name) for _, fit in fits))
+        add_row(table, entry.name, *(parameter_words(fit, entry.name) for _, fit in fits))
     return table
 
 
@@ -195,9 +203,10 @@ def ranking_table(ranking: Sequence[Candidate] | Verdict | Finding) -> Table:
         A table for rich.
     """
     ranking = ranking.ranking if isinstance(ranking, Verdict | Finding) else ranking
-    table = _table("Effects, best first", "effect", "z", "p", "strength", "χ²/dof", "ΔBIC", "admissible")
+    table = new_table("Effects, best first", "effect", "z", "p", "strength", "χ²/dof", "ΔBIC", "admissible")
     for one in ranking[:_RANKS_IN_SUMMARY]:
-        table.add_row(
+        add_row(
+            table,
             one.effect,
             typeset_number(one.z, 3),
             typeset_p_value(one.p_value),
@@ -220,9 +229,9 @@ def loop_summary(loop: Loop) -> RenderableType:
     """
     lines = [line for finding in loop.findings for line in finding_words(finding)]
     return PlainGroup(
-        *(Text(line, style="bold red") for line in check_first_words(loop.check_first)),
-        Text(verdict_sentence(loop), style="bold"),
-        *(Text(line) for line in (*lines, *alternative_words(loop), *remainder_summary(loop))),
+        *(as_rich(line, "bold red") for line in check_first_words(loop.check_first)),
+        as_rich(verdict_sentence(loop), "bold"),
+        *(as_rich(line) for line in (*lines, *alternative_words(loop), *remainder_summary(loop))),
         error_table(loop.before, loop.after),
         parameter_table(loop.before, loop.after),
     )
@@ -241,9 +250,9 @@ def verdict_summary(verdict: Verdict) -> RenderableType:
     named = "" if finding is None else f": {effect_words(finding.effect)}"
     lines = () if finding is None else finding_words(finding)
     return PlainGroup(
-        Text(f"{verdict.verdict.replace('_', ' ')}{named}", style="bold"),
-        Text(verdict.reason),
-        *(Text(line) for line in lines),
+        as_rich(f"{verdict.verdict.replace('_', ' ')}{named}", "bold"),
+        as_rich(verdict.reason),
+        *(as_rich(line) for line in lines),
         ranking_table(verdict.ranking),
     )
 
@@ -254,10 +263,10 @@ def catalogue_table() -> Table:
     Returns:
         A table for rich.
     """
-    table = _table("Effects", "name", "strength", "unit", "states", "signed")
+    table = new_table("Effects", "name", "strength", "unit", "states", "signed")
     table.add_column("what it is")
     for name, kind in sorted(CATALOGUE.items()):
         spec = dict(own_parameters(kind))[kind.strength]
         states, signed = str(kind.internal_states), "yes" if kind.signed else "no"
-        table.add_row(name, kind.strength, spec.unit, states, signed, kind.words)
+        add_row(table, name, kind.strength, spec.unit, states, signed, kind.words)
     return table

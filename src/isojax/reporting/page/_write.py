@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..._output_folder import check_folder, publish
@@ -21,11 +21,16 @@ MODEL_FILES = ("model.json", "fit.json", "fit.txt", "report.html", "result.json"
 
 
 def write_report(
-    loop: Loop, folder: str | Path, health: CampaignHealth | None = None, *, markdown: bool = False
+    loop: Loop,
+    folder: str | Path,
+    health: Callable[[], CampaignHealth] | None = None,
+    *,
+    markdown: bool = False,
 ) -> None:
     """Write result.json, model.json and fit.json, and then, once its pictures are drawn, report.html.
 
-    The numbers are there whatever becomes of the pictures; one that cannot be drawn is a line of the report.
+    The numbers are there whatever becomes of the health of the data, which joins result.json once it is
+    computed, and of the pictures; one that cannot be drawn is a line of the report.
 
     Where the last fit failed there is no model: model.json and fit.json are not written, and those of before
     are removed. So are the other files that isojax wrote there: they belong to another run.
@@ -33,7 +38,7 @@ def write_report(
     Args:
         loop: the closed loop.
         folder: where they go; made if it is not there. Files that isojax did not write stay as they are.
-        health: of its campaign; computed here if omitted.
+        health: gives that of its campaign; computed here if omitted.
         markdown: whether to write report.md as well, with its pictures report_*.png beside it.
 
     Raises:
@@ -41,16 +46,21 @@ def write_report(
         KeptElsewhereError: if they could not be written there; it names the folder that has them.
     """
     folder = check_folder(folder)
-    health = campaign_health(loop) if health is None else health
-    numbers = {
-        "model.json": model_text(loop.after),
-        "fit.json": fit_text(loop.after),
-        "result.json": json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n",
-    }
+    # Each step may fail, and must not take with it what is known before.
+    numbers = {"model.json": model_text(loop.after), "fit.json": fit_text(loop.after)}
     write_model_files(folder, numbers)
-    pages = render_pages(page_content(loop, health), markdown=markdown)
+    write_model_files(folder, {**numbers, "result.json": _result_text(loop)})
+    known = campaign_health(loop) if health is None else health()
+    numbers["result.json"] = _result_text(loop, known)
+    write_model_files(folder, numbers)
+    pages = render_pages(page_content(loop, known), markdown=markdown)
     # All of them again: what a full disk does not take is then whole in another place.
     write_model_files(folder, {**numbers, **pages})
+
+
+def _result_text(loop: Loop, health: CampaignHealth | None = None) -> str:
+    """Give result.json."""
+    return json.dumps(result_dict(loop, health), indent=1, allow_nan=False) + "\n"
 
 
 def model_text(fit: Fit) -> str | None:

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...identification import ClassicalGuess, Fit
 from ...models import Isolator
 from ._draw_band import draw_band
@@ -43,7 +44,7 @@ def plot_receptance(
     for response in guess.responses:
         place = levels.index(response.level) if response.level is not None else 0
         size = response.receptance * 1e6 if what == "receptance" else response.displacement[:, 0] * 1e3
-        level = response.record if response.level is None else f"{response.level:g}"
+        level = as_mathtext(response.record) if response.level is None else f"{response.level:g}"
         label = level if response.direction == "none" else f"{level} {response.direction}"
         ax.plot(
             response.frequency,
@@ -57,7 +58,9 @@ def plot_receptance(
         )
     for line in guess.linear:
         scale = 1e6 if what == "receptance" else np.nan
-        ax.plot(line.frequency, scale * np.abs(line.receptance), linewidth=0.9, label=line.record)
+        ax.plot(
+            line.frequency, scale * np.abs(line.receptance), linewidth=0.9, label=as_mathtext(line.record)
+        )
     _resonance_points(guess, what, ax)
     if what == "displacement":
         for (label, fit), colour, width in zip(fits, (BEFORE, AFTER), CURVES, strict=False):

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...identification import NextTest
 from ...inference import Design
 from ..words import typeset_number
@@ -68,5 +69,6 @@ def plot_design(design: Design, *, ax: Axes | None = None) -> Figure:
     ax.grid(False, axis="y")
     ax.set_xlabel("change [%]")
     kept = "; ".join(one.constraint.words for one in design.outcomes if one.kept)
-    entitle(ax, f"not reached: {'; '.join(design.missed)}" if design.missed else kept or "no constraint")
+    missed = "; ".join(design.missed)
+    entitle(ax, as_mathtext(f"not reached: {missed}" if missed else kept or "no constraint"))
     return figure

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...identification import Candidate, Finding, Fit, Verdict
 from ..words import typeset_number, typeset_unit
 from ._style import AFTER, BEFORE, NEUTRAL, ROLES, axes_for, entitle, fits_meant, pair
@@ -154,7 +155,7 @@ def plot_stiffness_scatter(before: Fit, after: Fit | None = None, *, ax: Axes | 
         The figure.
     """
     figure, ax = axes_for(ax)
-    names = [record.name for record in before.campaign.records]
+    names = [as_mathtext(record.name) for record in before.campaign.records]
     for label, fit, colour in pair(before, after):
         deviation = 100.0 * fit.restarts.stiffness
         ax.plot(range(len(names)), deviation, "o-", color=colour, markersize=4, linewidth=0.8, label=label)

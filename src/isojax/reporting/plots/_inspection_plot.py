@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...records import ChannelInspection, FileInspection, power_spectrum
 from ._over_time import extremes
 from ._style import AFTER, BAND, MEASURED, axes_for, entitle
@@ -38,7 +39,10 @@ def plot_inspection(files: Sequence[FileInspection]) -> Figure:
         drive = file.channel(file.drive) or file.channels[0]
         response = file.channel(file.response)
         _draw_channel(axes[0], file, drive, MEASURED)
-        entitle(axes[0], f"{file.file.name}: {(file.kind or 'excitation not seen').replace('_', ' ')}")
+        entitle(
+            axes[0],
+            f"{as_mathtext(file.file.name)}: {(file.kind or 'excitation not seen').replace('_', ' ')}",
+        )
         for dwell in file.dwells[1::2]:
             rate = file.rate or 1.0
             axes[0].axvspan(dwell.start / rate, dwell.stop / rate, color=BAND, zorder=0)
@@ -74,7 +78,7 @@ def _draw_spectra(ax: Axes, file: FileInspection, channels: Sequence[tuple[Chann
         if channel.rms > 0.0 and finite.size >= 64:
             frequency, density = power_spectrum(finite, file.rate or 1.0)
             level = 10.0 * np.log10(np.maximum(density / np.max(density), 1e-16))
-            ax.plot(frequency[1:], level[1:], color=colour, linewidth=0.9, label=channel.name)
+            ax.plot(frequency[1:], level[1:], color=colour, linewidth=0.9, label=as_mathtext(channel.name))
     ax.set_xscale("log")
     ax.set_xlabel("frequency [Hz]" if file.rate is not None else "cycles per sample")
     ax.set_ylabel("power density [dB]")
@@ -84,4 +88,4 @@ def _draw_spectra(ax: Axes, file: FileInspection, channels: Sequence[tuple[Chann
 def _label(channel: ChannelInspection) -> str:
     unit = channel.unit
     written = unit is None or f"[{unit}]" in channel.name or f"({unit})" in channel.name
-    return channel.name if written else f"{channel.name} [{unit}]"
+    return as_mathtext(channel.name if written else f"{channel.name} [{unit}]")

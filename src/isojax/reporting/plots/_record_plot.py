@@ -5,6 +5,7 @@ from typing import Literal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...identification import OUTPUT_UNITS
 from ...records import Campaign, Record
 from ..words import INPUT_WORDS
@@ -49,5 +50,5 @@ def plot_record(
         INPUT_WORDS[campaign.input.quantity] if what == "input" else (quantity, OUTPUT_UNITS[quantity])
     )
     finish_time_axes(ax, low, high, words, unit)
-    entitle(ax, f"{record.name} ({ROLES[record.role]}, {record.kind.replace('_', ' ')})")
+    entitle(ax, f"{as_mathtext(record.name)} ({ROLES[record.role]}, {record.kind.replace('_', ' ')})")
     return figure

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...identification import OUTPUT_UNITS, Fit, Residual, Run
 from ..words import typeset_unit
 from ._over_time import draw_signal, finish_time_axes, is_dense, shown_samples
@@ -56,7 +57,7 @@ def plot_residual(
     sigma = before.noise.levels[place]
     ax.axhspan(-2 * sigma, 2 * sigma, color=BAND, zorder=0, label="noise, ±2σ")
     finish_time_axes(ax, low, high, "residual", OUTPUT_UNITS[before.campaign.output.quantity])
-    entitle(ax, f"residual of {chosen.name} ({ROLES[chosen.role]}), segments restarted")
+    entitle(ax, f"residual of {as_mathtext(chosen.name)} ({ROLES[chosen.role]}), segments restarted")
     return figure
 
 
@@ -169,7 +170,7 @@ def plot_cycle_residual(before: Fit, after: Fit | None = None, *, ax: Axes | Non
     ax.set_ylabel(f"mean residual [{typeset_unit(OUTPUT_UNITS[quantity])}]")
     ax.set_xlim(0.0, 360.0)
     ax.set_xticks(np.arange(0, 361, 60))
-    entitle(ax, f"cycle-averaged residual: {record.name} at {dwell.frequency:.3g} Hz")
+    entitle(ax, f"cycle-averaged residual: {as_mathtext(record.name)} at {dwell.frequency:.3g} Hz")
     return figure
 
 

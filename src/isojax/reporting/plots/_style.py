@@ -9,6 +9,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...identification import Fit, as_fit
 
 _Draw = TypeVar("_Draw", bound=Callable[..., Any])
@@ -141,4 +142,4 @@ def parameter_label(name: str) -> str:
     Returns:
         Such as "linear stiffness".
     """
-    return name.removesuffix(".coefficient").replace("_", " ").replace(".", ", ")
+    return as_mathtext(name.removesuffix(".coefficient").replace("_", " ").replace(".", ", "))

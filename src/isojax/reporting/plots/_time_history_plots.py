@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..._languages import as_mathtext
 from ...identification import OUTPUT_UNITS, Fit
 from ...records import Record
 from ._over_time import draw_signal, finish_time_axes, shown_samples
@@ -82,5 +83,5 @@ def plot_time_history(
         draw_signal(ax, chosen.time[shown], simulated, colour=colour, label=label, style=style)
     quantity = before.campaign.output.quantity
     finish_time_axes(ax, low, high, quantity, OUTPUT_UNITS[quantity])
-    entitle(ax, f"{chosen.name} ({ROLES[chosen.role]}), free run")
+    entitle(ax, f"{as_mathtext(chosen.name)} ({ROLES[chosen.role]}), free run")
     return figure
