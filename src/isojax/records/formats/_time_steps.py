@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from .._physical_limits import TIME
 from .._wording import row
 
 _GAP = 1.5
@@ -23,11 +24,12 @@ def uniform_rate(file: Path, time: Float[np.ndarray, " time"], column: str, firs
     Raises:
         ValueError: If a time is not finite, repeats, runs backwards, or leaves a gap; names the row.
     """
-    wrong = np.flatnonzero(~np.isfinite(time))
+    wrong = np.flatnonzero(~(np.abs(time) <= TIME.most))
     if wrong.size:
         at = int(wrong[0])
         raise ValueError(
-            f"{file}: time column `{column}` is {time[at]} at {row(first + at)}; it must be finite"
+            f"{file}: time column `{column}` is {time[at]} at {row(first + at)}; it must be finite, and at "
+            f"most {TIME.most:g} s"
         )
     steps = np.diff(time)
     wrong = np.flatnonzero(steps <= 0)
