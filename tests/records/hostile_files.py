@@ -13,10 +13,12 @@ from hostile_writers import (
     VALUE,
     archive_of,
     blank,
+    deleted,
     door,
     file,
     h5,
     linked,
+    linked_to,
     lvm,
     many_members,
     mat_four,
@@ -59,6 +61,7 @@ for ending in ENDINGS:
 CASES |= {
     "a socket": file(".csv", door, "is a socket; expected"),
     "a folder": file(".csv", Path.mkdir, "is a folder; expected"),
+    "a link to a right file": file(".h5", linked_to, None, ("run/force",)),
     "a link to itself": file(".csv", to_itself, "does not exist"),
     "gigabytes behind a right .mat": file("_73.mat", sparse, None),
     "gigabytes behind a right .h5": file(".h5", sparse, None, ("run/force",)),
@@ -290,6 +293,10 @@ CASES |= {
     "nothing in a dataset": file(".h5", h5(lambda one: one.update(force=h5py.Empty("f8"))), "column `force`"),
     "a unit that is an array": file(
         ".h5", h5(lambda one: one["right"].attrs.update(unit=np.ones(5))), None, RIGHT
+    ),
+    "references to what was deleted, beside": file(".h5", h5(deleted), None, RIGHT),
+    "a class that is no text, beside": file(
+        ".h5", h5(lambda one: one["right"].attrs.update(MATLAB_class=np.bytes_(b"\xff\xfe"))), None, RIGHT
     ),
     "references to what is gone": file(
         ".h5", h5(lambda one: one.create_dataset("force", (50,), h5py.ref_dtype)), "has no column `force`"

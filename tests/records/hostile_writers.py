@@ -178,6 +178,12 @@ def two_names(handle: h5py.File) -> None:
     handle["c/d"] = handle["c/e"] = handle["/"]
 
 
+def deleted(handle: h5py.File) -> None:
+    handle["gone"] = SAMPLES
+    handle["force"] = np.array([handle["gone"].ref], h5py.ref_dtype)
+    del handle["gone"]
+
+
 def unknown_filter(handle: h5py.File) -> None:
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plist.set_chunk((50,))
@@ -266,6 +272,12 @@ def door(path: Path) -> None:
 
 def to_itself(path: Path) -> None:
     path.symlink_to(path)
+
+
+def linked_to(path: Path) -> None:
+    """A right file that stands elsewhere."""
+    WRITERS[path.suffix](path.with_stem("elsewhere"))
+    path.symlink_to(path.with_stem("elsewhere"))
 
 
 def sparse(path: Path) -> None:

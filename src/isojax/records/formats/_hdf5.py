@@ -75,7 +75,12 @@ def _leaves(
             for i, reference in enumerate(np.asarray(node[()]).reshape(-1)):
                 if reference:
                     place = f"{path}[{i}]" if cell else f"{parent}[{i}].{field}"
-                    yield from _leaves(file, place, node.file[reference], above, visited)
+                    try:
+                        held = node.file[reference]
+                    except (ValueError, KeyError, RuntimeError, OSError):  # h5py, where it was deleted
+                        yield Leaf(place, _refusal(file, place, "refers to what is gone"))
+                    else:
+                        yield from _leaves(file, place, held, above, visited)
         elif node.dtype.names:
             for field in node.dtype.names:
                 yield Leaf(f"{path}.{field}", _reader(file, path, node, field), size=_memory(node))
@@ -145,7 +150,7 @@ def _memory(node: Any) -> int:
 
 def _matlab_class(node: Any) -> str:
     found = node.attrs.get("MATLAB_class", b"")
-    return found.decode() if isinstance(found, bytes) else str(found)
+    return found.decode(errors="replace") if isinstance(found, bytes) else str(found)
 
 
 def _unit(node: Any) -> str | None:
