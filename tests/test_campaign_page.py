@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from isojax.elements import CATALOGUE
+from isojax.records._physical_limits import GAIN, MASS, ORDER, RATE, SHARE, SIZE, TIME
 from isojax.records.reading._declaration import RECORD, SECTIONS, read_declaration
 
 PAGE = (Path(__file__).parents[1] / "docs" / "campaign.md").read_text(encoding="utf-8")
@@ -44,6 +45,11 @@ def test_default_and_choices_of_a_field_are_those_of_the_reader(key):
         stated = tomllib.loads(f"it = {default}")["it"]
         assert (tuple(stated) if isinstance(stated, list) else stated) == field.default
         assert field.accepts(stated)
+
+
+def test_limits_of_numbers_are_those_of_the_reader():
+    for limits in (GAIN, MASS, ORDER, RATE, SHARE, SIZE, TIME):
+        assert f"| {limits.words} |" in PAGE
 
 
 @pytest.mark.parametrize("side", ["stiffness", "damping"])

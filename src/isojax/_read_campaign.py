@@ -82,8 +82,8 @@ def _declared_names(
 
 def _has_file(found: str, suffix: str) -> bool:
     """Whether a file of the catalogue is named after an effect."""
-    folder = Path(__file__).with_name("elements")
-    return any((folder / f"_{name}.py").exists() for name in (found + suffix, found))
+    files = {file.stem for file in Path(__file__).with_name("elements").glob("_*.py")}
+    return bool(files & {f"_{found}{suffix}", f"_{found}"})
 
 
 def _check_names(declared: Declaration) -> None:
@@ -117,7 +117,8 @@ def _catalogue_name(file: Path, field: str, found: str, suffix: str) -> str:
     short = [name.removesuffix(suffix) for name in CATALOGUE if suffix and name.endswith(suffix)]
     near = difflib.get_close_matches(found, [*short, *CATALOGUE], n=1, cutoff=0.0)[0]
     raise ValueError(
-        f"Field `{field}` of {file} must name effects of the catalogue, but has {found!r}; nearest: {near!r}."
+        f"Field `{field}` of {file} must name effects of the catalogue, but has {found[:80]!r}; nearest: "
+        f"{near!r}."
     )
 
 
@@ -136,9 +137,16 @@ def catalogue_names(
         Their names, as written and in this order.
 
     Raises:
-        ValueError: if a name is not in the catalogue; names the file, the field and the nearest right name.
+        ValueError: if a name is not in the catalogue, or two mean one effect; names the file, the field and,
+            of the first, the nearest right name.
     """
-    return tuple(
-        _catalogue_name(file, field, found, suffix)
-        for field, found, suffix in _declared_names(stiffness, damping, elements)
-    )
+    meant: dict[str, str] = {}
+    for field, found, suffix in _declared_names(stiffness, damping, elements):
+        name = _catalogue_name(file, field, found, suffix)
+        if name in meant:
+            raise ValueError(
+                f"Field `{field}` of {file} has {found!r}, but `{name}` is named already, as "
+                f"{meant[name]!r}; each effect may be named once."
+            )
+        meant[name] = found
+    return tuple(meant)

@@ -200,7 +200,7 @@ MISTAKES = {
         r'kind = "periodic", but lacks the field `period`',
     ),
     "a folder for a file": ('"run.csv"', '"."', r"file = '\.' must be the name of a file"),
-    "a folder that is there": ('"run.csv"', '"inner"', r"inner is a folder; a record must be one file"),
+    "a folder that is there": ('"run.csv"', '"inner"', r"inner is a folder; expected one file on a disk"),
     "a pressure below vacuum": (
         RECORD,
         RECORD + "\npressure = -2e4",

@@ -138,13 +138,11 @@ def archive_of_zeros(path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(announced, struct.pack("<I", 4_000_000_000)))
 
 
-def sheet_of_gigabytes(path: Path) -> None:
-    """A spreadsheet whose directory announces 4 GB of cells."""
-    sheet(path)
-    raw = bytearray(path.read_bytes())
-    entry = raw.rindex(b"xl/worksheets/sheet1.xml") - 46
-    raw[entry + 24 : entry + 28] = struct.pack("<I", 4_000_000_000)
-    path.write_bytes(raw)
+def array_of_nothing(path: Path) -> None:
+    """An array that ends after its header."""
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("acceleration.npy", header((16,)) + bytes(128))
+        archive.writestr("force.npy", header((10**7,)))
 
 
 def many_cells(path: Path) -> None:
@@ -208,6 +206,7 @@ def many_groups(path: Path) -> None:
 def matlab_table(path: Path) -> None:
     """A table as MATLAB v7.3 writes it: numbers that refer to objects."""
     with h5py.File(path, "w", userblock_size=512) as handle:
+        handle["acceleration"] = np.arange(6.0)
         handle["T"] = np.arange(6, dtype=np.uint32)
         handle["T"].attrs.update(MATLAB_class=np.bytes_("table"), MATLAB_object_decode=3)
 
@@ -261,7 +260,7 @@ CASES = {
     ),
     # Tables of text.
     "an empty file": campaign(
-        lambda f: text("")(f / "run.csv"), r"run\.csv is empty \(0 bytes\); expected the col"
+        lambda f: text("")(f / "run.csv"), r"run\.csv is empty \(0 bytes\); expected a table"
     ),
     "a heading alone": campaign(lambda f: text("force,acceleration\n")(f / "run.csv"), "no rows of numbers"),
     "prose": file("notes.txt", text("The bench was cold.\nWe went home.\n"), "no rows of numbers; expected"),
@@ -381,23 +380,23 @@ CASES = {
         "`force` cannot be read",
     ),
     "an archive of gigabytes": file(
-        "a.npz", archive_of_zeros, "GB of samples, unpacked; expected at most 2.15 GB"
+        "a.npz", archive_of_zeros, "to read it takes 22.4 GiB of memory; expected at most 1"
     ),
     "an array that announces more than there is": campaign(
-        data_in("a.npz", lambda p: zipfile.ZipFile(p, "w").writestr("force.npy", header((10**13,)))),
+        data_in("a.npz", array_of_nothing),
         "array `force` cannot be read as numbers",
     ),
     "a .mat cut short": file(
         "a.mat", cut(lambda p: scipy.io.savemat(p, {"F": np.ones(500)})), "Likely cause: it is cut"
     ),
     "a .mat that announces 3 GB": file(
-        "a.mat", lambda p: mat(p, array_element(4 * 10**8, 32 * 10**8)), "3.2 GB of"
+        "a.mat", lambda p: mat(p, array_element(4 * 10**8, 32 * 10**8)), "takes 5.96 GiB"
     ),
     "a packed .mat that announces 3 GB": file(
-        "a.mat", lambda p: mat(p, packed(array_element(4 * 10**8, 32 * 10**8))), "3.2 GB of samples, unpacked"
+        "a.mat", lambda p: mat(p, packed(array_element(4 * 10**8, 32 * 10**8))), "takes 5.96 GiB of memory"
     ),
     "a .mat of a billion rows": file(
-        "a.mat", lambda p: mat(p, array_element(10**9, 64)), "cannot be read as a MATLAB"
+        "a.mat", lambda p: mat(p, array_element(10**9, 64)), "takes 22.4 GiB of memory"
     ),
     "structures in structures": file(
         "a.mat", nested_mat, "structures more than 64 levels deep", "Likely cause"
@@ -413,7 +412,7 @@ CASES = {
     "Parquet called .h5": file("a.h5", parquet, "wrong ending, since it begins as Parquet"),
     "groups in groups": file("a.h5", nested_groups, "groups or structures more than 64 levels deep"),
     "links to links": file("a.h5", many_groups, "more than 16384 groups and arrays"),
-    "a dataset of terabytes": file("a.h5", huge_dataset, r"8e\+03 GB of samples, unpacked"),
+    "a dataset of terabytes": file("a.h5", huge_dataset, r"takes 2.24e\+04 GiB of memory"),
     "an HDF5 file cut short": file(
         "a.h5",
         cut(lambda p: h5py.File(p, "w").create_dataset("F", data=np.ones(5000))),
@@ -433,9 +432,6 @@ CASES = {
         "a.xlsx",
         lambda p: sheet(p, ("XFD9999", 1.0)),
         "row 9999 and column 16384; .*Likely cause: a stray entry",
-    ),
-    "a spreadsheet of gigabytes": file(
-        "a.xlsx", sheet_of_gigabytes, "sheet1.xml has 4 GB, unpacked; expected at most"
     ),
     "text in a spreadsheet's column": campaign(
         lambda f: (

@@ -1,17 +1,18 @@
 """HDF5 files, and MATLAB v7.3 files, which are HDF5 with MATLAB's class written on each dataset."""
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ._door import file_size
 from ._leaves import Leaf, leaf_columns
-from ._limits import check_count, check_levels
+from ._limits import SAMPLE, check_count, check_levels
 from ._matlab_object import matlab_object
 from ._samples import Column
-from ._unreadable import unreadable
 
 _UNIT_NAMES = ("unit", "units", "Unit", "Units", "unit_str", "unit_string")
 
@@ -32,16 +33,8 @@ def read_hdf5_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colu
     """
     import h5py
 
-    try:
-        handle = h5py.File(file, "r")
-    except OSError as error:
-        raise unreadable(file, "HDF5", error) from error
-    with handle:
-        try:
-            leaves = list(_leaves(file, "", handle, (), itertools.count(1)))
-            return leaf_columns(file, names, leaves)
-        except (OSError, RuntimeError, KeyError, TypeError, MemoryError) as error:  # h5py, on a broken file
-            raise unreadable(file, "HDF5", error) from error
+    with h5py.File(file, "r") as handle:
+        return leaf_columns(file, names, list(_leaves(file, "", handle, (), itertools.count(1))))
 
 
 def _leaves(
@@ -68,29 +61,45 @@ def _leaves(
         for name in map(str, node):
             if not name.startswith("#"):  # where MATLAB keeps what its cells and structs refer to
                 inside = f"{path}{point}{name}" if path else name
-                yield from _leaves(file, inside, node.get(name), above, visited)
+                link = node.get(name, getlink=True)
+                if isinstance(link, h5py.ExternalLink):
+                    yield Leaf(inside, _refusal(file, inside, f"is a link into the file {link.filename}"))
+                else:
+                    yield from _leaves(file, inside, node.get(name), above, visited)
     elif isinstance(node, h5py.Dataset):
-        if node.dtype == h5py.ref_dtype:
+        if h5py.check_ref_dtype(node.dtype) is h5py.Reference:
+            check_count(file, int(node.size or 0))
             # The field of an array of structs, and a cell array: a list of references.
             parent, _, field = path.rpartition(".")
             cell = _matlab_class(node) == "cell" or not parent
             for i, reference in enumerate(np.asarray(node[()]).reshape(-1)):
                 if reference:
                     place = f"{path}[{i}]" if cell else f"{parent}[{i}].{field}"
-                    yield from _leaves(file, place, node.file[reference], above, visited)
+                    try:
+                        held = node.file[reference]
+                    except (ValueError, KeyError, RuntimeError, OSError):  # h5py, where it was deleted
+                        yield Leaf(place, _refusal(file, place, "refers to what is gone"))
+                    else:
+                        yield from _leaves(file, place, held, above, visited)
         elif node.dtype.names:
             for field in node.dtype.names:
-                yield Leaf(f"{path}.{field}", _field(node, field), size=_float64_bytes(node))
+                yield Leaf(f"{path}.{field}", _reader(file, path, node, field), size=_memory(node))
+        elif node.dtype.kind in "iufbcmM":
+            yield Leaf(path, _reader(file, path, node), _unit(node), _memory(node))
         else:
-            yield Leaf(path, _reader(file, path, node), _unit(node), _float64_bytes(node))
+            yield Leaf(path, _refusal(file, path, "holds text or lists"))
 
 
-def _field(node: Any, field: str) -> Callable[[], Any]:
-    return lambda: node[field]
+def _refusal(file: Path, path: str, found: str) -> Callable[[], Any]:
+    def refuse() -> Any:
+        raise ValueError(f"{file}: column `{path}` {found}; expected real numbers that stand in the file")
+
+    return refuse
 
 
-def _reader(file: Path, path: str, node: Any) -> Callable[[], Any]:
+def _reader(file: Path, path: str, node: Any, field: str | None = None) -> Callable[[], Any]:
     def read() -> np.ndarray:
+        _check_written(file, path, node)
         matlab = _matlab_class(node)
         if matlab in ("char", "cell", "struct", "logical", "function_handle"):
             raise ValueError(
@@ -100,19 +109,48 @@ def _reader(file: Path, path: str, node: Any) -> Callable[[], Any]:
             raise matlab_object(file, path)
         if "MATLAB_empty" in node.attrs:
             raise ValueError(f"{file}: column `{path}` is empty; expected one row or column of numbers")
-        values = np.asarray(node[()])
+        values = np.asarray(node[() if field is None else field])
         return values.T if matlab else values  # MATLAB writes columns first
 
     return read
 
 
-def _float64_bytes(node: Any) -> int:
-    return 8 * int(node.size or 0)
+def _check_written(file: Path, path: str, node: Any, levels: int = 0) -> None:
+    """Refuses samples that HDF5 would take from beside the file, or make up where none were written."""
+    import h5py
+
+    check_levels(file, levels)
+    if node.external:
+        _refusal(file, path, "is stored outside the file")()
+    if not node.is_virtual:
+        if node.size and node.id.get_space_status() != h5py.h5d.SPACE_STATUS_ALLOCATED:
+            _refusal(file, path, "has samples that were never written")()
+        return
+    mapped = 0
+    for part in node.virtual_sources():
+        mapped += part.vspace.get_select_npoints()
+        source = file if part.file_name == "." else file.parent / part.file_name
+        if not file_size(source):
+            _refusal(file, path, f"is made of the file {part.file_name}, which does not exist,")()
+        with h5py.File(source, "r") as handle:
+            held = handle.get(part.dset_name)
+            wanted = part.src_space.get_simple_extent_dims()
+            if not isinstance(held, h5py.Dataset) or np.any(np.less(held.shape, wanted)):
+                _refusal(file, path, f"lacks its part `{part.dset_name}` of {part.file_name}")()
+            _check_written(source, part.dset_name, held, levels + 1)
+    if mapped < node.size:
+        _refusal(file, path, f"has {node.size - mapped} samples that come from nowhere")()
+
+
+def _memory(node: Any) -> int:
+    """Gives the bytes that reading a dataset takes; a chunk is unpacked whole."""
+    size = max(SAMPLE, 2 * node.dtype.itemsize)
+    return size * int(node.size or 0) + node.dtype.itemsize * math.prod(node.chunks or (0,))
 
 
 def _matlab_class(node: Any) -> str:
     found = node.attrs.get("MATLAB_class", b"")
-    return found.decode() if isinstance(found, bytes) else str(found)
+    return found.decode(errors="replace") if isinstance(found, bytes) else str(found)
 
 
 def _unit(node: Any) -> str | None:

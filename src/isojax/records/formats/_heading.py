@@ -2,6 +2,7 @@
 
 import re
 
+from ._limits import LONGEST_NAME
 from ._units import channel_unit
 
 _FORMS = (r"(.+?)\s*\[([^\[\]]+)\]", r"(.+?)\s*\(([^()]+)\)", r"(.+?)\s+/\s+(\S+)", r"(.+?)\s+in\s+(\S+)")
@@ -15,6 +16,8 @@ def split_heading(heading: str) -> tuple[str, str | None]:
     so is "Force (A)", since sensors are called so.
     """
     text = heading.strip()
+    if len(text) > LONGEST_NAME:
+        return text, None
     for form in _FORMS:
         match = re.fullmatch(form, text)
         if match is None:

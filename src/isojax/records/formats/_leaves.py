@@ -10,7 +10,7 @@ import numpy as np
 
 from .._wording import listing
 from ._heading import split_heading
-from ._limits import check_size
+from ._limits import check_demand
 from ._samples import Column, as_samples, find_channel, missing_column, unit_of_time
 
 _INDEX = re.compile(r"(.*?)\[([\d\s]*:?[\d\s]*(?:,\s*(?:\d+|:)\s*)+)\]")
@@ -26,7 +26,7 @@ class Leaf:
         path: Its full name, such as "run.force" or "bench/force".
         read: Gives the array; may raise ValueError where it holds no numbers.
         unit: Unit that the file states, or None.
-        size: Bytes that it takes as float64, where the file says so before it is read.
+        size: Bytes of memory that reading it takes, where the file says so before it is read.
     """
 
     path: str
@@ -51,21 +51,13 @@ def leaf_columns(file: Path, names: Sequence[str] | None, leaves: Sequence[Leaf]
         ValueError: If there is no array of a name, it holds no row or column of numbers, or it is too large.
     """
     if names is None:
-        check_size(file, sum(leaf.size for leaf in leaves))
+        check_demand(file, sum(leaf.size for leaf in leaves))
         return dict(_all_columns(file, leaves))
+    found = {name: _leaf_of(file, name, leaves) for name in names}
+    check_demand(file, sum(leaf.size for leaf in dict.fromkeys(leaf for leaf, _ in found.values())))
     columns = {}
-    for name in names:
-        leaf = _find(file, name, leaves)
-        if leaf is not None:
-            check_size(file, leaf.size)
-            values, rest = leaf.read(), ""
-        else:
-            path, rest = _split_index(name)
-            leaf = _find(file, path, leaves) if rest else None
-            if leaf is None:
-                raise _missing(file, name, leaves)
-            check_size(file, leaf.size)
-            values = _picked(file, leaf.path, np.asarray(leaf.read()), rest)
+    for name, (leaf, index) in found.items():
+        values = _picked(file, leaf.path, np.asarray(leaf.read()), index) if index else leaf.read()
         unit = leaf.unit or split_heading(leaf.path)[1] or unit_of_time(values)
         columns[name] = Column(as_samples(values, file, name), unit=unit)
     return columns
@@ -87,6 +79,7 @@ def _all_columns(file: Path, leaves: Sequence[Leaf]) -> Iterator[tuple[str, Colu
             values = np.asarray(leaf.read())
         except ValueError:
             continue
+        held = [Leaf(leaf.path, lambda values=values: values, leaf.unit)]
         names = [leaf.path]
         if values.ndim == 2 and 1 < min(values.shape) <= _MOST_COLUMNS:
             tall = values.shape[0] >= values.shape[1]
@@ -95,13 +88,25 @@ def _all_columns(file: Path, leaves: Sequence[Leaf]) -> Iterator[tuple[str, Colu
             ]
         for name in names:
             try:
-                yield from leaf_columns(file, [name], [leaf]).items()
+                yield from leaf_columns(file, [name], held).items()
             except ValueError:
                 continue  # text, a single number, an empty array: no channel
 
 
 def _key(path: str) -> str:
     return path.strip("/").replace("/", ".")
+
+
+def _leaf_of(file: Path, name: str, leaves: Sequence[Leaf]) -> tuple[Leaf, str]:
+    """Gives the array of a name, and what is picked of it."""
+    leaf = _find(file, name, leaves)
+    if leaf is not None:
+        return leaf, ""
+    path, index = _split_index(name)
+    leaf = _find(file, path, leaves) if index else None
+    if leaf is None:
+        raise _missing(file, name, leaves)
+    return leaf, index
 
 
 def _find(file: Path, name: str, leaves: Sequence[Leaf]) -> Leaf | None:

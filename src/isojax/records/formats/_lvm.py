@@ -1,5 +1,6 @@
 """LabVIEW measurement files (.lvm), by lvm_read: a header with rate and units, then one or more segments."""
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -8,9 +9,12 @@ from typing import Any
 import numpy as np
 
 from ._layout import pick_columns
+from ._limits import check_demand
 from ._samples import Column, as_samples, missing_extra
 from ._text import decoded, read_text_columns
-from ._unreadable import unreadable
+
+_BYTE, _LINE, _CELL = 12, 400, 48
+"""Bytes of memory that a byte of the file takes, a line, which may be a segment, and a cell."""
 
 _WHOLE = 0.05
 """Share of a sample by which a segment may miss the end of the one before it."""
@@ -33,6 +37,7 @@ def read_lvm_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colum
         ValueError: If lvm_read is not installed, the file cannot be read, a channel is missing or holds no
             numbers, or a segment starts after a pause.
     """
+    check_demand(file, _BYTE * file.stat().st_size)
     text = decoded(file.read_bytes())
     if not text.lstrip().startswith("LabVIEW Measurement"):
         return read_text_columns(file, names)
@@ -40,13 +45,17 @@ def read_lvm_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colum
         import lvm_read
     except ImportError as error:
         raise missing_extra(file, "lvm_read", "LabVIEW measurement files") from error
-    try:
-        held: Any = lvm_read.read_str(text.replace("\r\n", "\n").replace("\r", "\n"))
-        segments = [held[i] for i in range(held["Segments"])]
-        headings = [str(name).strip() for name in segments[0]["Channel names"]]
-        values = [np.asarray(one["data"], dtype=np.float64) for one in segments]
-    except Exception as error:  # lvm_read raises ValueError, KeyError, SyntaxError, ... on a broken file
-        raise unreadable(file, "a LabVIEW measurement file", error) from error
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    mark = re.search("^Separator(.)", text, re.MULTILINE)
+    separators = f"[\t{re.escape(mark[1])}]" if mark else "\t"
+    lines = text.count("\n")
+    check_demand(file, _BYTE * len(text) + _LINE * lines, text=len(text))
+    cells = lines * max(len(re.findall(separators, line)) + 1 for line in text.splitlines())
+    check_demand(file, _BYTE * len(text) + _LINE * lines + _CELL * cells)
+    held: Any = lvm_read.read_str(text)
+    segments = [held[i] for i in range(held["Segments"])]
+    headings = [str(name).strip() for name in segments[0]["Channel names"]]
+    values = [np.asarray(one["data"], dtype=np.float64) for one in segments]
     wide = [one.shape[1] if one.ndim == 2 else 0 for one in values]
     if headings and headings[-1] == "Comment":
         headings = headings[:-1]

@@ -1,6 +1,6 @@
 """MATLAB files up to v7 by SciPy, v7.3 as the HDF5 it is."""
 
-import warnings
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from ._leaves import Leaf, leaf_columns
 from ._mat_bounds import check_mat_elements
 from ._matlab_object import matlab_object
 from ._samples import Column
-from ._unreadable import unreadable
 
 
 def read_mat_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
@@ -35,14 +34,11 @@ def read_mat_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colum
 
     if h5py.is_hdf5(file):
         return read_hdf5_columns(file, names)
-    check_mat_elements(file)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # SciPy warns of variables that nobody asked for
-            held = scipy.io.loadmat(file, appendmat=False)
-    except Exception as error:  # SciPy raises TypeError, ValueError, zlib.error, ... on a broken file
-        raise unreadable(file, "a MATLAB .mat file", error) from error
-    leaves = [
+    wanted = None if names is None else [re.match(r"\w*", name.strip("/ "))[0] for name in names]  # type: ignore[index]
+    others = check_mat_elements(file, wanted)
+    held = scipy.io.loadmat(file, appendmat=False, variable_names=wanted)
+    leaves = [Leaf(name, lambda: None) for name in others]
+    leaves += [
         leaf
         for name, value in held.items()
         if not name.startswith("__")
@@ -63,7 +59,7 @@ def _leaves(file: Path, path: str, value: Any) -> Iterator[Leaf]:
             else:
                 yield from _leaves(file, place, one)
     else:
-        yield Leaf(path, lambda: value, size=8 * int(np.size(value)))
+        yield Leaf(path, lambda: value)
 
 
 def _refusal(file: Path, path: str) -> Callable[[], Any]:

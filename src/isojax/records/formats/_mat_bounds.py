@@ -1,58 +1,88 @@
 """What the data elements of a MAT file of version 5 announce, seen before SciPy makes anything of them."""
 
+import math
 import struct
 import zlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from ._limits import check_count, check_levels, check_size
+from ._limits import SAMPLE, check_count, check_demand, check_levels
 
 _MATRIX, _COMPRESSED = 14, 15
 _HEADER = 128
+_HEAD = 512
+"""Bytes of an element in which the class, the dimensions and the name of its array stand."""
+
 _NESTING = (1, 2, 3)
 """Classes of arrays that hold others: cells, structures, objects."""
 
-_CLASS_AT = 16
-"""Place of the class within an array's element: after two tags of 8 bytes."""
+_FULL = (4, *range(6, 16))
+"""Classes of arrays with a number or letter for each place: all but sparse ones and objects."""
+
+_OBJECT = 1000
+"""Bytes of memory that an array takes beside its numbers."""
 
 
-def check_mat_elements(file: Path) -> None:
-    """Refuses a MAT file that unpacks to too much, or whose structures are too many or nested too deep.
+class _Array(NamedTuple):
+    levels: int
+    kind: int
+    name: str
+    numbers: int
+
+
+def check_mat_elements(file: Path, wanted: Sequence[str] | None) -> list[str]:
+    """Refuses a MAT file whose wanted variables take too much, or are too many or nested too deep.
 
     SciPy allocates what an element announces, and follows nested structures down the stack of the process,
-    which it overruns. A file of another version is left to SciPy.
+    which it overruns. A file of another version is not packed, and left to SciPy.
 
     Args:
         file: The file.
+        wanted: Variables that are to be read; None for all.
+
+    Returns:
+        The variables that are not.
 
     Raises:
         ValueError: If it exceeds the bounds.
 
     Source: MathWorks, "MAT-File Format", chapter 1: level 5 data elements.
     """
+    check_demand(file, file.stat().st_size)
     raw = memoryview(file.read_bytes())
     order = {b"IM": "<", b"MI": ">"}.get(bytes(raw[126:_HEADER]))
     if order is None:
-        return
-    total, arrays, place = 0, 0, _HEADER
+        check_demand(file, SAMPLE * len(raw))
+        return []
+    others: list[str] = []
+    memory, arrays, place = float(len(raw)), 0, _HEADER
     while place + 8 <= len(raw):
         kind, size = struct.unpack_from(f"{order}II", raw, place)
         element, place = raw[place : place + 8 + size], place + 8 + size
+        arrays += 1
+        check_count(file, arrays)
+        head = _unpacked(element[8:], _HEAD) if kind == _COMPRESSED else bytes(element[:_HEAD])
+        first = next(_arrays(file, memoryview(head), order), None)
+        if first is None:
+            continue
+        if wanted is not None and first.name not in wanted:
+            others.append(first.name)
+            continue
         if kind == _COMPRESSED:
-            head = _unpacked(element[8:], 64)
-            size = struct.unpack_from(f"{order}II", head)[1] if len(head) >= 8 else 0
-        else:
-            head = bytes(element[:64])
-        total += size
-        check_size(file, total)
-        if (
-            len(head) > _CLASS_AT + 4
-            and struct.unpack_from(f"{order}I", head, _CLASS_AT)[0] & 0xFF in _NESTING
-        ):
+            size = struct.unpack_from(f"{order}II", head)[1]
+        memory += 2 * size
+        check_demand(file, memory)
+        held: Iterator[_Array] = iter((first,))
+        if first.kind in _NESTING:
             whole = _unpacked(element[8:], size + 8) if kind == _COMPRESSED else element
-            levels, count = _levels(memoryview(whole), order)
-            check_levels(file, levels)
-            arrays += count
+            held = _arrays(file, memoryview(whole), order)
+        for one in held:
+            arrays, memory = arrays + 1, memory + _OBJECT + SAMPLE * one.numbers
+            check_levels(file, one.levels)
             check_count(file, arrays)
+        check_demand(file, memory)
+    return others
 
 
 def _unpacked(packed: memoryview, most: int) -> bytes:
@@ -62,17 +92,32 @@ def _unpacked(packed: memoryview, most: int) -> bytes:
         return b""  # SciPy says what is wrong
 
 
-def _levels(element: memoryview, order: str) -> tuple[int, int]:
-    """Gives how deep arrays are nested in each other, and how many there are."""
-    place, ends, deepest, count = 0, [len(element)], 0, 0
+def _arrays(file: Path, element: memoryview, order: str) -> Iterator[_Array]:
+    """Gives the arrays of an element, each before those within it."""
+    place, steps, ends = 0, 0, [len(element)]
     while place + 8 <= len(element):
         while ends and place >= ends[-1]:
             ends.pop()
         kind, size = struct.unpack_from(f"{order}II", element, place)
-        place += 8
+        place, steps = place + 8, steps + 1
+        check_count(file, steps // 8)  # an array has six elements of its own
         if kind == _MATRIX:
             ends.append(place + size)
-            deepest, count = max(deepest, len(ends) - 1), count + 1
+            try:
+                yield _Array(len(ends) - 1, *_described(element, place, order))
+            except struct.error:
+                return  # cut short; SciPy says so
         elif kind <= 0xFFFF:  # else a small element, whose data stand in its tag
             place += size + -size % 8
-    return deepest, count
+
+
+def _described(element: memoryview, place: int, order: str) -> tuple[int, str, int]:
+    """Gives class, name and count of numbers of the array whose elements start at a place."""
+    kind = struct.unpack_from(f"{order}I", element, place + 8)[0] & 0xFF
+    (size,) = struct.unpack_from(f"{order}I", element, place + 20)
+    sides = struct.unpack_from(f"{order}{min(size // 4, 64)}I", element, place + 24)
+    place += 24 + size + -size % 8
+    small, length = struct.unpack_from(f"{order}II", element, place)
+    place, length = (place + 4, small >> 16) if small >> 16 else (place + 8, length)
+    name = bytes(element[place : place + min(length, _HEAD)]).decode(errors="replace")
+    return kind, name, math.prod(sides) if kind in _FULL else 0

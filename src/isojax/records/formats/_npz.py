@@ -1,15 +1,16 @@
 """NumPy archives."""
 
-import zipfile
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ._archive import check_directory
 from ._leaves import Leaf, leaf_columns
+from ._limits import SAMPLE, check_count
 from ._samples import Column
-from ._unreadable import unreadable
 
 
 def read_npz_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
@@ -19,18 +20,30 @@ def read_npz_columns(file: Path, names: Sequence[str] | None) -> dict[str, Colum
         ValueError: If it is no archive, an array is missing, or one is not a row or column of real numbers.
     """
     with file.open("rb") as handle:  # NumPy leaves a file open that it cannot read
-        try:
-            archive = np.load(handle, allow_pickle=False)
-        except Exception as error:  # zipfile and NumPy raise a dozen kinds on a broken file
-            raise unreadable(file, "a NumPy .npz archive", error) from error
-        if not isinstance(archive, np.lib.npyio.NpzFile):
+        if handle.read(6) == np.lib.format.MAGIC_PREFIX:
             raise ValueError(f"{file} holds a single array without a name; expected a NumPy .npz archive")
-        with archive, zipfile.ZipFile(handle) as members:
-            sizes = {one.filename.removesuffix(".npy"): one.file_size for one in members.infolist()}
+        check_directory(file, handle)
+        handle.seek(0)
+        with np.load(handle, allow_pickle=False) as archive:
+            check_count(file, len(archive.files))
             leaves = [
-                Leaf(name, _reader(file, archive, name), size=sizes.get(name, 0)) for name in archive.files
+                Leaf(name, _reader(file, archive, name), size=_memory(archive, name))
+                for name in archive.files
             ]
             return leaf_columns(file, names, leaves)
+
+
+def _memory(archive: Any, name: str) -> int:
+    """Gives the bytes that an array takes, by its header; without one, by the archive's directory."""
+    member = name if name in archive.zip.NameToInfo else f"{name}.npy"
+    try:
+        with archive.zip.open(member) as packed:
+            major, _ = np.lib.format.read_magic(packed)
+            read = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
+            shape, _, dtype = read(packed)
+        return math.prod(shape) * max(SAMPLE, 2 * dtype.itemsize)
+    except Exception:  # `_reader` says what is wrong, if the array is wanted
+        return archive.zip.getinfo(member).file_size
 
 
 def _reader(file: Path, archive: Any, name: str) -> Callable[[], Any]:

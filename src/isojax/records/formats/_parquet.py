@@ -1,14 +1,13 @@
 """Parquet files, by pyarrow."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ._heading import split_heading
 from ._layout import pick_columns
-from ._limits import check_size
+from ._limits import SAMPLE, check_demand
 from ._samples import Column, as_samples, missing_extra, unit_of_time
-from ._unreadable import unreadable
 
 
 def read_parquet_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
@@ -30,22 +29,27 @@ def read_parquet_columns(file: Path, names: Sequence[str] | None) -> dict[str, C
         import pyarrow.parquet
     except ImportError as error:
         raise missing_extra(file, "pyarrow", "Parquet files") from error
-    held = _or_unreadable(file, lambda: pyarrow.parquet.ParquetFile(file))
-    check_size(file, 8 * held.metadata.num_rows * held.metadata.num_columns)
-    table = _or_unreadable(file, held.read)
+    held = pyarrow.parquet.ParquetFile(file)
+    schema = held.schema_arrow
+    groups = [held.metadata.row_group(i).num_rows for i in range(held.num_row_groups)]
+    rows = max(held.metadata.num_rows, sum(groups))
+    read = [name for name in schema.names if names is None or {name, split_heading(name)[0]} & {*names}]
+    check_demand(file, SAMPLE * rows * len(read))
 
     def column(i: int) -> Column:
-        name = table.column_names[i]
-        values = table.column(i).to_numpy()
-        held = {key.decode(): value.decode() for key, value in (table.schema.field(i).metadata or {}).items()}
-        unit = split_heading(name)[1] or held.get("unit") or held.get("units") or unit_of_time(values)
+        name, kind = schema.names[i], schema.types[i]
+        if not _is_number(pyarrow.types, kind):
+            raise ValueError(f"{file}: column `{name}` holds {kind} values; expected numbers")
+        table = held.read(columns=[name])
+        place = [j for j, one in enumerate(table.column_names) if one == name][schema.names[:i].count(name)]
+        values = table.column(place).to_numpy()
+        stated = {key.decode(): value.decode() for key, value in (schema.field(i).metadata or {}).items()}
+        unit = split_heading(name)[1] or stated.get("unit") or stated.get("units") or unit_of_time(values)
         return Column(as_samples(values, file, name), unit=unit)
 
-    return pick_columns(file, names, table.column_names, column)
+    return pick_columns(file, names, schema.names, column)
 
 
-def _or_unreadable(file: Path, work: Callable[[], Any]) -> Any:
-    try:
-        return work()
-    except Exception as error:  # pyarrow raises a dozen kinds on a broken file
-        raise unreadable(file, "a Parquet file", error) from error
+def _is_number(types: Any, kind: Any) -> bool:
+    kind = kind.value_type if types.is_dictionary(kind) else kind
+    return types.is_integer(kind) or types.is_floating(kind) or types.is_temporal(kind)

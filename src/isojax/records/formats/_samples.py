@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._wording import listing, nearest
+from ._limits import check_demand
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,7 @@ def as_samples(values: Any, file: Path, name: str) -> Float[np.ndarray, " time"]
             f"{file}: column `{name}` has the shape {array.shape}; expected one row or column of numbers"
             + _one_of(name, array.shape)
         )
+    check_demand(file, 8 * array.size)  # that of a view of one number may be any
     array = array.reshape(-1)
     if array.dtype.kind == "M":
         array = array - array[0]

@@ -11,7 +11,6 @@ from .._wording import row
 from ._layout import find_layout, pick_columns
 from ._samples import Column, as_samples, missing_extra
 from ._sheet_bounds import check_sheets
-from ._unreadable import unreadable
 
 _LOOKED_AT = 500
 """Rows from which the heading is found."""
@@ -36,13 +35,10 @@ def read_sheet_columns(file: Path, names: Sequence[str] | None) -> dict[str, Col
     except ImportError as error:
         raise missing_extra(file, "python-calamine", "spreadsheets") from error
     check_sheets(file)
-    try:
-        book = python_calamine.CalamineWorkbook.from_path(str(file))
-        sheets = {
-            name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names
-        }
-    except Exception as error:  # several kinds of its own
-        raise unreadable(file, "a spreadsheet", error) from error
+    book = python_calamine.CalamineWorkbook.from_path(str(file))
+    sheets = {
+        name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names
+    }
     places: list[tuple[str, int, int, str | None]] = []
     headings: list[str] = []
     for name, rows in sheets.items():

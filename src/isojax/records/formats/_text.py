@@ -17,7 +17,7 @@ from jaxtyping import Float
 from .._wording import row
 from ._clock import read_clock, seconds_since_first
 from ._layout import Layout, find_layout, numeric_cells, pick_columns
-from ._limits import check_size
+from ._limits import check_demand
 from ._samples import Column, as_samples
 
 _LOOKED_AT = 500
@@ -30,12 +30,15 @@ _CELLS_A_ROW = 1024
 _LONGEST_LINE = 2**16
 """Bytes of a line: 64 a column."""
 
+_BYTE, _LINE, _NUMBER_BYTES, _TEXT_BYTES = 12, 32, 24, 100
+"""Bytes of memory that a byte takes, a line, a cell that is a number, and a cell of a column with texts."""
+
 _SPACES = r"\s+"
 _SEPARATORS = (",", ";", "\t", _SPACES)
 """The earlier one is taken where two give equally many numbers."""
 
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", _SPACES: "spaces"}
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*")
 _MARKS = "#%!"
 """Signs before a heading, as NumPy and other programs write them."""
@@ -49,7 +52,7 @@ class TextTable:
         file: The file.
         headings: One a column.
         units: Unit that the file states, one a column, or None.
-        cells: One array a column: numbers, or objects where a cell is text.
+        cells: Gives a column: numbers, or objects where a cell is text.
         text: The rows of values as they are written.
         first: Lines of the file above them.
         decimal: Decimal sign.
@@ -58,7 +61,7 @@ class TextTable:
     file: Path
     headings: tuple[str, ...]
     units: tuple[str | None, ...]
-    cells: tuple[np.ndarray, ...]
+    cells: Callable[[int], np.ndarray]
     text: str
     first: int
     decimal: str
@@ -69,7 +72,7 @@ class TextTable:
         Raises:
             ValueError: At the first cell that holds text; names the row, the line and the text.
         """
-        cells = self.cells[column]
+        cells = self.cells(column)
         if cells.dtype.kind in "iufb":
             return cells
         if self.is_clock(column):
@@ -87,18 +90,19 @@ class TextTable:
 
     def is_clock(self, column: int) -> bool:
         """Says whether a column starts with a time of day."""
-        first = next((cell for cell in self.cells[column] if cell == cell), None)
+        first = next((cell for cell in self.cells(column) if cell == cell), None)
         return isinstance(first, str) and read_clock(first) is not None
 
     def _times(self, column: int) -> Float[np.ndarray, " time"]:
-        clocks = [read_clock(cell) if isinstance(cell, str) else None for cell in self.cells[column]]
-        for index, (cell, clock) in enumerate(zip(self.cells[column], clocks, strict=True)):
+        cells = self.cells(column)
+        clocks = [read_clock(cell) if isinstance(cell, str) else None for cell in cells]
+        for index, (cell, clock) in enumerate(zip(cells, clocks, strict=True)):
             if clock is None and cell == cell:
                 raise self._wrong(column, index, "not a time of day as in the rows before")
         return seconds_since_first(clocks)
 
     def _wrong(self, column: int, index: int, what: str) -> ValueError:
-        cell = self.cells[column][index]
+        cell = self.cells(column)[index]
         return ValueError(
             f"{self.file}: column `{self.headings[column]}` holds the text {str(cell)!r} at {row(index)}, "
             f"line {_line(self.text, self.first, index)} of the file, {what}"
@@ -142,10 +146,12 @@ def read_table(file: Path) -> TextTable:
     Raises:
         ValueError: If it is empty, holds no row of numbers, or its rows differ in length.
     """
-    check_size(file, file.stat().st_size)
+    check_demand(file, _BYTE * file.stat().st_size)
     raw = file.read_bytes()
+    check_demand(file, _BYTE * len(raw) + _LINE * (raw.count(b"\n") + raw.count(b"\r")))
     _check_lines(file, raw)
     text = decoded(raw).replace("\r\n", "\n").replace("\r", "\n")
+    del raw
     lines = text.split("\n", 5 * _LOOKED_AT)[: 5 * _LOOKED_AT]
     written = [i for i, line in enumerate(lines) if line.strip()][:_LOOKED_AT]
     length = itertools.accumulate(len(lines[i]) for i in written)
@@ -166,8 +172,6 @@ def read_table(file: Path) -> TextTable:
             f"{lines[written[0]]!r:.80}"
         )
     first = written[layout.first]
-    if layout.width > _CELLS_A_ROW:
-        raise _lying(file, f"line {first + 1} has {layout.width} columns")
     if len(layout.headings) != layout.width:
         raise ValueError(
             f"{file} has {len(layout.headings)} headings but {layout.width} columns of values "
@@ -175,16 +179,15 @@ def read_table(file: Path) -> TextTable:
             "these within a heading, or is it a decimal comma?"
         )
     values = text[sum(len(line) + 1 for line in lines[:first]) :]
+    del text
     table = _parsed(file, values, first, separator, decimal, layout)
-    return TextTable(
-        file,
-        layout.headings,
-        layout.units,
-        tuple(np.asarray(table.iloc[:, i].to_numpy()) for i in range(layout.width)),
-        values,
-        first,
-        decimal,
-    )
+
+    def cells(i: int) -> np.ndarray:
+        if table.dtypes.iloc[i].kind not in "iufb":
+            check_demand(file, _TEXT_BYTES * len(table))
+        return np.asarray(table.iloc[:, i].to_numpy())
+
+    return TextTable(file, layout.headings, layout.units, cells, values, first, decimal)
 
 
 def _check_lines(file: Path, raw: bytes) -> None:
@@ -272,20 +275,23 @@ def _heading_cells(line: str, separator: str, width: int) -> list[str]:
 
 def _line(text: str, first: int, index: int) -> int:
     """Gives the line of the file, from 1 on, in which a row of values stands; empty lines are no rows."""
-    written = (i for i, line in enumerate(text.split("\n")) if line.strip())
+    written = (i for i, line in enumerate(io.StringIO(text)) if line.strip())
     return first + 1 + next(itertools.islice(written, index, None), 0)
 
 
 def _parsed(file: Path, text: str, first: int, separator: str, decimal: str, layout: Layout) -> pd.DataFrame:
     head = text.partition("\n")[0]
     count = layout.width if separator == _SPACES else max(layout.width, head.count(separator) + 1)
+    if count > _CELLS_A_ROW:
+        raise _lying(file, f"line {first + 1} has {count} columns")
+    check_demand(file, _BYTE * len(text) + _NUMBER_BYTES * count * (text.count("\n") + 1))
     # pandas takes the number of columns from the first row, which may lack cells.
     full = (" " if separator == _SPACES else separator).join(["0"] * count)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             table = pd.read_csv(
-                io.StringIO(f"{full}\n{text}"),
+                io.BytesIO(f"{full}\n{text}".encode(errors="replace")),
                 sep=separator,
                 decimal=decimal,
                 header=None,
@@ -304,7 +310,7 @@ def _parsed(file: Path, text: str, first: int, separator: str, decimal: str, lay
 
 def _ragged(file: Path, text: str, first: int, separator: str, layout: Layout) -> ValueError:
     """Gives the error of a table whose rows differ in length, at the first one that does."""
-    rows = (line for line in text.split("\n") if line.strip())
+    rows = (line for line in io.StringIO(text) if line.strip())
     for index, line in enumerate(rows):
         count = len(_cells(line, separator))
         if count > layout.width:

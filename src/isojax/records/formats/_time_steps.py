@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 from jaxtyping import Float
 
+from .._physical_limits import TIME
 from .._wording import row
 from ._last_digit import last_digit
 
@@ -40,11 +41,12 @@ def uniform_rate(file: Path, time: Float[np.ndarray, " time"], column: str, firs
     Raises:
         ValueError: If a time is not finite, repeats, runs backwards, or leaves a gap; names the row.
     """
-    wrong = np.flatnonzero(~np.isfinite(time))
+    wrong = np.flatnonzero(~(np.abs(time) <= TIME.most))
     if wrong.size:
         at = int(wrong[0])
         raise ValueError(
-            f"{file}: time column `{column}` is {time[at]} at {row(first + at)}; it must be finite"
+            f"{file}: time column `{column}` is {time[at]} at {row(first + at)}; it must be finite, and at "
+            f"most {TIME.most:g} s"
         )
     steps = np.diff(time)
     wrong = np.flatnonzero(steps <= 0)

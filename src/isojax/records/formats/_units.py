@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import pint
 
+from .._physical_limits import Limits
+
 STANDARD_GRAVITY = 9.80665
 """Of 1 g [m/s^2]."""
 
@@ -23,7 +25,20 @@ SI_UNITS = {
 """What a channel of a vibration test measures."""
 
 _LONGEST = 24
-"""Letters beyond which a text is no unit."""
+"""Letters beyond which a text in a heading is no unit."""
+
+_LONGEST_DECLARED = 64
+"""Letters beyond which a declared text is none."""
+
+_NAME = r"(?:[^\W\d]|[%°])+\.?(?:(?:\*\*|\^)?[-+]?\d(?![\d.])|⁻?[¹²³⁴])?"
+_TIMES = "[*/· ]"
+_PRODUCT = rf"(?:{_NAME}|1)(?:{_TIMES}(?:{_NAME}|1))*"
+_FACTOR = rf"(?:\({_PRODUCT}\)|{_NAME}|1)"
+_UNIT = re.compile(rf"{_FACTOR}(?:{_TIMES}{_FACTOR})*")
+"""Names with powers of one digit, multiplied and divided, and products of them in brackets."""
+
+_FACTORS = Limits(1e-15, 1e15)
+"""Of a unit that a channel may have, in SI units."""
 
 
 class ChannelUnit(NamedTuple):
@@ -55,9 +70,15 @@ def one_of(unit: str) -> Any:
     Raises:
         ValueError: If it is no unit.
     """
-    spelled = re.sub(r"(?<=[A-Za-zµμ])(\d)(?=$|[/*· ])", r"^\1", unit.strip().replace("·", "*"))
+    unit = re.sub(r" ?([*/·()]) ?", r"\1", " ".join(unit[: _LONGEST_DECLARED + 1].split()))
+    if len(unit) > _LONGEST_DECLARED or _UNIT.fullmatch(unit) is None:
+        raise ValueError(f'"{unit:.{_LONGEST_DECLARED}}" is not a unit')
+    spelled = re.sub(r"(?<=[A-Za-zµμ])(\d)(?=$|[/*· ])", r"^\1", unit.replace("·", "*"))
     try:
-        return _registry().Quantity(1.0, _registry().parse_units(spelled))
+        one = _registry().Quantity(1.0, _registry().parse_units(spelled))
+        if not _FACTORS.hold(float(one.to_root_units().magnitude)):
+            raise ValueError("too large or too small, or counted from another zero")
+        return one
     except Exception as error:  # pint raises a dozen kinds on text that is no unit; all mean the same here
         raise ValueError(f'"{unit}" is not a unit') from error
 

@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from .._wording import listing
+from ._limits import check_count, check_demand
 from ._samples import Column, as_samples, find_channel, missing_extra
-from ._unreadable import unreadable
 
 _TIME_RESPONSE = (0, 1)  # function type "general" and "time response"
 _TIME_AXES = (0, 1, 17)  # abscissa "unknown", "general" and "time"; 18 is frequency
+
+
+_BYTE, _LINE = 16, 150
+"""Bytes of memory that a byte and a line of the file take."""
 
 
 def read_universal_columns(file: Path, names: Sequence[str] | None) -> dict[str, Column]:
@@ -46,7 +50,9 @@ def _time_histories(file: Path) -> list[dict[str, Any]]:
         import pyuff
     except ImportError as error:
         raise missing_extra(file, "pyuff", "universal files") from error
+    check_demand(file, _BYTE * file.stat().st_size)
     raw = file.read_bytes()
+    check_demand(file, _BYTE * len(raw) + _LINE * (raw.count(b"\n") + raw.count(b"\r")), text=len(raw))
     if not raw.strip():
         raise ValueError(f"{file} is empty; expected a universal file with datasets 58")
     stray = re.search(rb"\r\r\n|\r(?!\n)", raw) is not None and b"58b" not in raw[: 1 << 16]
@@ -55,12 +61,10 @@ def _time_histories(file: Path) -> list[dict[str, Any]]:
         if stray:
             source = Path(folder) / "clean.uff"
             source.write_bytes(re.sub(rb"\r+\n?", b"\n", raw))
-        try:
-            universal = pyuff.UFF(str(source))
-            types = [int(one) for one in universal.get_set_types()]
-            sets = [universal.read_sets(i) for i, one in enumerate(types) if one == 58]
-        except Exception as error:  # pyuff raises bare Exceptions
-            raise unreadable(file, "a universal file", error) from error
+        universal = pyuff.UFF(str(source))
+        types = [int(one) for one in universal.get_set_types()]
+        check_count(file, len(types))
+        sets = [universal.read_sets(i) for i, one in enumerate(types) if one == 58]
     if not types:
         raise ValueError(f"{file} holds no dataset; expected a universal file with datasets 58")
     found = [one for one in sets if isinstance(one, dict)]

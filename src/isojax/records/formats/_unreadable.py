@@ -1,5 +1,6 @@
 """The error for a file whose bytes are not those of its format."""
 
+import os
 import re
 from pathlib import Path
 
@@ -32,11 +33,14 @@ def unreadable(file: Path, what: str, error: BaseException) -> ValueError:
     try:
         with file.open("rb") as handle:
             head = handle.read(32)
-    except OSError as refused:
-        return ValueError(f"{file} cannot be read: {refused.strerror}")
+    except (OSError, ValueError) as refused:
+        if os.path.exists(file):
+            return ValueError(f"{file} cannot be read: {getattr(refused, 'strerror', refused)}")
+        head = b""  # data in memory, or a file that is gone
     seen = next((name for mark, name in _MARKS.items() if head.startswith(mark)), None)
-    cause = "it is cut short or damaged"
+    cause = "it is cut short or damaged" if head else "it is of another form"
     if seen is not None and file.suffix.lower() not in seen:
         cause = f"it has the wrong ending, since it begins as {seen}"
-    said = " ".join(re.sub("<[^>]* at 0x[^>]*>", "...", str(error)).split())[:_SAID] or type(error).__name__
+    words = str(getattr(error, "strerror", None) or error)  # of an OSError without its number
+    said = " ".join(re.sub("<[^>]* at 0x[^>]*>", "...", words).split())[:_SAID] or type(error).__name__
     return ValueError(f"{file} cannot be read as {what}. Likely cause: {cause} (the reader says: {said})")

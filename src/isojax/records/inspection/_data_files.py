@@ -1,9 +1,10 @@
 """Which of the files that a person names are records, and which are schedules of stepped sines."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..formats import read_table, split_heading
+from ..formats import door, read_table, split_heading
 from ..reading import READERS, find_reader
 from ..reading import SCHEDULE_HEADINGS as _SCHEDULE
 
@@ -26,7 +27,7 @@ def find_data_files(paths: Sequence[str | Path]) -> tuple[list[Path], dict[Path,
     files: list[Path] = []
     for path in map(Path, paths):
         found = [path]
-        if path.is_dir():
+        if os.path.isdir(path):
             found = sorted(one for one in path.iterdir() if one.is_file() and one.suffix.lower() in READERS)
         for file in found:
             find_reader(file)
@@ -47,7 +48,8 @@ def _is_schedule(file: Path) -> bool:
     if file.suffix.lower() != ".csv":
         return False
     try:
-        headings = [split_heading(one)[0] for one in read_table(file).headings]
+        with door(file, "a table"):
+            headings = [split_heading(one)[0] for one in read_table(file).headings]
     except ValueError:
         return False
     return set(_SCHEDULE) <= set(headings)

@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from ..._show import shown
 from .._record import Direction, Dwell, ExcitationKind
-from ..formats import Column, channel_unit, columns_of, split_heading, time_jitter, uniform_rate
-from ..reading import RATE_TOLERANCE, detect_kind, find_reader
+from ..formats import Column, channel_unit, split_heading, time_jitter, uniform_rate
+from ..reading import RATE_TOLERANCE, detect_kind, find_reader, given_columns
 from ..spectrum import ringing_frequency
 from ._channel import ChannelInspection, inspect_channel
 from ._guess import drive_and_response, guess_quantity, is_time
@@ -99,7 +99,7 @@ def inspect_file(file: str | Path, rate: float | None = None, data: Any = None) 
         (500.0, 'F [N]', 'a [g]', 'stepped_sine')
     """
     path = Path(file)
-    columns = find_reader(path)(path, None) if data is None else columns_of(data, path, None)
+    columns = find_reader(path)(path, None) if data is None else given_columns(path, None, data)
     sizes = [one.samples.size for one in columns.values() if one.samples.size >= _FEWEST_ROWS]
     if not sizes:
         raise ValueError(f"{path} holds no channel; expected columns of at least {_FEWEST_ROWS} numbers")

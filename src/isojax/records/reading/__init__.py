@@ -10,6 +10,7 @@ records. Read `_declaration.py` first, then `_read_measurements.py`. It uses `_r
 from ._channel_units import si_factor as si_factor
 from ._data_file import READERS as READERS
 from ._data_file import find_reader as find_reader
+from ._data_file import given_columns as given_columns
 from ._declaration import Declaration as Declaration
 from ._declaration import read_declaration as read_declaration
 from ._excitation_kind import detect_kind as detect_kind

@@ -46,7 +46,7 @@ def si_factor(unit: str, quantity: str, where: str) -> float:
     try:
         one = one_of(unit)
     except ValueError as error:
-        raise ValueError(f'{where} = "{unit}" is not a unit; {expected}') from error
+        raise ValueError(f'{where} = "{unit:.80}" is not a unit; {expected}') from error
     if quantity == "command":
         return float(one.to_root_units().magnitude) if not one.check("[electric_potential]") else _volts(one)
     if one.check("[electric_potential]") and quantity != "time":

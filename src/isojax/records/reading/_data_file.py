@@ -1,14 +1,18 @@
 """The reader of each file ending, and channels aligned to one time base."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from .._physical_limits import RATE, TIME
 from .._wording import nearest
 from ..formats import (
     Column,
     columns_of,
+    door,
+    file_size,
     read_hdf5_columns,
     read_lvm_columns,
     read_mat_columns,
@@ -20,23 +24,56 @@ from ..formats import (
     read_universal_columns,
 )
 
-READERS: Mapping[str, Callable[[Path, Sequence[str] | None], dict[str, Column]]] = {
-    ".csv": read_text_columns,
-    ".txt": read_text_columns,
-    ".dat": read_text_columns,
-    ".tsv": read_text_columns,
-    ".lvm": read_lvm_columns,
-    ".xlsx": read_sheet_columns,
-    ".xls": read_sheet_columns,
-    ".ods": read_sheet_columns,
-    ".parquet": read_parquet_columns,
-    ".npz": read_npz_columns,
-    ".mat": read_mat_columns,
-    ".h5": read_hdf5_columns,
-    ".hdf5": read_hdf5_columns,
-    ".uff": read_universal_columns,
-    ".unv": read_universal_columns,
-    ".tdms": read_tdms_columns,
+
+@dataclass(frozen=True)
+class Reader:
+    """What reads the files of an ending, behind the door that every file passes.
+
+    Attributes:
+        read: Gives the named columns of a file; None for all that hold numbers.
+        what: What such a file is, in words.
+    """
+
+    read: Callable[[Path, Sequence[str] | None], dict[str, Column]]
+    what: str
+
+    def __call__(self, file: Path, names: Sequence[str] | None) -> dict[str, Column]:
+        """Gives the named columns of a file.
+
+        Raises:
+            ValueError: If it is missing, empty, no file on a disk, asks for too much, is broken, or lacks a
+                column; no other exception leaves it.
+        """
+        with door(file, self.what):
+            size = file_size(file)
+            if size is None:
+                raise ValueError(f"{file} does not exist; expected a data file")
+            if size == 0:
+                raise ValueError(f"{file} is empty (0 bytes); expected {self.what}")
+            return _possible(file, self.read(file, names))
+
+
+_TEXT = Reader(read_text_columns, "a table of text")
+_SHEET = Reader(read_sheet_columns, "a spreadsheet")
+_HDF5 = Reader(read_hdf5_columns, "HDF5")
+_UNIVERSAL = Reader(read_universal_columns, "a universal file")
+READERS: Mapping[str, Reader] = {
+    ".csv": _TEXT,
+    ".txt": _TEXT,
+    ".dat": _TEXT,
+    ".tsv": _TEXT,
+    ".lvm": Reader(read_lvm_columns, "a LabVIEW measurement file"),
+    ".xlsx": _SHEET,
+    ".xls": _SHEET,
+    ".ods": _SHEET,
+    ".parquet": Reader(read_parquet_columns, "a Parquet file"),
+    ".npz": Reader(read_npz_columns, "a NumPy .npz archive"),
+    ".mat": Reader(read_mat_columns, "a MATLAB .mat file"),
+    ".h5": _HDF5,
+    ".hdf5": _HDF5,
+    ".uff": _UNIVERSAL,
+    ".unv": _UNIVERSAL,
+    ".tdms": Reader(read_tdms_columns, "TDMS"),
 }
 
 _RATE_MATCH = 1e-6
@@ -63,31 +100,43 @@ def read_columns(file: Path, names: Sequence[str], data: Any = None) -> dict[str
         ValueError: If the file is missing, empty or broken, its ending unknown, a column missing or no list
             of numbers, or if the columns differ in length, rate or (by a fraction of a sample) in start.
     """
-    if data is not None:
-        return _aligned(file, columns_of(data, file, names))
-    reader = find_reader(file)
-    if file.stat().st_size == 0:
-        raise ValueError(f"{file} is empty (0 bytes); expected the columns {', '.join(names)}")
-    return _aligned(file, reader(file, names))
+    return _aligned(
+        file, find_reader(file)(file, names) if data is None else given_columns(file, names, data)
+    )
 
 
-def find_reader(file: Path) -> Callable[[Path, Sequence[str] | None], dict[str, Column]]:
+def given_columns(file: Path, names: Sequence[str] | None, data: Any) -> dict[str, Column]:
+    """Gives the named columns of data in memory, None for all, behind the door of a file."""
+    with door(file, "data in memory"):
+        return _possible(file, columns_of(data, file, names))
+
+
+def find_reader(file: Path) -> Reader:
     """Gives what reads a file, by its ending.
 
     Raises:
         ValueError: If the file is missing, or its ending unknown.
     """
-    if file.is_dir():
-        raise ValueError(f"{file} is a folder; a record must be one file, ending in {', '.join(READERS)}")
-    if not file.is_file():
-        near = nearest(file.name, [one.name for one in file.parent.glob("*")] if file.parent.is_dir() else [])
-        raise ValueError(f"{file} does not exist; expected a data file{near}")
+    if file_size(file) is None:
+        siblings = [one.name for one in file.parent.glob("*")] if os.path.isdir(file.parent) else []
+        raise ValueError(f"{file} does not exist; expected a data file{nearest(file.name, siblings)}")
     reader = READERS.get(file.suffix.lower())
     if reader is None:
         raise ValueError(
             f'{file} has the unknown ending "{file.suffix}"; expected one of {", ".join(READERS)}'
         )
     return reader
+
+
+def _possible(file: Path, columns: dict[str, Column]) -> dict[str, Column]:
+    for name, column in columns.items():
+        rate, start = column.rate, abs(column.start or 0.0)
+        for what, found, limits in (("rate", rate, RATE), ("start time", start, TIME)):
+            if found is not None and not limits.hold(found):
+                raise ValueError(
+                    f"{file}: channel `{name}` states a {what} of {found:g}; expected one {limits.words}"
+                )
+    return columns
 
 
 def _aligned(file: Path, columns: dict[str, Column]) -> dict[str, Column]:

@@ -1,6 +1,6 @@
 """campaign.toml as declared: each section and field with its type, checked before a data file is opened."""
 
-import math
+import os
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,8 +12,10 @@ import numpy as np
 from ..._quantities import CONDITIONS
 from ..._show import shown
 from .._campaign import RELATIVE_ERROR, Hold, InputQuantity, OutputQuantity
+from .._physical_limits import COUNT, GAIN, MASS, ORDER, RATE, SHARE, SIZE, Limits
 from .._record import Direction, ExcitationKind, Role
-from .._wording import listing, nearest
+from .._wording import listing, nearest, written
+from ..formats import LONGEST_NAME, door, file_size
 
 # Why no validation library: this declaration was also written for pydantic 2 and tried with msgspec. pydantic
 # reports field and value, but not in words what a missing or wrong field must be, and orders its errors
@@ -33,25 +35,22 @@ class Field:
     convert: Callable[[Any], Any] = lambda value: value
 
 
-def _is_number(value: Any) -> bool:
-    whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**63
-    return whole or (isinstance(value, float) and math.isfinite(value))
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+def _is_number(value: Any, limits: Limits) -> bool:
+    known = isinstance(value, int | float) and not isinstance(value, bool)
+    return known and limits.hold(abs(value))
 
 
 def _is_text(value: Any) -> bool:
-    return isinstance(value, str) and bool(value.strip())
+    return isinstance(value, str) and bool(value.strip()) and len(value) <= LONGEST_NAME
 
 
 def _is_names(value: Any) -> bool:
-    return isinstance(value, list) and all(_is_text(one) for one in value) and len(set(value)) == len(value)
+    held = isinstance(value, list) and len(value) <= LONGEST_NAME and all(_is_text(one) for one in value)
+    return held and len(set(value)) == len(value)
 
 
 def _text(required: bool = False) -> Field:
-    return Field("a text that is not empty", _is_text, required)
+    return Field(f"a text that is not empty, of at most {LONGEST_NAME} letters", _is_text, required)
 
 
 def _is_file(value: Any) -> bool:
@@ -59,31 +58,37 @@ def _is_file(value: Any) -> bool:
 
 
 def _file(required: bool = False) -> Field:
-    return Field('the name of a file, such as "run1.csv"', _is_file, required)
+    words = f'the name of a file, such as "run1.csv", of at most {LONGEST_NAME} letters'
+    return Field(words, _is_file, required)
 
 
 def _choice(*choices: str, required: bool = False, default: str | None = None) -> Field:
     words = "one of " + ", ".join(f'"{choice}"' for choice in choices)
-    return Field(words, lambda value: value in choices, required, default, choices)
+    accepts = lambda value: isinstance(value, str) and value in choices  # noqa: E731
+    return Field(words, accepts, required, default, choices)
 
 
-def _number(default: float | None = None) -> Field:
-    return Field("a finite number", _is_number, default=default, convert=float)
+def _number() -> Field:
+    accepts = lambda value: _is_number(value, Limits(0.0, SIZE.most))  # noqa: E731
+    return Field(f"a finite number, at most {SIZE.most:g}", accepts, convert=float)
 
 
 def _factor() -> Field:
-    accepts = lambda value: _is_number(value) and value != 0  # noqa: E731
-    return Field("a finite number other than 0", accepts, default=1.0, convert=float)
+    accepts = lambda value: _is_number(value, GAIN)  # noqa: E731
+    return Field(f"a finite number other than 0, {GAIN.words}", accepts, default=1.0, convert=float)
 
 
-def _positive(required: bool = False, default: float | None = None) -> Field:
-    accepts = lambda value: _is_number(value) and value > 0  # noqa: E731
-    return Field("a finite number above 0", accepts, required, default, convert=float)
+def _positive(limits: Limits = SIZE, required: bool = False, default: float | None = None) -> Field:
+    accepts = lambda value: _is_number(value, limits) and value > 0  # noqa: E731
+    return Field(f"a finite number above 0, {limits.words}", accepts, required, default, convert=float)
 
 
-def _count(default: int | None = None, at_least: int = 0, required: bool = False) -> Field:
-    accepts = lambda value: _is_count(value) and value >= at_least  # noqa: E731
-    return Field(f"a whole number, at least {at_least}", accepts, required, default)
+def _count(
+    default: int | None = None, least: int = 0, most: float = COUNT.most, required: bool = False
+) -> Field:
+    accepts = lambda value: isinstance(value, int) and _is_number(value, COUNT) and least <= value <= most  # noqa: E731
+    ceiling = "" if most == COUNT.most else f" and at most {most:g}"
+    return Field(f"a whole number, at least {least}{ceiling}", accepts, required, default)
 
 
 def _flag(default: bool = False) -> Field:
@@ -95,7 +100,7 @@ def _names(default: tuple[str, ...]) -> Field:
 
 
 SECTIONS: Mapping[str, Mapping[str, Field]] = {
-    "campaign": {"title": _text(), "mass": _positive(required=True), "mass_free": _flag()},
+    "campaign": {"title": _text(), "mass": _positive(MASS, required=True), "mass_free": _flag()},
     "input": {
         "quantity": _choice(*get_args(InputQuantity), required=True),
         "column": _text(required=True),
@@ -104,7 +109,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "gain_free": _flag(),
         "offset_free": _flag(),
         "hold": _choice(*get_args(Hold), default="band_limited"),
-        "moving_mass": _positive(),
+        "moving_mass": _positive(MASS),
         "remove_spikes": _flag(),
     },
     "output": {
@@ -113,7 +118,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "unit": _text(),
         "offset_free": _flag(),
         "noise": _positive(),
-        "relative_error": _positive(default=RELATIVE_ERROR),
+        "relative_error": _positive(SHARE, default=RELATIVE_ERROR),
         "remove_spikes": _flag(),
     },
     "floor": {
@@ -122,11 +127,11 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "unit": _text(),
         "gain": _factor(),
     },
-    "sampling": {"rate": _positive(), "time": _text(), "unit": _text(), "resample": _flag()},
+    "sampling": {"rate": _positive(RATE), "time": _text(), "unit": _text(), "resample": _flag()},
     "filter": {
         "kind": _choice("butterworth", default="butterworth"),
-        "order": _count(at_least=1, required=True),
-        "cutoff_hz": _positive(required=True),
+        "order": _count(least=int(ORDER.least), most=ORDER.most, required=True),
+        "cutoff_hz": _positive(RATE, required=True),
         "applied": _flag(default=True),
         "compensate": _flag(),
     },
@@ -139,8 +144,8 @@ RECORD: Mapping[str, Field] = {
     "direction": _choice(*get_args(Direction), default="none"),
     "repeat": _count(),
     "start": _count(default=0),
-    "stop": _count(at_least=1),
-    "period": _count(at_least=2),
+    "stop": _count(least=1),
+    "period": _count(least=2),
     "settle": _count(default=0),
     "schedule": _file(),
     "kind": _choice(*get_args(ExcitationKind)),
@@ -150,6 +155,15 @@ _REQUIRED_SECTIONS = ("campaign", "input", "output")
 _ABSENT_SECTIONS = ("floor", "filter")
 """Sections that are None where the file has none; of the others every field is then at its default."""
 
+
+_MOST_RECORDS = 1000
+"""Of a campaign: each is compared with each, whether they share samples."""
+
+_MOST_BYTES = 2**20
+"""Of a campaign.toml: a kilobyte a record."""
+
+_MOST_POINTS = 100
+"""In a line of it: each part of a dotted key is looked up with all before it."""
 
 _IN_MEMORY = "declaration"
 """Called so in errors where it is no file."""
@@ -196,14 +210,14 @@ def read_declaration(
             belong; if `data` lacks a record.
     """
     if isinstance(source, Mapping):
-        file, table = Path(_IN_MEMORY), _plain(source)
+        file = Path(_IN_MEMORY)
+        with door(file, "a declaration of a campaign"):
+            table = _plain(source)
+    elif not isinstance(source, str | os.PathLike):
+        raise ValueError(f"Argument `source` must be a path or a mapping, but is {type(source).__name__}.")
     else:
         file = Path(source)
-        file = file / "campaign.toml" if file.is_dir() else file
-        if not file.is_file():
-            raise ValueError(
-                f"{file} does not exist; expected a campaign .toml, or a folder with a campaign.toml"
-            )
+        file = file / "campaign.toml" if os.path.isdir(file) else file
         table = _parse(file)
     _check_names(file, "the file", table, (*SECTIONS, "record"), "section")
     sections: dict[str, Any] = {}
@@ -220,12 +234,18 @@ def read_declaration(
     entries = table.get("record", [])
     if not isinstance(entries, list):
         raise ValueError(f"{file}: [record] must be a list of tables; write [[record]] above each record")
+    if len(entries) > _MOST_RECORDS:
+        raise ValueError(f"{file}: {len(entries)} [[record]] are listed; expected at most {_MOST_RECORDS}")
     if not entries:
         raise ValueError(f'{file}: no [[record]] is listed; at least one with role = "fit" is needed')
     records = tuple(
         _checked(file, f"[[record]] number {i + 1}", one, RECORD) for i, one in enumerate(entries)
     )
     _check_together(file, sections, records)
+    if not (data is None or isinstance(data, Mapping)):
+        raise ValueError(
+            f"Argument `data` must give data by the `file` of a record, but is {type(data).__name__}."
+        )
     for number, record in enumerate(records if data is not None else (), start=1):
         if record["file"] not in (data or {}):
             raise ValueError(
@@ -238,37 +258,53 @@ def read_declaration(
 def _plain(value: Any) -> Any:
     """Gives mappings, sequences and NumPy numbers as a TOML file would hold them, without fields of None."""
     if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items() if one is not None}
+        return {str(name): _plain(one) for name, one in value.items() if one is not None}
     if isinstance(value, list | tuple):
         return [_plain(one) for one in value]
     return value.item() if isinstance(value, np.generic) else value
 
 
 def _parse(file: Path) -> dict[str, Any]:
-    try:
-        text = file.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{file} is not UTF-8 text (byte {error.start}); a TOML file must be") from error
-    if not text.strip():
-        raise ValueError(f"{file} is empty; expected sections [campaign], [input], [output] and [[record]]")
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{file} is not valid TOML: {error}") from error
+    size = file_size(file)
+    if size is None:
+        raise ValueError(
+            f"{file} does not exist; expected a campaign .toml, or a folder with a campaign.toml"
+        )
+    if size > _MOST_BYTES:
+        raise ValueError(f"{file} has {size} bytes; expected a campaign .toml of at most {_MOST_BYTES}")
+    with door(file, "a campaign .toml"):
+        try:
+            text = file.read_bytes().decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise ValueError(f"{file} is not UTF-8 text (byte {error.start}); a TOML file must be") from error
+        if not text.strip():
+            raise ValueError(
+                f"{file} is empty; expected sections [campaign], [input], [output] and [[record]]"
+            )
+        for number, line in enumerate(text.splitlines(), start=1):
+            if line.count(".") > _MOST_POINTS:
+                raise ValueError(
+                    f"{file}: line {number} has more than {_MOST_POINTS} points; expected a field"
+                )
+        try:
+            return tomllib.loads(text)
+        except (ValueError, RecursionError) as error:
+            said = "brackets within brackets, too deep" if isinstance(error, RecursionError) else error
+            raise ValueError(f"{file} is not valid TOML: {said}") from error
 
 
 def _check_names(file: Path, where: str, table: Mapping[str, Any], known: tuple[str, ...], what: str) -> None:
     for name in table:
         if name not in known:
             raise ValueError(
-                f"{file}: {where} has an unknown {what} `{name}`{nearest(name, known)} Known: "
+                f"{file}: {where} has an unknown {what} `{name:.80}`{nearest(name, known)} Known: "
                 f"{listing(known)}"
             )
 
 
 def _checked(file: Path, where: str, table: Any, fields: Mapping[str, Field]) -> dict[str, Any]:
     if not isinstance(table, dict):
-        found = "a list of tables" if isinstance(table, list) else f"{table!r}"
+        found = "a list of tables" if isinstance(table, list) else written(table)
         raise ValueError(f"{file}: {where} must be one table of fields, but is {found}")
     _check_names(file, where, table, tuple(fields), "field")
     values: dict[str, Any] = {}
@@ -281,7 +317,7 @@ def _checked(file: Path, where: str, table: Any, fields: Mapping[str, Field]) ->
         value = table[name]
         if not field.accepts(value):
             hint = nearest(value, field.choices) if isinstance(value, str) else ""
-            raise ValueError(f"{file}: {where} {name} = {value!r} must be {field.words}{hint}")
+            raise ValueError(f"{file}: {where} {name} = {written(value)} must be {field.words}{hint}")
         values[name] = field.convert(value)
     return values
 

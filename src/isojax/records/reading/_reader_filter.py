@@ -49,12 +49,15 @@ def filter_channels(
         return channels
     run = compensate_butterworth if declared.compensate else zero_phase_butterworth
     shape = channels.rate, declared.order, declared.cutoff_hz
-    channels = replace(
-        channels,
-        input=run(channels.raw_input, *shape),
-        output=run(channels.raw_output, *shape),
-        floor=None if channels.floor is None else run(channels.floor, *shape),
-    )
+    try:
+        channels = replace(
+            channels,
+            input=run(channels.raw_input, *shape),
+            output=run(channels.raw_output, *shape),
+            floor=None if channels.floor is None else run(channels.floor, *shape),
+        )
+    except ValueError as error:
+        raise ValueError(f"{where}: the [filter] cannot be computed. {error}") from error
     return _without_ends(where, entry, unsure_samples(*shape), channels) if declared.compensate else channels
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from .._physical_limits import SIZE
 from .._spikes import without_spikes
 from .._wording import row
 from ..formats import last_digit, time_jitter
@@ -103,7 +104,7 @@ def read_channels(
     for name, column in named.items():
         unit, factor = channel_factor(declared, name, columns[column], file)
         units[name] = unit
-        measured[name] = _finite(file, column, columns[column].samples[start:stop], start) * factor
+        measured[name] = _finite(file, column, columns[column].samples[start:stop], start, factor)
         if sections[name].get("remove_spikes"):
             measured[name], count = without_spikes(measured[name])
             removed += count
@@ -120,7 +121,7 @@ def read_channels(
     stated = next((column.rate for column in columns.values() if column.rate is not None), None)
     rate = find_rate(file, sections["sampling"]["rate"], stated, time, clock, start)
     _check_not_constant(file, named["output"], raw_output)
-    if np.ptp(raw_input) == 0.0 and raw_input[0] != 0.0:
+    if np.any(raw_input):
         _check_not_constant(file, named["input"], raw_input)
     jitter, resampled = (0.0 if time is None else time_jitter(time)), False
     if time is not None and jitter > 0.0 and sections["sampling"]["resample"]:
@@ -164,21 +165,23 @@ def _checked_span(where: str, file: Path, entry: Mapping[str, Any], total: int) 
 
 
 def _finite(
-    file: Path, column: str, samples: Float[np.ndarray, " time"], start: int
+    file: Path, column: str, samples: Float[np.ndarray, " time"], start: int, factor: float
 ) -> Float[np.ndarray, " time"]:
-    wrong = np.flatnonzero(~np.isfinite(samples))
+    """Gives samples in SI, all of a size that can be computed with."""
+    wrong = np.flatnonzero(~(np.abs(samples) <= SIZE.most / abs(factor)))
     if wrong.size:
         at = int(wrong[0])
         more = f" (and at {wrong.size - 1} more)" if wrong.size > 1 else ""
+        size = f", at most {SIZE.most:g} in SI" if np.isfinite(samples[at]) else ""
         raise ValueError(
             f"{file}: column `{column}` is {samples[at]} at {row(start + at)}{more}; every sample must be "
-            "a finite number"
+            f"a finite number{size}"
         )
-    return samples
+    return samples * factor
 
 
 def _check_not_constant(file: Path, column: str, samples: Float[np.ndarray, " time"]) -> None:
-    if np.ptp(samples) == 0.0:
+    if np.ptp(samples) < SIZE.least:
         raise ValueError(
             f"{file}: column `{column}` is constant ({samples[0]:.6g} in SI throughout); expected a "
             "channel that varies"

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from .._physical_limits import RATE, TIME
 from .._record import Dwell
 from .._wording import listing, nearest, row
-from ..formats import read_table, split_heading
+from ..formats import door, file_size, read_table, split_heading
 
 SCHEDULE_HEADINGS = ("start_s", "frequency_hz", "cycles")
 
@@ -22,24 +23,27 @@ def read_schedule(file: Path) -> Float[np.ndarray, "segment 3"]:
         ValueError: If the file or a heading is missing, a value is no number or not possible, or starts do
             not increase; names the row.
     """
-    if not file.is_file():
-        raise ValueError(f"{file} does not exist; it is the schedule of a record")
-    table = read_table(file)
-    present = [split_heading(heading)[0] for heading in table.headings]
-    for heading in SCHEDULE_HEADINGS:
-        if heading not in present:
-            raise ValueError(
-                f"{file}: a schedule needs the headings {listing(SCHEDULE_HEADINGS)}, but `{heading}` "
-                f"is not among {listing(present)}{nearest(heading, present)}"
-            )
-    columns = [table.numbers(present.index(heading)) for heading in SCHEDULE_HEADINGS]
-    rows = np.stack(columns, axis=1).astype(np.float64)
+    with door(file, "a schedule"):
+        if file_size(file) is None:
+            raise ValueError(f"{file} does not exist; it is the schedule of a record")
+        table = read_table(file)
+        present = [split_heading(heading)[0] for heading in table.headings]
+        for heading in SCHEDULE_HEADINGS:
+            if heading not in present:
+                raise ValueError(
+                    f"{file}: a schedule needs the headings {listing(SCHEDULE_HEADINGS)}, but `{heading}` "
+                    f"is not among {listing(present)}{nearest(heading, present)}"
+                )
+        columns = [table.numbers(present.index(heading)) for heading in SCHEDULE_HEADINGS]
+        rows = np.stack(columns, axis=1).astype(np.float64)
     for i, (start, frequency, cycles) in enumerate(rows):
-        if not (np.isfinite(start) and start >= 0):
+        if not TIME.hold(start):
             raise ValueError(f"{file}: start_s = {start:.9g} at {row(i)} must be a number, at least 0")
-        for heading, value in (("frequency_hz", frequency), ("cycles", cycles)):
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{file}: {heading} = {value:.9g} at {row(i)} must be a number above 0")
+        for heading, value, limits in (("frequency_hz", frequency, RATE), ("cycles", cycles, TIME)):
+            if not (limits.hold(value) and value > 0):
+                raise ValueError(
+                    f"{file}: {heading} = {value:.9g} at {row(i)} must be a number above 0, {limits.words}"
+                )
         if i and start <= rows[i - 1, 0]:
             raise ValueError(
                 f"{file}: start_s must increase strictly, but {start:.9g} at {row(i)} follows "

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from .._physical_limits import RATE
 from ..formats import uniform_rate
 
 RATE_TOLERANCE = 1e-3
@@ -48,6 +49,8 @@ def find_rate(
             f'{file}: the sampling rate is not known; give [sampling] rate = ... or time = "column"'
         )
     first_name, chosen = known[0]
+    if not RATE.hold(chosen):
+        raise ValueError(f"{file}: {first_name} says {chosen:.9g} Hz; expected a rate {RATE.words} Hz")
     for name, rate in known[1:]:
         if abs(rate / chosen - 1.0) > RATE_TOLERANCE:
             raise ValueError(

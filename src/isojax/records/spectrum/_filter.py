@@ -31,7 +31,7 @@ def zero_phase_butterworth(
         )
     if order < 1:
         raise ValueError(f"Argument `order` must be at least 1, but is {order}.")
-    sections = scipy.signal.butter(order, cutoff_hz, fs=rate, output="sos")
+    sections = low_pass(order, cutoff_hz, rate)
     if signal.size < 4 * order + 8:
         raise ValueError(
             f"Argument `signal` must have at least {4 * order + 8} samples, but has {signal.size}."
@@ -39,6 +39,28 @@ def zero_phase_butterworth(
     settling = _settling(order, cutoff_hz, rate, signal.size)
     return scipy.signal.sosfiltfilt(sections, signal, padlen=settling)
 
+
+def low_pass(order: int, cutoff_hz: float, rate: float) -> Float[np.ndarray, "section 6"]:
+    """Gives the second-order sections of a digital Butterworth low-pass.
+
+    Raises:
+        ValueError: If rounding spoils it, as its poles crowd at 1 for a low cut-off: the gain must be 1 at 0
+            and 1/sqrt(2) at the cut-off, and every pole lie within the unit circle.
+    """
+    sections = scipy.signal.butter(order, cutoff_hz, fs=rate, output="sos")
+    with np.errstate(all="ignore"):
+        _, gain = scipy.signal.sosfreqz(sections, np.array([0.0, cutoff_hz]), fs=rate)
+    poles = np.abs(np.concatenate([np.roots(one[3:]) for one in sections]))
+    if not np.all(poles < 1.0) or not np.all(np.abs(np.abs(gain) / [1.0, np.sqrt(0.5)] - 1.0) < _EXACT):
+        raise ValueError(
+            f"Argument `cutoff_hz` must be above {cutoff_hz:g} Hz: a filter of order {order} at {rate:g} Hz "
+            "with so low a cut-off cannot be computed."
+        )
+    return sections
+
+
+_EXACT = 1e-3
+"""Relative error of a filter's gain that is accepted."""
 
 LEAST_GAIN = 0.5
 """Gain of a filter below which it is compensated no further: compensation at most doubles the noise."""
@@ -82,7 +104,7 @@ def compensate_butterworth(
         The samples before the filter, (time,), where its gain was above `LEAST_GAIN`; elsewhere only its
         phase is compensated. The first and last `unsure_samples` of them are not reliable.
     """
-    sections = scipy.signal.butter(order, cutoff_hz, fs=rate, output="sos")
+    sections = low_pass(order, cutoff_hz, rate)
     pad = _settling(order, cutoff_hz, rate, signal.size)
     longer = np.pad(signal, pad, mode="reflect", reflect_type="odd")
     # The transform assumes a periodic signal, so a bridge leads from its end back to its start.
