@@ -133,14 +133,17 @@ def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[R
     if best is None:
         return refits
     alike = _look_alikes(best.score.element.name)
-    place = _place(scores, best)
+    place, free = _place(scores, best), _free_effects(best.fit)
     for index, score in enumerate(scores.scores):
         near = score.element.name in alike or abs(best.score.likeness[index]) > rules.likeness
         done = any(_place(scores, one) == index for one in refits)
         few = found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
-        # Where a law leaves nothing but noise one with more coefficients cannot be told from it.
-        simpler = not best.explains or coefficients(found, score) <= len(best.fit.places)
-        if near and few and simpler and not done and index != place and score.admissible:
+        # Where a law leaves nothing but noise one with more coefficients cannot be told from it, unless they
+        # would be one law if what is known beside them were not.
+        pair = best.score.element.name, score.element.name
+        twin = is_exact(*pair, set(CATALOGUE)) and not is_exact(*pair, free)
+        told = not best.explains or twin or coefficients(found, score) <= len(best.fit.places)
+        if near and few and told and not done and index != place and score.admissible:
             refit(score)
     return refits
 
@@ -167,6 +170,11 @@ def _look_alikes(name: str) -> set[str]:
             elif name in alike.others:
                 found.add(kind_name)
     return found - {name}
+
+
+def _free_effects(fit: ErrorFit) -> set[str]:
+    """Give the catalogue names of the effects whose strength is fitted."""
+    return {name for name, kind in CATALOGUE.items() if f"{name}.{kind.strength}" in fit.names}
 
 
 def _gain(found: ErrorFit, refit: Refit) -> float:
@@ -317,8 +325,7 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         fine = refined(fine, sizes)
         whole = fit_with_errors(fine, fit.model, fit.campaign, search)
     name = refit.score.element.name
-    free = set(refit.fit.names)
-    names = {one for one in CATALOGUE if f"{one}.{CATALOGUE[one].strength}" in free}
+    names = _free_effects(fine)
     together = tuple(
         one.score.element.name
         for one in refits
