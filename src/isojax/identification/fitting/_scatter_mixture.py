@@ -277,7 +277,7 @@ def _uncertainty(known: Determined, records: _Records, scatter: float | None) ->
     covariance = known.vectors @ mixture.covariance @ known.vectors.T
     moment = np.einsum("t,tij->ij", mixture.weight, covariance)
     moment += np.einsum("t,ti,tj->ij", mixture.weight, step, step)
-    error = np.sqrt(np.einsum("tii->ti", covariance))
+    error = np.sqrt(np.maximum(np.einsum("tii->ti", covariance), 0.0))  # rounding may leave less than nothing
     width = half_width(mixture.weight, step.T, error.T, CONFIDENCE) / HALF_WIDTH
     scale = width / np.sqrt(np.where(np.diag(moment) > 0.0, np.diag(moment), 1.0))
     law = _merged(mixture.weight, step, covariance).propagated(np.diag(1.0 / known.size))
