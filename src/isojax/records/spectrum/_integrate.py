@@ -49,9 +49,8 @@ def measured_state(
     """Gives displacement, velocity and acceleration estimated from the measured output, whatever it is.
 
     The measured one is returned as it was measured. Integrals lack their mean and all below
-    `lowest_frequency`; derivatives are cut above `highest_frequency`, where they would be noise. A periodic
-    record goes on by its period beyond its ends, another by its mirror image. With base excitation the state
-    is that of the output, i.e. absolute.
+    `lowest_frequency`; derivatives are cut above `highest_frequency`, where they would be noise. With base
+    excitation the state is that of the output, i.e. absolute.
 
     Args:
         record: The record.
@@ -89,7 +88,6 @@ def measured_state(
             order - measured,
             lowest if order < measured else None,
             highest if order > measured else None,
-            record.period,
         )
         for order in (0, 1, 2)
     )
@@ -102,7 +100,6 @@ def shift_order(
     order: int,
     lowest_frequency: float | None,
     highest_frequency: float | None,
-    period: int | None = None,
 ) -> Float[np.ndarray, " time"]:
     """Gives the time derivative (order above 0) or integral (below 0) of a signal within a band.
 
@@ -112,8 +109,6 @@ def shift_order(
         order: Number of differentiations; negative for integrations.
         lowest_frequency: Smooth ramp from a quarter of it up to it [Hz], or None for no lower end.
         highest_frequency: Smooth ramp down from it to 1.25 times it [Hz], or None for no upper end.
-        period: Samples by which the signal repeats, which continue it beyond its ends; else its mirror image
-            does.
 
     Returns:
         (time,).
@@ -123,10 +118,7 @@ def shift_order(
     pad = min(signal.size - 1, int(np.ceil(8.0 * rate / slowest)))
     length = signal.size + 2 * pad
     window = scipy.signal.windows.tukey(length, 1.5 * pad / length)
-    if period is not None and period <= signal.size:
-        extended = _repeated(signal - mean, pad, period) * window
-    else:
-        extended = _mirrored(signal - mean, pad, through=order > 0) * window
+    extended = _mirrored(signal - mean, pad, through=order > 0) * window
     size = int(scipy.fft.next_fast_len(extended.size + pad, real=True) or extended.size + pad)
     frequency = np.fft.rfftfreq(size, 1.0 / rate)
     weight = np.ones_like(frequency)
@@ -139,12 +131,6 @@ def shift_order(
     spectrum[~kept] = 0.0
     spectrum[kept] *= weight[kept] * (2j * np.pi * frequency[kept]) ** order
     return np.fft.irfft(spectrum, size)[pad : pad + signal.size]
-
-
-def _repeated(signal: Float[np.ndarray, " time"], pad: int, period: int) -> Float[np.ndarray, " extended"]:
-    """Gives the signal continued at both ends by the period next to each."""
-    before, after = np.arange(-pad, 0) % period, np.arange(pad) % period
-    return np.concatenate([signal[before], signal, signal[signal.size - period + after]])
 
 
 def _mirrored(signal: Float[np.ndarray, " time"], pad: int, through: bool) -> Float[np.ndarray, " extended"]:
