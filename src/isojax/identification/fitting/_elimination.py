@@ -15,9 +15,6 @@ from ..._show import shown
 from ..jacobian import STIFFNESS_SCALE_UNIT
 from ._covariance import SMALLEST_EIGENVALUE
 
-_PRIOR = 0.01
-"""Information of the prior of an initial state, in its scale: a measured start may be off by several of them."""
-
 _FAST = 1e12
 """Factor on what is known of a state that stays where it is."""
 
@@ -205,7 +202,7 @@ def eliminate(
     heads = None if heads is None else heads / power
     offset, spread = nuisances.states[: owner.size], nuisances.spread
     has_scale = matrices.shape[1] > columns + offset.shape[1] + 1
-    misfits = matrices[:, -1, -1] + (0.0 if heads is not None else _PRIOR * np.sum(offset**2, axis=1))
+    misfits = matrices[:, -1, -1] + (0.0 if heads is not None else np.sum(offset**2, axis=1))
     held = np.zeros(owner.size, bool) if nuisances.held is None else nuisances.held[: owner.size]
     left, states_map, taken = _without_states(matrices, heads, columns + int(has_scale), offset, held)
     eliminated = np.zeros(nuisances.stiffness.size)
@@ -253,22 +250,22 @@ def _without_states(
     segments, states = offset.shape
     keep = np.r_[0:shared, shared + states]
     drop = np.arange(shared, shared + states)
-    # A prior is one more measurement of the deviation.
+    # A prior is one more measurement: deviation 0 +- 1 in the states' scales.
     source = matrices if heads is None else heads
-    inner = source[:, drop[:, None], drop] + _PRIOR * np.eye(states)
+    inner = source[:, drop[:, None], drop] + np.eye(states)
     cross = source[:, drop[:, None], keep].copy()
-    cross[:, :, -1] -= _PRIOR * offset
+    cross[:, :, -1] -= offset
     still = inner.copy()
     still[:, range(states), range(states)] *= np.where(held, _FAST, 1.0)[:, None]
     try:
         states_map = np.linalg.solve(still, cross)
-        taken = states - _PRIOR * np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
+        taken = states - np.trace(np.linalg.inv(inner), axis1=1, axis2=2)
     except np.linalg.LinAlgError:
         # Only a simulation that diverged makes a state's column as large as to drown its own prior.
         states_map, taken = np.full_like(cross, np.nan), np.full(segments, np.nan)
     left = matrices[:, keep[:, None], keep].copy()
     if heads is None:
-        left[:, -1, -1] += _PRIOR * np.sum(offset**2, axis=1)
+        left[:, -1, -1] += np.sum(offset**2, axis=1)
         left -= np.swapaxes(cross, 1, 2) @ states_map
     else:
         mixed = np.swapaxes(matrices[:, drop[:, None], keep], 1, 2) @ states_map
