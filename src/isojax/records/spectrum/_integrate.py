@@ -10,6 +10,9 @@ from .._campaign import TIME_DERIVATIVES, OutputQuantity
 from .._record import Record
 from ._excited_band import excited_band
 
+_SETTLED = 1.2
+"""Change from the first period to the second, over that of the last two, up to which a record repeats."""
+
 
 def integrate_acceleration(
     acceleration: Float[np.ndarray, " time"], rate: float, lowest_frequency: float
@@ -49,8 +52,9 @@ def measured_state(
     """Gives displacement, velocity and acceleration estimated from the measured output, whatever it is.
 
     The measured one is returned as it was measured. Integrals lack their mean and all below
-    `lowest_frequency`; derivatives are cut above `highest_frequency`, where they would be noise. With base
-    excitation the state is that of the output, i.e. absolute.
+    `lowest_frequency`; derivatives are cut above `highest_frequency`, where they would be noise. A periodic
+    record that repeats from its start goes on by its period beyond its ends, another by its mirror image.
+    With base excitation the state is that of the output, i.e. absolute.
 
     Args:
         record: The record.
@@ -88,6 +92,7 @@ def measured_state(
             order - measured,
             lowest if order < measured else None,
             highest if order > measured else None,
+            record.period if _repeats_from_the_start(record) else None,
         )
         for order in (0, 1, 2)
     )
@@ -100,6 +105,7 @@ def shift_order(
     order: int,
     lowest_frequency: float | None,
     highest_frequency: float | None,
+    period: int | None = None,
 ) -> Float[np.ndarray, " time"]:
     """Gives the time derivative (order above 0) or integral (below 0) of a signal within a band.
 
@@ -109,6 +115,8 @@ def shift_order(
         order: Number of differentiations; negative for integrations.
         lowest_frequency: Smooth ramp from a quarter of it up to it [Hz], or None for no lower end.
         highest_frequency: Smooth ramp down from it to 1.25 times it [Hz], or None for no upper end.
+        period: Samples by which the signal repeats, which continue it beyond its ends; else its mirror image
+            does.
 
     Returns:
         (time,).
@@ -118,7 +126,10 @@ def shift_order(
     pad = min(signal.size - 1, int(np.ceil(8.0 * rate / slowest)))
     length = signal.size + 2 * pad
     window = scipy.signal.windows.tukey(length, 1.5 * pad / length)
-    extended = _mirrored(signal - mean, pad, through=order > 0) * window
+    if period is not None and period <= signal.size:
+        extended = _repeated(signal - mean, pad, period) * window
+    else:
+        extended = _mirrored(signal - mean, pad, through=order > 0) * window
     size = int(scipy.fft.next_fast_len(extended.size + pad, real=True) or extended.size + pad)
     frequency = np.fft.rfftfreq(size, 1.0 / rate)
     weight = np.ones_like(frequency)
@@ -131,6 +142,21 @@ def shift_order(
     spectrum[~kept] = 0.0
     spectrum[kept] *= weight[kept] * (2j * np.pi * frequency[kept]) ** order
     return np.fft.irfft(spectrum, size)[pad : pad + signal.size]
+
+
+def _repeats_from_the_start(record: Record) -> bool:
+    """Whether the first two periods differ no more than the last two: nothing rings down at the start."""
+    if record.period is None or record.output.size < 3 * record.period:
+        return False
+    own = record.output[: record.output.size // record.period * record.period].reshape(-1, record.period)
+    changes = np.std(np.diff(own, axis=0), axis=1)
+    return bool(changes[0] <= _SETTLED * changes[-1])
+
+
+def _repeated(signal: Float[np.ndarray, " time"], pad: int, period: int) -> Float[np.ndarray, " extended"]:
+    """Gives the signal continued at both ends by the period next to each."""
+    before, after = np.arange(-pad, 0) % period, np.arange(pad) % period
+    return np.concatenate([signal[before], signal, signal[signal.size - period + after]])
 
 
 def _mirrored(signal: Float[np.ndarray, " time"], pad: int, through: bool) -> Float[np.ndarray, " extended"]:
