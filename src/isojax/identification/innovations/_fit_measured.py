@@ -15,7 +15,7 @@ from ._record_filter import COPIES, RecordFilter, Sizes
 SUBSTEPS = (2, 8, 16)
 """Integration steps a sample that are tried in turn."""
 
-MOST_ROUNDS = 3
+MOST_SEARCHES = 3
 """Searches of full length that end a rough one: large records creep along a valley."""
 
 SMALL = 0.1
@@ -85,7 +85,7 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
         The fit; that of the most steps where none suffice.
     """
     measured = found.filter.measured
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MOST_SEARCHES):
         if is_successful(found.result):
             break
         found = fit_errors(

@@ -6,7 +6,7 @@ from jaxtyping import Float
 _MOST_DIGITS = 9
 """Decimals, or significant digits, of a written number at most; with more it counts as exact."""
 
-_WHOLE = 1e-3
+_NEARLY_WHOLE = 1e-3
 """Distance from a whole number, in units of the last digit, within which a number ends there."""
 
 _FIRST_LOOK = 256
@@ -31,6 +31,6 @@ def _ends(numbers: Float[np.ndarray, " time"], unit: Float[np.ndarray, " time"])
     """Whether every number is a whole multiple of its unit."""
     for part in (slice(_FIRST_LOOK), slice(None)):
         multiple = numbers[part] / unit[part]
-        if np.any(np.abs(multiple - np.round(multiple)) > _WHOLE):
+        if np.any(np.abs(multiple - np.round(multiple)) > _NEARLY_WHOLE):
             return False
     return True

@@ -25,7 +25,7 @@ _SIDE = 128
 _LEAST_STEP, _SURE = 0.1, 6.0
 """A clock step counts above this share of a sampling step, and above so many of its standard errors."""
 
-_ABRUPT = 0.6
+_SUDDEN = 0.6
 """Share of a clock step that a quarter of the samples on either side shows; of a change of rate a quarter."""
 
 _MISSING = 0.25
@@ -125,7 +125,7 @@ def _refuse_clock_step(
         return
     near = max(side // 4, 1)
     beside = float(np.median(about[at : at + near]) - np.median(about[at - near : at]))
-    if beside / jump[at] < _ABRUPT:
+    if beside / jump[at] < _SUDDEN:
         return  # the clock changes its rate
     lost = round(jump[at] / step)
     missing = lost > 0 and abs(jump[at] / step - lost) < _MISSING

@@ -7,7 +7,7 @@ from pathlib import Path
 from ..._languages import as_toml, printable
 from .._campaign import OutputQuantity
 from ..formats import channel_unit, split_heading
-from ..reading import UNEVEN
+from ..reading import MOST_JITTER
 from ._arrangement import Place, arrange
 from ._channel import ChannelInspection
 from ._guess import is_base, is_exciter, is_nameless
@@ -175,7 +175,7 @@ def _sampling_lines(file: FileInspection) -> list[str]:
         lines.append(_field("time", split_heading(file.time)[0], guessed))
         if file.time_unit is not None or guessed:
             lines.append(_field("unit", file.time_unit or "s", guessed and "# guessed"))
-        if file.time_jitter * (file.rate or 0.0) > UNEVEN:
+        if file.time_jitter * (file.rate or 0.0) > MOST_JITTER:
             lines.append("resample = true      # guessed: the samples were taken when their times say")
     elif file.time is not None:
         lines.append(f"# the time column is not used: {printable(file.time_fault)}")

@@ -16,6 +16,6 @@ from ._declaration import read_declaration as read_declaration
 from ._excitation_kind import detect_kind as detect_kind
 from ._find_dwells import segment_dwells as segment_dwells
 from ._read_measurements import read_measurements as read_measurements
-from ._record_channels import UNEVEN as UNEVEN
+from ._record_channels import MOST_JITTER as MOST_JITTER
 from ._schedule import SCHEDULE_HEADINGS as SCHEDULE_HEADINGS
 from ._time_base import RATE_TOLERANCE as RATE_TOLERANCE

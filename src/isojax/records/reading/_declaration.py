@@ -162,7 +162,7 @@ _MOST_RECORDS = 1000
 _MOST_BYTES = 2**20
 """Of a campaign.toml: a kilobyte a record."""
 
-_MOST_POINTS = 100
+_MOST_DOTS = 100
 """In a line of it: each part of a dotted key is looked up with all before it."""
 
 _IN_MEMORY = "declaration"
@@ -282,10 +282,8 @@ def _parse(file: Path) -> dict[str, Any]:
                 f"{file} is empty; expected sections [campaign], [input], [output] and [[record]]"
             )
         for number, line in enumerate(text.splitlines(), start=1):
-            if line.count(".") > _MOST_POINTS:
-                raise ValueError(
-                    f"{file}: line {number} has more than {_MOST_POINTS} points; expected a field"
-                )
+            if line.count(".") > _MOST_DOTS:
+                raise ValueError(f"{file}: line {number} has more than {_MOST_DOTS} points; expected a field")
         try:
             return tomllib.loads(text)
         except (ValueError, RecursionError) as error:

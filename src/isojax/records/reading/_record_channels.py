@@ -22,7 +22,7 @@ from ._time_base import find_rate
 FEWEST_SAMPLES = 16
 """Samples without which a record is refused."""
 
-UNEVEN = 0.02
+MOST_JITTER = 0.02
 """rms by which times may scatter about an even grid, over its step. A sine of ten samples a cycle is then off
 by 1 %, about what a good sensor is."""
 
@@ -129,11 +129,11 @@ def read_channels(
         first, (raw_input, raw_output, *rest) = on_even_grid(time, rate, *present)
         floor, start, resampled = (rest[0] if rest else None), start + first, True
         stop = start + raw_output.size
-    elif jitter * rate > UNEVEN:
+    elif jitter * rate > MOST_JITTER:
         raise ValueError(
             f"{file}: the times of column `{clock}` scatter by {1e3 * jitter:.3g} ms rms about an even grid, "
-            f"{100.0 * jitter * rate:.3g} % of its step; expected at most {100.0 * UNEVEN:.2g} %. If the "
-            "samples were taken at these times, set [sampling] resample = true; if only the time stamps "
+            f"{100.0 * jitter * rate:.3g} % of its step; expected at most {100.0 * MOST_JITTER:.2g} %. If "
+            "the samples were taken at these times, set [sampling] resample = true; if only the time stamps "
             "scatter, give their rate in place of time"
         )
     channels = raw_input, raw_output, raw_input, raw_output, floor

@@ -51,7 +51,7 @@ def low_pass(order: int, cutoff_hz: float, rate: float) -> Float[np.ndarray, "se
     with np.errstate(all="ignore"):
         _, gain = scipy.signal.sosfreqz(sections, np.array([0.0, cutoff_hz]), fs=rate)
     poles = np.abs(np.concatenate([np.roots(one[3:]) for one in sections]))
-    if not np.all(poles < 1.0) or not np.all(np.abs(np.abs(gain) / [1.0, np.sqrt(0.5)] - 1.0) < _EXACT):
+    if not np.all(poles < 1.0) or not np.all(np.abs(np.abs(gain) / [1.0, np.sqrt(0.5)] - 1.0) < _TRUE_GAIN):
         raise ValueError(
             f"Argument `cutoff_hz` must be above {cutoff_hz:g} Hz: a filter of order {order} at {rate:g} Hz "
             "with so low a cut-off cannot be computed."
@@ -59,7 +59,7 @@ def low_pass(order: int, cutoff_hz: float, rate: float) -> Float[np.ndarray, "se
     return sections
 
 
-_EXACT = 1e-3
+_TRUE_GAIN = 1e-3
 """Relative error of a filter's gain that is accepted."""
 
 LEAST_GAIN = 0.5

@@ -10,7 +10,7 @@ from .._campaign import TIME_DERIVATIVES, OutputQuantity
 from .._record import Record
 from ._excited_band import excited_band
 
-_SETTLED = 1.2
+_NO_MORE_THAN_LAST = 1.2
 """Change from the first period to the second, over that of the last two, up to which a record repeats."""
 
 
@@ -150,7 +150,7 @@ def _repeats_from_the_start(record: Record) -> bool:
         return False
     own = record.output[: record.output.size // record.period * record.period].reshape(-1, record.period)
     changes = np.std(np.diff(own, axis=0), axis=1)
-    return bool(changes[0] <= _SETTLED * changes[-1])
+    return bool(changes[0] <= _NO_MORE_THAN_LAST * changes[-1])
 
 
 def _repeated(signal: Float[np.ndarray, " time"], pad: int, period: int) -> Float[np.ndarray, " extended"]:
