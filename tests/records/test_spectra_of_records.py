@@ -243,3 +243,31 @@ def test_the_state_comes_from_whatever_was_measured(quantity: str) -> None:
         error = (values - state[name])[3000:-3000]
         assert np.sqrt(np.mean(error**2)) < 3e-3 * np.std(state[name]), name
     assert found[list(state).index(quantity)] is record.output
+
+
+@pytest.mark.parametrize("start", [0.3, 1.7])
+def test_a_periodic_acceleration_gives_its_first_state_in_the_middle_of_a_motion(start):
+    period, lines = 1000, np.array([3, 5, 8, 13])
+    frequency = 2.0 * np.pi * lines * RATE / period
+    time = np.arange(4 * period) / RATE
+    phases = frequency[:, None] * time + start * lines[:, None] ** 2
+    size = 1.0 / lines[:, None]
+    acceleration = np.sum(-size * frequency[:, None] ** 2 * np.cos(phases), axis=0)
+    record = record_of(acceleration, acceleration)
+    x, v, _ = measured_state(replace(record, kind="periodic", period=period), "acceleration")
+    truth = np.sum(size * np.cos(phases), axis=0)
+    speed = np.sum(-size * frequency[:, None] * np.sin(phases), axis=0)
+    for place in (0, -1):
+        assert abs(x[place] - truth[place]) < 0.02 * np.std(truth)
+        assert abs(v[place] - speed[place]) < 0.02 * np.std(speed)
+
+
+def test_an_acceleration_that_rings_down_at_its_start_is_not_continued_by_its_period():
+    period = 500
+    time = np.arange(6 * period) / RATE
+    steady = np.cos(2.0 * np.pi * 10.0 * time)
+    record = record_of(steady, steady + 5.0 * np.exp(-3.0 * time) * np.sin(2.0 * np.pi * 7.0 * time))
+    declared = replace(record, kind="periodic", period=period)
+    np.testing.assert_array_equal(
+        measured_state(declared, "acceleration")[0], measured_state(record, "acceleration")[0]
+    )

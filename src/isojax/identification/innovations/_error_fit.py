@@ -17,8 +17,8 @@ _NO_FORCE = 0.05
 """Share of the innovations' variance below which the random force does not matter."""
 
 _DETERMINED = 10.0
-"""Information of the logarithm of the random force's variance from which there is a force: chance gives one
-that is as large in one of a thousand records."""
+"""Information of the logarithm of the random force's variance from which there is a force: its variance is
+then known to a third."""
 
 _LAGS = 20
 """Samples back from which an innovation may be foretold."""
@@ -81,43 +81,34 @@ class ErrorFit:
         """Sum of squared innovations over their variances."""
         return float(self.products[-1, -1].sum())
 
-    @property
-    def innovations(self) -> list[Float[np.ndarray, " time"]]:
-        """Innovations of each record over their standard deviations, of the samples that count."""
+    @cached_property
+    def seen(self) -> list[tuple[Float[np.ndarray, " time"], Float[np.ndarray, " time"]]]:
+        """Innovations of each record and their standard deviations, where they count [unit of the output]."""
         prepared, found = self.filter.prepared, {}
         width = prepared.order.size // len(prepared.batches)
         for part, trace in enumerate(self.way.traces):
-            white = np.asarray(trace.error) / np.asarray(trace.deviation)
+            error, deviation = np.asarray(trace.error), np.asarray(trace.deviation)
             for lane in range(width):
-                counted = np.isfinite(np.asarray(trace.deviation)[:, lane])
-                found[int(prepared.order[part * width + lane])] = white[counted, lane]
+                counted = np.isfinite(deviation[:, lane])
+                place = int(prepared.order[part * width + lane])
+                found[place] = error[counted, lane], deviation[counted, lane]
         return [found[place] for place in range(self.filter.count)]
+
+    @property
+    def innovations(self) -> list[Float[np.ndarray, " time"]]:
+        """Innovations of each record over their standard deviations."""
+        return [error / deviation for error, deviation in self.seen]
 
     @property
     def misses(self) -> Float[np.ndarray, " record"]:
         """Rms of the innovations of each record [SI unit of the output]; 0 where no sample counts."""
-        prepared, found = self.filter.prepared, np.zeros(self.filter.prepared.order.size)
-        width = prepared.order.size // len(prepared.batches)
-        for part, trace in enumerate(self.way.traces):
-            counted = np.isfinite(np.asarray(trace.deviation))
-            squares = np.where(counted, np.asarray(trace.error), 0.0) ** 2
-            own = np.sqrt(squares.sum(axis=0) / np.maximum(counted.sum(axis=0), 1))
-            found[prepared.order[part * width : (part + 1) * width]] = own
-        return found[: self.filter.count]
+        return np.array([np.sqrt(np.sum(error**2) / max(error.size, 1)) for error, _ in self.seen])
 
     @cached_property
     def force_share(self) -> float:
         """Share of the innovations' variance that the random force causes, at most over the records."""
-        noise, shares = np.exp(self.sizes.noise), []
-        prepared = self.filter.prepared
-        width = prepared.order.size // len(prepared.batches)
-        for part, trace in enumerate(self.way.traces):
-            deviation = np.asarray(trace.deviation)
-            for lane in range(width):
-                place = int(prepared.order[part * width + lane])
-                own = deviation[:, lane][np.isfinite(deviation[:, lane])]
-                if place < self.filter.count and own.size:
-                    shares.append(1.0 - noise[place] * float(np.mean(own**-2)))
+        pairs = zip(np.exp(self.sizes.noise), self.seen, strict=True)
+        shares = [1.0 - noise * float(np.mean(own**-2)) for noise, (_, own) in pairs if own.size]
         return max(shares, default=0.0)
 
     @cached_property

@@ -9,8 +9,8 @@ Source: Jazwinski 1970, Stochastic Processes and Filtering Theory, sec. 8.3; Kri
 2004, Automatica 40:225 (grey-box models with system noise).
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -175,6 +175,11 @@ def _update(
     return gain, variance, tuple(tuple(upper[min(a, b), max(a, b)] for b in every) for a in every)
 
 
+def _scan_of(model: Isolator) -> Callable[..., Any]:
+    """Give what loops over the samples."""
+    return kernel_scan if model.internal_states <= _IN_A_KERNEL else jax.lax.scan
+
+
 @quick_jit
 def follow_records(
     model: Isolator,
@@ -237,8 +242,7 @@ def follow_records(
     tables = batch.acting, batch.measured, batch.weight, used
     differing = (nothing.size // kept - 1) // 2
     flat = jnp.zeros((differing, kept)), jnp.zeros((differing, differing, kept))
-    scan = kernel_scan if model.internal_states <= _IN_A_KERNEL else jax.lax.scan
-    (_, _, deviance, square, slope, fisher), trace = scan(
+    (_, _, deviance, square, slope, fisher), trace = _scan_of(model)(
         body, (start, begun, nothing, tuple(nothing for _ in every), *flat), tables
     )
     counted = jnp.maximum(batch.weight.sum(axis=0), 1.0)
@@ -313,5 +317,4 @@ def innovation_products(
     tangents = tuple(jnp.zeros((columns, count)) for _ in start)
     empty = jnp.zeros((columns + 1, columns + 1, count))
     tables = batch.acting, batch.measured, trace.gains, trace.deviation
-    scan = kernel_scan if model.internal_states <= _IN_A_KERNEL else jax.lax.scan
-    return scan(body, (begun, tangents, empty), tables)[0][2]
+    return _scan_of(model)(body, (begun, tangents, empty), tables)[0][2]

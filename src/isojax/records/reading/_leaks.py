@@ -13,16 +13,16 @@ from .._record import Record
 _SHARED = 0.5
 """Share of the shorter record that both must cover."""
 
-_AS_LIKE = 1.5
+_OTHER_DIGITS = 1.5
 """Rounding errors, by rms, within which samples are one number with other digits ..."""
 
-_SAME_AS = 0.1
+_SAME_DIGITS = 0.1
 """... and with as many digits: both then come from one number, and are one."""
 
 _DIGITS_ALIKE = 2.0
 """Ratio of rounding errors up to which both are written with as many digits."""
 
-_NO_NOISE_LEFT = 1e-6
+_SINGLE_PRECISION = 1e-6
 """Difference over the rms of a record up to which it is the other, as in single precision."""
 
 
@@ -97,7 +97,9 @@ def _refuse_leak(file: Path, held: _Prepared, fitted: _Prepared) -> None:
     left = float(np.sqrt(np.mean((one - scale * other) ** 2)))
     errors = held.rounding, abs(scale) * fitted.rounding
     same = max(errors) <= _DIGITS_ALIKE * min(errors)
-    if left > max(_NO_NOISE_LEFT * size, (_SAME_AS if same else _AS_LIKE) * float(np.hypot(*errors))):
+    if left > max(
+        _SINGLE_PRECISION * size, (_SAME_DIGITS if same else _OTHER_DIGITS) * float(np.hypot(*errors))
+    ):
         return
     first = held.record.start + held.record.raw_output.size - held.output.size + low
     begin = fitted.record.start + low + lag

@@ -10,7 +10,7 @@ from .._campaign import TIME_DERIVATIVES, OutputQuantity
 from .._record import Record
 from ._excited_band import excited_band
 
-_NO_MORE_THAN_LAST = 1.2
+_AS_STEADY = 1.2
 """Change from the first period to the second, over that of the last two, up to which a record repeats."""
 
 
@@ -116,7 +116,7 @@ def shift_order(
         lowest_frequency: Smooth ramp from a quarter of it up to it [Hz], or None for no lower end.
         highest_frequency: Smooth ramp down from it to 1.25 times it [Hz], or None for no upper end.
         period: Samples by which the signal repeats, which continue it beyond its ends; else its mirror image
-            does.
+            does. At most the length of the signal.
 
     Returns:
         (time,).
@@ -126,10 +126,10 @@ def shift_order(
     pad = min(signal.size - 1, int(np.ceil(8.0 * rate / slowest)))
     length = signal.size + 2 * pad
     window = scipy.signal.windows.tukey(length, 1.5 * pad / length)
-    if period is not None and period <= signal.size:
-        extended = _repeated(signal - mean, pad, period) * window
-    else:
+    if period is None:
         extended = _mirrored(signal - mean, pad, through=order > 0) * window
+    else:
+        extended = _repeated(signal - mean, pad, period) * window
     size = int(scipy.fft.next_fast_len(extended.size + pad, real=True) or extended.size + pad)
     frequency = np.fft.rfftfreq(size, 1.0 / rate)
     weight = np.ones_like(frequency)
@@ -150,7 +150,7 @@ def _repeats_from_the_start(record: Record) -> bool:
         return False
     own = record.output[: record.output.size // record.period * record.period].reshape(-1, record.period)
     changes = np.std(np.diff(own, axis=0), axis=1)
-    return bool(changes[0] <= _NO_MORE_THAN_LAST * changes[-1])
+    return bool(changes[0] <= _AS_STEADY * changes[-1])
 
 
 def _repeated(signal: Float[np.ndarray, " time"], pad: int, period: int) -> Float[np.ndarray, " extended"]:
