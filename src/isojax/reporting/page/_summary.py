@@ -69,7 +69,7 @@ class PlainGroup(Group):
 def new_table(title: str, *columns: str) -> Table:
     """Give a table without rows; its title and headings are shown letter by letter."""
     table = PlainTable(
-        title=as_rich(title), title_justify="left", title_style="bold", header_style="dim", box=SIMPLE_HEAD
+        title=as_rich(title, "bold"), title_justify="left", header_style="dim", box=SIMPLE_HEAD
     )
     for place, column in enumerate(columns):
         table.add_column(as_rich(column), justify="right" if place else "left", no_wrap=place == 0)
