@@ -32,9 +32,6 @@ _SMALLER = 4.0
 _MOST_FOLDS = 4
 """Parts of the records of which each is left out in turn, at most."""
 
-_ROUGH_STEPS = 16
-"""Steps of a refit that is only ranked."""
-
 
 class Score(NamedTuple):
     """What the innovations say of an absent effect, before any refit.
@@ -209,7 +206,8 @@ def refit_effect(
         fit.filter.measured,
         sizes,
         starts,
-        _ROUGH_STEPS,
+        steps=fit.filter.steps,
+        rough=True,
     )
     if begin is not None:
         # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
@@ -270,7 +268,7 @@ def transfer(fit: ErrorFit, found: ErrorFit, search: Search) -> Transfer:
                 magnitudes(one.model, one.places, search.scales),
                 one.sizes,
                 judged=1.0 - unseen,
-                most_steps=12,
+                rough=True,
                 starts=(one.values,),
                 loudest=fit.filter.measured.loudest,
             )

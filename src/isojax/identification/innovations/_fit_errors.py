@@ -13,11 +13,14 @@ from ..._types import on_device
 from ._error_fit import ErrorFit
 from ._record_filter import COPIES, FURTHEST, RecordFilter, Sizes, Way, physical
 
-MOST_SCORINGS = 40
+_MOST_SCORINGS = 40
 """Steps of a search at most."""
 
-SETTLED_DEVIANCE = 0.05
-"""Decrease of the deviance of a step below which a search is over."""
+_SETTLED_DEVIANCE = 0.05
+"""Change of the deviance by a step below which a search is over."""
+
+_MOST_ROUGH_SCORINGS, _ROUGH_DEVIANCE = 16, 0.5
+"""The same of a search whose end is only ranked: far below what tells two laws apart."""
 
 _TRIED = np.array([1e-3, 0.03, 1.0, 30.0])
 """Marquardt's dampings that a step tries side by side, over that of the last step."""
@@ -31,7 +34,7 @@ _FAR = 3.0
 _LEAST_FORCE = 1e-5
 """Random force below which there is none [rms of the drive, or of the inertia where nothing drives]."""
 
-_LEAST_NOISE = 1e-4
+_LEAST_NOISE = 1e-6
 """Noise below which the output has none but rounding and the error of the steps [rms of the output]."""
 
 _ASTRAY = 10.0
@@ -82,7 +85,7 @@ def fit_errors(
     sizes: Sizes,
     *,
     loudest: Float[np.ndarray, " record"],
-    most_steps: int = MOST_SCORINGS,
+    rough: bool = False,
     starts: Sequence[Float[np.ndarray, " column"]] = (),
     judged: Float[np.ndarray, " record"] | None = None,
 ) -> ErrorFit:
@@ -99,7 +102,7 @@ def fit_errors(
         magnitudes: of each.
         sizes: to start from.
         loudest: variance above which the noise of each record cannot be, log [squared SI unit of the output].
-        most_steps: at most.
+        rough: whether the fit is only ranked among others.
         starts: other values of the coefficients, of which the best is taken.
         judged: 1 for the records that are fitted, 0 for those that take no part; all if omitted.
 
@@ -125,6 +128,10 @@ def fit_errors(
 
     longest = _LONGEST_MEMORY if record_filter.feeds_through else least.memory
     bounds = least, Sizes(np.inf, longest, np.maximum(loudest, least.noise))
+    sizes = sizes.within(bounds)
+    most, settled_at = (
+        (_MOST_ROUGH_SCORINGS, _ROUGH_DEVIANCE) if rough else (_MOST_SCORINGS, _SETTLED_DEVIANCE)
+    )
 
     def points(frees: Sequence[np.ndarray]) -> Float[np.ndarray, "copy column"]:
         return np.array([physical(free, specs, scales)[0] for free in frees])
@@ -141,7 +148,7 @@ def fit_errors(
         free = frees[int(np.argmin(deviances[: len(frees)]))]
     last, before, trust, alone = np.inf, sizes, FURTHEST, False
     result: Any = RESULTS.not_converged
-    for step in range(1, most_steps + 1):
+    for step in range(1, most + 1):
         way = followed([free] * COPIES, sizes.around())
         if step == 1 and not over(way.deviance[0]) < _ASTRAY * record_filter.samples:
             record_filter.seek_starts(places, points([free])[0], sizes)
@@ -166,7 +173,7 @@ def fit_errors(
             free, damping = free + tried[best], float(np.clip(damping * _TRIED[best], 1e-9, 1e9))
         else:
             damping = min(1e9, 1e3 * damping)
-        if deviance > last + SETTLED_DEVIANCE:  # the last step of the sizes went too far
+        if deviance > last + settled_at:  # the last step of the sizes went too far
             trust *= 0.25
             new = Sizes(
                 before.force + 0.25 * (sizes.force - before.force),
@@ -176,8 +183,8 @@ def fit_errors(
         else:
             trust, before, new = min(2.0 * trust, FURTHEST), sizes, sizes.moved(way, part, bounds, trust)
 
-        settled = step > 2 and abs(last - deviance) < SETTLED_DEVIANCE and gain < SETTLED_DEVIANCE
-        if settled and (promised < SETTLED_DEVIANCE or damping >= 1e6):
+        settled = step > 2 and abs(last - deviance) < settled_at and gain < settled_at
+        if settled and (promised < settled_at or damping >= 1e6):
             if record_filter.feeds_through and not alone and sizes.force > least.force:
                 alone = True
                 only = bounds[0], bounds[1]._replace(force=least.force, memory=least.memory)

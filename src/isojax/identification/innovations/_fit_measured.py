@@ -8,7 +8,7 @@ from jaxtyping import Float
 from ..._results import is_successful
 from ...models import Isolator
 from ._error_fit import ErrorFit
-from ._fit_errors import MOST_SCORINGS, first_sizes, fit_errors
+from ._fit_errors import first_sizes, fit_errors
 from ._measured import Measured
 from ._record_filter import COPIES, RecordFilter, Sizes
 
@@ -33,7 +33,8 @@ def fit_measured(
     measured: Measured,
     sizes: Sizes | None = None,
     starts: Sequence[Float[np.ndarray, " column"]] = (),
-    most_steps: int = MOST_SCORINGS,
+    steps: int = SUBSTEPS[0],
+    rough: bool = False,
 ) -> ErrorFit:
     """Fit a model to records, with as many integration steps as show which law it is.
 
@@ -47,14 +48,15 @@ def fit_measured(
         measured: the records.
         sizes: of the errors to start from; large if omitted.
         starts: other values of the coefficients, of which the best is taken.
-        most_steps: of the search, at most.
+        steps: integration steps a sample to begin with.
+        rough: whether the fit is only ranked among others.
 
     Returns:
         The fit; that of the most steps where none suffice.
     """
     found = None
-    for steps in SUBSTEPS:
-        record_filter = RecordFilter(model, measured, steps)
+    for finer in [one for one in SUBSTEPS if one >= steps]:
+        record_filter = RecordFilter(model, measured, finer)
         first = first_sizes(record_filter) if sizes is None else sizes
         first = first._replace(noise=np.minimum(first.noise, measured.loudest))
         found = fit_errors(
@@ -64,12 +66,14 @@ def fit_measured(
             first,
             loudest=measured.loudest,
             starts=starts,
-            most_steps=most_steps,
+            rough=rough,
         )
         if np.isfinite(found.deviance.sum()):
-            if model.slides or steps == SUBSTEPS[-1] or steps_are_fine(found, ROUGH_SHARE):
+            if model.slides or finer == SUBSTEPS[-1] or steps_are_fine(found, ROUGH_SHARE):
                 break
             starts = (found.values, *starts[: COPIES - 2])
+            if is_successful(found.result):
+                sizes = found.sizes
     assert found is not None
     return found
 

@@ -92,8 +92,12 @@ class Sizes(NamedTuple):
         free, step = np.flatnonzero(~held), np.zeros(2 + count)
         step[free] = -np.linalg.solve(fisher[np.ix_(free, free)], slope[free])
         step = np.clip(np.log(np.maximum(1.0 + step, np.exp(-furthest))), -furthest, furthest)
-        moved = np.clip(here + step, lower, upper)
-        return Sizes(float(moved[0]), float(moved[1]), moved[2:])
+        moved = here + step
+        return Sizes(float(moved[0]), float(moved[1]), moved[2:]).within(bounds)
+
+    def within(self, bounds: tuple["Sizes", "Sizes"]) -> "Sizes":
+        """Give the sizes that lie nearest, between the smallest and the largest."""
+        return Sizes(*(np.clip(*each) for each in zip(self, *bounds, strict=True)))
 
     @property
     def correlation(self) -> float:

@@ -28,7 +28,7 @@ from ._batch import Batch, Prepared, workers
 from ._effect_inputs import input_columns
 from ._families import ElementFamily, find_families, in_turn, stack_states
 from ._information import find_stepping
-from ._propagation import propagate, respond
+from ._propagation import Propagation, propagate, respond
 from ._slopes import Change, Slopes, impulse_at_samples, sample_stages, slopes_along
 from ._transitions import Transitions, transitions_along
 from ._unknowns import STIFFNESS_SCALE_UNIT, Lanes, Unknowns, has_stiffness_scale
@@ -46,9 +46,6 @@ SCORE_PIECES = 10
 
 _BY_STAGE = ("drive", "drive_rate", "channels")
 """Fields of a batch that have a value at each stage of a sample's steps."""
-
-_NO_MEMORY = 1e-3
-"""Correlation of a random force from sample to sample that counts as none."""
 
 _TOGETHER = 24
 """Columns that one linear solve carries: the last one is filled up, so that all have one shape."""
@@ -209,8 +206,12 @@ def _block(
         exact = transitions_along(model, layout.moving, scale, path, own.acting, quantity, step, own.ringing)
     by_state = slopes.states
     if followed is not None:
-        by_state = _with_random_force(slopes, followed.memory, step)
-    group = _Group(by_state, exact, weight, step, gains)
+        by_state = _with_random_force(slopes)
+    propagation = propagate(by_state, step) if exact is None else exact.propagation
+    if followed is not None:
+        propagation.forward[-1][-1] = propagation.forward[-1][-1] * followed.memory
+    readings = tuple(entry.reading for entry in by_state)
+    group = _Group(propagation, readings, weight, gains)
     for source in _sources(layout, step, batch, slopes, exact, states[size:], columns, part):
         group.add(*source)
         if group.is_full:
@@ -295,12 +296,12 @@ def _sources(
                 yield column, np.asarray(forcing), np.asarray(direct), 0.0
 
 
-def _with_random_force(slopes: Slopes, memory: float, step: float) -> tuple[Change, ...]:
-    """Give the slopes with each state, and with the random force as one more state behind them."""
+def _with_random_force(slopes: Slopes) -> tuple[Change, ...]:
+    """Give the slopes with each state, and with the random force behind them: constant over a sample."""
     still = jnp.zeros_like(slopes.states[0].reading)
     pushed = slopes.inputs["recorded"]
     own = Change(
-        (*(still + rate for rate in pushed.rates), still + np.log(max(memory, _NO_MEMORY)) / step),
+        (*(still + rate for rate in pushed.rates), still),
         still + pushed.reading,
     )
     return (*(Change((*one.rates, still), one.reading) for one in slopes.states), own)
@@ -311,16 +312,13 @@ class _Group:
 
     def __init__(
         self,
-        by_state: tuple[Change, ...],
-        exact: Transitions | None,
+        propagation: Propagation,
+        readings: tuple[Array, ...],
         weight: Array,
-        step: float,
-        gains: State = (),
+        gains: State,
     ):
-        self.weight, self.gains = weight, gains
-        self.propagation = propagate(by_state, step) if exact is None else exact.propagation
-        self.readings = tuple(entry.reading for entry in by_state)
-        size, (time, lanes) = len(by_state), weight.shape
+        self.propagation, self.readings, self.weight, self.gains = propagation, readings, weight, gains
+        size, (time, lanes) = len(readings), weight.shape
         self.forcing = np.zeros((size - 1, time, _TOGETHER, lanes))
         self.kicks: np.ndarray | None = None
         self.kick_shape = (size + 2, time, _TOGETHER, lanes)
