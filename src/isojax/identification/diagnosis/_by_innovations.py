@@ -1,5 +1,6 @@
 """The diagnosis of records without dwells: effects weighed by the likelihood of a filter's innovations."""
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from ._effect_search import (
     Scores,
     Transfer,
     coefficients,
+    left_out,
     refit_effect,
     score_effects,
     transfer,
@@ -76,13 +78,16 @@ def diagnose_innovations(
     usable = _by_evidence(found, refits, scores, level, rules)
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
+    alone, free = functools.cache(lambda: left_out(found, search)), _free_error(found)
     for refit in usable:
         clear = _gain(found, refit) > rules.clear_gain * found.samples
         if refit.plain is not None or (refit.fit.is_noise_of_output and clear):
             best = Weighed(refit, Transfer(_gain(found, refit), 1.0))
             break
-        one = Weighed(refit, transfer(found, refit.fit, search))
         needed = 0.0 if refit.fit.is_noise else rules.smallest_share
+        if not refit.fit.is_noise and not _free_error(refit.fit) < free * np.sqrt(1.0 - needed):
+            continue  # what does not even help the records that it was fitted to helps no others
+        one = Weighed(refit, transfer(alone(), left_out(refit.fit, search)))
         if one.transfer.deviance > 0.0 and one.transfer.share >= needed:
             best = one
             break

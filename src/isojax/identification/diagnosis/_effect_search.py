@@ -194,11 +194,9 @@ def refit_effect(
             extended_model(fit, score.element, share * score.strength, share * score.step)
         )
         starts.append(np.array([float(listed[place].value) for place in places]))
-    large = first_sizes(fit.filter)
-    sizes = large._replace(noise=np.minimum(fit.sizes.noise, large.noise))
+    sizes = first_sizes(fit.filter)
     if begin is None:
-        force = max(fit.sizes.force, large.force - _SMALLER)
-        sizes = sizes._replace(force=force, memory=max(fit.sizes.memory, 1.0))
+        sizes = sizes._replace(force=max(fit.sizes.force, sizes.force - _SMALLER))
     found = fit_measured(
         model,
         places,
@@ -232,6 +230,18 @@ def _violation(fit: ErrorFit, found: ErrorFit, score: Score) -> str | None:
     return find_violation(found.model, tables.records, tables.quantity)
 
 
+class LeftOut(NamedTuple):
+    """How a model does on records that its refit did not see.
+
+    Attributes:
+        deviance: -2 log-likelihood, but for a constant.
+        squares: squared error of free runs [squared SI unit of the output].
+    """
+
+    deviance: float
+    squares: float
+
+
 class Transfer(NamedTuple):
     """What an effect takes off the error of records that its refit did not see.
 
@@ -244,34 +254,46 @@ class Transfer(NamedTuple):
     share: float
 
 
-def transfer(fit: ErrorFit, found: ErrorFit, search: Search) -> Transfer:
-    """Refit both models without each record in turn, and predict that record.
+def transfer(before: LeftOut, after: LeftOut) -> Transfer:
+    """Give what an effect takes off.
 
     Args:
-        fit: the model without the effect.
-        found: with it.
+        before: without it.
+        after: with it.
+
+    Returns:
+        Both measures.
+    """
+    share = 1.0 - after.squares / before.squares if before.squares > 0.0 else 0.0
+    return Transfer(before.deviance - after.deviance, share)
+
+
+def left_out(found: ErrorFit, search: Search) -> LeftOut:
+    """Refit a model without each record in turn, and predict that record.
+
+    Args:
+        found: the model.
         search: the scales of the campaign.
 
     Returns:
-        What it takes off all records together.
+        The deviance of all records together, and the squared error of their free runs.
     """
-    count = fit.filter.count
+    count = found.filter.count
     folds = [np.arange(count) == place for place in range(count)]
     if count > _MOST_FOLDS:
         folds = [np.arange(count) % _MOST_FOLDS == place for place in range(_MOST_FOLDS)]
-    gained, squares = 0.0, np.zeros(2)
+    deviance, squares = 0.0, 0.0
     for unseen in folds:
-        for place, one in enumerate((fit, found)):
-            part = fit_errors(
-                one.filter,
-                one.places,
-                magnitudes(one.model, one.places, search.scales),
-                one.sizes,
-                judged=1.0 - unseen,
-                rough=True,
-                starts=(one.values,),
-                loudest=fit.filter.measured.loudest,
-            )
-            gained += (1 - 2 * place) * float(part.deviance[unseen].sum())
-            squares[place] += float(free_squares(part)[unseen].sum())
-    return Transfer(gained, float(1.0 - squares[1] / squares[0]) if squares[0] > 0.0 else 0.0)
+        part = fit_errors(
+            found.filter,
+            found.places,
+            magnitudes(found.model, found.places, search.scales),
+            found.sizes,
+            judged=1.0 - unseen,
+            rough=True,
+            starts=(found.values,),
+            loudest=found.filter.measured.loudest,
+        )
+        deviance += float(part.deviance[unseen].sum())
+        squares += float(free_squares(part)[unseen].sum())
+    return LeftOut(deviance, squares)
