@@ -42,7 +42,7 @@ ACCURACY = {
     "_lack_of_fit": {"HIGHEST", "HIGHEST_ORDER", "LINES_A_BAND", "LINES_BESIDE"},
     "_remainder": {"FEWEST_CELL_SAMPLES"},
     "_residual": {"MOST_LAGS"},
-    "_score_columns": {"ENTRIES", "LEAST_COLUMNS", "NO_MEMORY"},
+    "_score_columns": {"ENTRIES", "LEAST_COLUMNS"},
     # What a filter follows, how much of it, and how large its covariance may grow.
     "_fit": {"MOST_EVALUATIONS"},
     "_fit_of_errors": {"LEAST_KEPT", "LOUDEST", "MUCH_LESS", "POWER", "SHORTEST_RECORD"},

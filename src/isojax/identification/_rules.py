@@ -81,6 +81,10 @@ class Rules:
     free_run_tie: float = 0.1
     """Larger error of free runs, relative, up to which two models whose error is not noise are as good."""
 
+    followed: float = 0.5
+    """Error of the best free run over the rms of the response from which free runs tell no laws apart: motion
+    that is irregular."""
+
     near_noise: float = 1.3
     """chi2/dof below which laws that are split where they jump explain what their rounding left."""
 

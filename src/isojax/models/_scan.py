@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from .._kernel_scan import kernel_scan
 from .._types import Lanes
 from ._event_step import Ringing, Step, find_regime, find_ringing, split_step
 from ._instant import Instant, split_stages
@@ -162,5 +163,5 @@ def scan_records(
         ahead, ringing = advance_record(model, solver, quantity, sample_time, carry, stages)
         return ahead, (kept, ringing)
 
-    last, (kept, ringing) = jax.lax.scan(body, state, record)
+    last, (kept, ringing) = kernel_scan(body, state, record)
     return last, kept, ringing

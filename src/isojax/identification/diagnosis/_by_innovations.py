@@ -11,7 +11,7 @@ from ...models import Isolator
 from .._rules import Rules
 from ..fitting import Fit, Search, fit_with_errors, magnitudes
 from ..guess import balance_starts
-from ..innovations import ErrorFit, free_squares, refined
+from ..innovations import ErrorFit, free_error, refined
 from ._bounds import WIDTH_95, strength_unit
 from ._effect_search import (
     Refit,
@@ -78,17 +78,19 @@ def diagnose_innovations(
     usable = _by_evidence(found, refits, scores, level, rules)
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
-    alone, free = functools.cache(lambda: left_out(found, search)), _free_error(found)
+    alone, free = functools.cache(lambda: left_out(found, search)), free_error(found)
     for refit in usable:
         clear = _gain(found, refit) > rules.clear_gain * found.samples
         if refit.plain is not None or (refit.fit.is_noise_of_output and clear):
             best = Weighed(refit, Transfer(_gain(found, refit), 1.0))
             break
+        by_runs = refit.fit.is_noise or _follows(usable, rules)
         needed = 0.0 if refit.fit.is_noise else rules.smallest_share
-        if not refit.fit.is_noise and not _free_error(refit.fit) < free * np.sqrt(1.0 - needed):
+        if needed and by_runs and not free_error(refit.fit) < free * np.sqrt(1.0 - needed):
             continue  # what does not even help the records that it was fitted to helps no others
         one = Weighed(refit, transfer(alone(), left_out(refit.fit, search)))
-        if one.transfer.deviance > 0.0 and one.transfer.share >= needed:
+        least = 0.0 if by_runs else rules.clear_gain * found.samples
+        if one.transfer.deviance > least and (one.transfer.share >= needed or not by_runs):
             best = one
             break
         reason = f"{refit.score.element.name} does not carry over to records left out of its refit"
@@ -103,7 +105,8 @@ def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[R
 
     def refit(score: Score, begin: Isolator | None = None) -> bool:
         search.progress(f"refit with {score.element.name}")
-        refits.append(refit_effect(found, score, fit, search, begin))
+        best = min((one.fit.criterion for one in refits if one.violation is None), default=found.criterion)
+        refits.append(refit_effect(found, score, fit, search, begin, best))
         return refits[-1].violation is None and refits[-1].explains
 
     asked = [
@@ -214,9 +217,12 @@ def _by_evidence(
         usable = sorted(usable, key=lambda one: (not one.fit.is_noise, one.fit.criterion))
         lowest = usable[0].fit.criterion + rules.close_bic
         tied = [one for one in usable if one.fit.is_noise and one.fit.criterion <= lowest]
+    elif usable and not _follows(usable, rules):
+        usable = sorted(usable, key=lambda one: one.fit.criterion)
+        tied = [one for one in usable if one.fit.criterion <= usable[0].fit.criterion + rules.close_bic]
     else:
         # The error is the model's: what a free run leaves counts, record by record over its size.
-        usable = sorted(usable, key=lambda one: _free_error(one.fit))
+        usable = sorted(usable, key=lambda one: free_error(one.fit))
         tied = [one for one in usable if _as_good(one.fit, usable[0].fit, rules)]
     if not usable:
         return []
@@ -225,6 +231,13 @@ def _by_evidence(
         key=lambda one: (len(one.fit.places), one.fit.model.internal_states, one.score.element.seldom),
     )
     return [first, *(one for one in usable if one is not first)]
+
+
+def _follows(refits: list[Refit], rules: Rules) -> bool:
+    """Say whether a free run of some model follows the records: none does where the motion is irregular."""
+    records = [record.output for record in refits[0].fit.filter.tables.records]
+    loud = float(np.sqrt(sum(np.sum(one**2) for one in records) / sum(one.size for one in records)))
+    return min(free_error(one.fit) for one in refits) < rules.followed * loud
 
 
 def _tied(sharp: list[Refit], rules: Rules) -> list[Refit]:
@@ -240,12 +253,6 @@ def _tied(sharp: list[Refit], rules: Rules) -> list[Refit]:
         bics[id(one)] = left.samples * np.log(square) + len(one.fit.places) * np.log(left.samples)
     lowest = min(bics.values())
     return [one for one in sharp if bics[id(one)] <= lowest + rules.close_bic]
-
-
-def _free_error(fit: ErrorFit) -> float:
-    """Give the rms error of free runs [SI unit of the output]; infinite where one diverges."""
-    squares = free_squares(fit).sum()
-    return float(np.sqrt(squares / fit.samples)) if np.isfinite(squares) else np.inf
 
 
 def _candidate(score: Score, refits: list[Refit], best: Refit | None, scores: Scores) -> Candidate:
@@ -343,7 +350,7 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         one for one in CATALOGUE if one != name and one not in together and is_exact(name, one, names)
     )
     together += exact
-    before, after = _free_error(found), _free_error(fine)
+    before, after = free_error(found), free_error(fine)
     explained = 1.0 - (after / before) ** 2 if np.isfinite(after) and before > 0.0 else 0.0
     noise = fine.is_noise or refit.plain is not None
     explained = 1.0 if noise else explained
@@ -361,13 +368,19 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         ranking,
         separating_experiment(name, together),
     )
-    reason = (
-        f"Adding {refit.score.element.words} takes {100.0 * best.transfer.share:.3g} % off the squared error "
-        "of free runs of records left out of its refit."
-        if not noise
-        else f"With {refit.score.element.words} what the model leaves is noise."
-    )
+    reason = _added_words(refit.score.element.words, best.transfer, noise)
     return Verdict(verdict, finding, ranking, together, 1.0 - explained, scores.hidden, {}, whole, reason)
+
+
+def _added_words(words: str, gained: Transfer, noise: bool) -> str:
+    """Say what a finding adds."""
+    if noise:
+        return f"With {words} what the model leaves is noise."
+    unseen = "records left out of its refit"
+    if gained.share > 0.0:
+        share = 100.0 * gained.share
+        return f"Adding {words} takes {share:.3g} % off the squared error of free runs of {unseen}."
+    return f"Adding {words} foretells {unseen} better. Their motion is irregular: no free run follows it."
 
 
 def _is_alike(one: Refit, best: Refit, rules: Rules) -> bool:
@@ -382,4 +395,4 @@ def _is_alike(one: Refit, best: Refit, rules: Rules) -> bool:
 
 def _as_good(one: ErrorFit, best: ErrorFit, rules: Rules) -> bool:
     """Say whether a model follows the records about as well as another, when nothing is fed back."""
-    return _free_error(one) <= _free_error(best) * (1.0 + rules.free_run_tie)
+    return free_error(one) <= free_error(best) * (1.0 + rules.free_run_tie)

@@ -17,6 +17,7 @@ from ..innovations import (
     fit_errors,
     fit_measured,
     free_squares,
+    sharpened,
 )
 from ..jacobian import effects_without_signal
 from ._admissibility import find_violation
@@ -172,7 +173,12 @@ def coefficients(fit: ErrorFit, score: Score) -> int:
 
 
 def refit_effect(
-    fit: ErrorFit, score: Score, whole: Fit, search: Search, begin: Isolator | None = None
+    fit: ErrorFit,
+    score: Score,
+    whole: Fit,
+    search: Search,
+    begin: Isolator | None = None,
+    best: float = np.inf,
 ) -> Refit:
     """Fit the model with one absent effect, everything free, from where the score points.
 
@@ -182,6 +188,7 @@ def refit_effect(
         whole: the fit without it, and its campaign.
         search: the scales of the campaign.
         begin: where else to start: the model with the effect, every coefficient from the measured forces.
+        best: criterion from which a law that the filter rounds is fitted more sharply.
 
     Returns:
         The refit, with what speaks against it whatever it gains.
@@ -197,16 +204,12 @@ def refit_effect(
     sizes = first_sizes(fit.filter)
     if begin is None:
         sizes = sizes._replace(force=max(fit.sizes.force, sizes.force - _SMALLER))
+    scales = magnitudes(model, places, search.scales)
     found = fit_measured(
-        model,
-        places,
-        magnitudes(model, places, search.scales),
-        fit.filter.measured,
-        sizes,
-        starts,
-        steps=fit.filter.steps,
-        rough=True,
+        model, places, scales, fit.filter.measured, sizes, starts, steps=fit.filter.steps, rough=True
     )
+    if model.splits and not found.is_noise_of_output and found.criterion < best:
+        found = sharpened(found, scales)
     if begin is not None:
         # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
         drop, extra = fit.deviance.sum() - found.deviance.sum(), max(1, len(places) - len(fit.places))

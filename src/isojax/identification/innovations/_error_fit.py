@@ -203,3 +203,16 @@ def free_squares(fit: ErrorFit) -> Float[np.ndarray, " record"]:
 
     way = fit.way._replace(traces=[free(one) for one in fit.way.traces])
     return fit.filter.products(fit.places, fit.values[None], way, columns=False)[0, 0, 0]
+
+
+def free_error(fit: ErrorFit) -> float:
+    """Give the error of each record, simulated with nothing fed back.
+
+    Args:
+        fit: the model.
+
+    Returns:
+        The rms over all records [SI unit of the output]; infinite where one diverges.
+    """
+    squares = free_squares(fit).sum()
+    return float(np.sqrt(squares / fit.samples)) if np.isfinite(squares) else np.inf

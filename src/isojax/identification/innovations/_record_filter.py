@@ -97,7 +97,8 @@ class Sizes(NamedTuple):
 
     def within(self, bounds: tuple["Sizes", "Sizes"]) -> "Sizes":
         """Give the sizes that lie nearest, between the smallest and the largest."""
-        return Sizes(*(np.clip(*each) for each in zip(self, *bounds, strict=True)))
+        force, memory, noise = (np.clip(*each) for each in zip(self, *bounds, strict=True))
+        return Sizes(float(force), float(memory), noise)
 
     @property
     def correlation(self) -> float:

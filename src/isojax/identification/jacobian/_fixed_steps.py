@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._kernel_scan import in_one_kernel, kernel_scan
 from ..._parameters import list_parameters
 from ..._quick_jit import quick_jit
 from ...models import (
@@ -73,7 +74,7 @@ def _scan_first(
             lambda rows, row: jax.lax.dynamic_update_index_in_dim(rows, row, place, 0), carry[1], one
         )
 
-    return jax.lax.fori_loop(0, count, step, (begun, blank))
+    return in_one_kernel(lambda *loop: jax.lax.fori_loop(0, loop[0], step, loop[1:]), count, begun, blank)
 
 
 @quick_jit
@@ -165,7 +166,7 @@ def fixed_path(start: Lanes, batch: Batch, sampling: Sampling) -> tuple[State, R
         return ahead, (state, find_ringing(jump, number, steps))
 
     numbers = jnp.tile(jnp.arange(steps), time)
-    path, ringing = jax.lax.scan(body, states, (numbers, acting))[1]
+    path, ringing = kernel_scan(body, states, (numbers, acting))[1]
     return path, jax.tree_util.tree_map(
         lambda one: batch.ringing * one.reshape(time, steps, -1).sum(axis=1), ringing
     )

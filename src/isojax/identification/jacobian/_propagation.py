@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..._kernel_scan import kernel_scan
 from ..._quick_jit import quick_jit
 from ._slopes import Change, cubic_middle
 
@@ -149,4 +150,4 @@ def respond(
 
     window = forcing[:, 0], forcing[:, 0], forcing[:, 1]
     tables = jnp.arange(last + 1), propagation, readings, direct, weight, gains
-    return jax.lax.scan(body, (tuple(starts), window, jnp.zeros_like(starts[0])), tables)[1]
+    return kernel_scan(body, (tuple(starts), window, jnp.zeros_like(starts[0])), tables)[1]
