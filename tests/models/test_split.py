@@ -258,11 +258,14 @@ def test_a_mass_at_rest_is_held_until_the_drive_exceeds_friction():
 
 
 @pytest.mark.parametrize("substeps", [1, 2, 4])
-def test_a_model_without_jumps_moves_bit_for_bit_as_it_did(substeps):
+def test_a_model_without_jumps_moves_as_without_splitting(substeps):
     model = Isolator(MASS, (SPRING, DAMPER, MaxwellBranch(2e5, 0.04)))
     drive = table(rig.Tones(0.0, COUNT / RATE + 1.0, 0.0, *TONES), substeps)
     start = (jnp.full(1, 1e-4), jnp.zeros(1), jnp.zeros(1))
-    np.testing.assert_array_equal(split(model, drive, start)[1], rounded(model, drive, start))
+    # But for the last digits: one loop is a kernel, and the other is not.
+    whole = rounded(model, drive, start)
+    size = np.max(np.abs(whole))
+    np.testing.assert_allclose(split(model, drive, start)[1], whole, rtol=0.0, atol=1e-13 * size)
 
 
 def test_a_held_drive_acts_on_both_pieces_of_a_split_step():
