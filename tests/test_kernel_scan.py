@@ -46,3 +46,17 @@ def test_derivatives_pass_through_it(tables):
     _, own = jax.jit(lambda at: jax.jvp(end(kernel_scan), (at,), (unit,)))(start)
     _, usual = jax.jit(lambda at: jax.jvp(end(jax.lax.scan), (at,), (unit,)))(start)
     np.testing.assert_allclose(own, usual, rtol=1e-10)
+
+
+def test_what_the_loop_takes_but_does_not_read_ends_no_process(tables):
+    # XLA aborts where simplifying leaves an operand of the kernel unread, or where it is known.
+    def run(tables):
+        idle, known = tables[5] * 0.0, jnp.zeros(5)
+
+        def unread(carry, row):
+            return body(carry, jnp.where(idle > 1.0, row, row) + known)
+
+        return kernel_scan(unread, (tables[0], known), tables)[1]
+
+    expected = jax.jit(lambda tables: jax.lax.scan(body, (tables[0], jnp.zeros(5)), tables)[1])(tables)
+    np.testing.assert_allclose(jax.jit(run)(tables), expected, rtol=1e-12, atol=1e-14)
