@@ -40,7 +40,7 @@ def in_one_kernel(function: Callable[..., Any], *operands: Any) -> Any:
             return done, [jnp.ravel(one)[:1] for one in jax.tree.leaves(known) if jnp.size(one)]
 
     # XLA ends the process where the call takes what it does not read, or what is known while it compiles: so
-    # everything is read, and hidden from those who simplify.
+    # everything is read, and hidden from what simplifies the program.
     known = jax.lax.optimization_barrier((closed.consts, *jax.tree.leaves(operands)))
     with set_xla_metadata(xla_cpu_small_call="true", inlineable="false"):
         done = jax.jit(unmarked)(known)

@@ -11,7 +11,7 @@ from ...models import Isolator
 from .._rules import Rules
 from ..fitting import Fit, Search, fit_with_errors, magnitudes
 from ..guess import balance_starts
-from ..innovations import ErrorFit, free_error, refined
+from ..innovations import ErrorFit, refined
 from ._bounds import WIDTH_95, strength_unit
 from ._effect_search import (
     Refit,
@@ -78,7 +78,7 @@ def diagnose_innovations(
     usable = _by_evidence(found, refits, scores, level, rules)
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
-    alone, free = functools.cache(lambda: left_out(found, search)), free_error(found)
+    without = functools.cache(lambda: left_out(found, search))
     for refit in usable:
         clear = _gain(found, refit) > rules.clear_gain * found.samples
         if refit.plain is not None or (refit.fit.is_noise_of_output and clear):
@@ -86,9 +86,9 @@ def diagnose_innovations(
             break
         by_runs = refit.fit.is_noise or _follows(usable, rules)
         needed = 0.0 if refit.fit.is_noise else rules.smallest_share
-        if needed and by_runs and not free_error(refit.fit) < free * np.sqrt(1.0 - needed):
+        if needed and by_runs and not refit.fit.free_error < found.free_error * np.sqrt(1.0 - needed):
             continue  # what does not even help the records that it was fitted to helps no others
-        one = Weighed(refit, transfer(alone(), left_out(refit.fit, search)))
+        one = Weighed(refit, transfer(without(), left_out(refit.fit, search)))
         least = 0.0 if by_runs else rules.clear_gain * found.samples
         if one.transfer.deviance > least and (one.transfer.share >= needed or not by_runs):
             best = one
@@ -222,7 +222,7 @@ def _by_evidence(
         tied = [one for one in usable if one.fit.criterion <= usable[0].fit.criterion + rules.close_bic]
     else:
         # The error is the model's: what a free run leaves counts, record by record over its size.
-        usable = sorted(usable, key=lambda one: free_error(one.fit))
+        usable = sorted(usable, key=lambda one: one.fit.free_error)
         tied = [one for one in usable if _as_good(one.fit, usable[0].fit, rules)]
     if not usable:
         return []
@@ -236,8 +236,8 @@ def _by_evidence(
 def _follows(refits: list[Refit], rules: Rules) -> bool:
     """Say whether a free run of some model follows the records: none does where the motion is irregular."""
     records = [record.output for record in refits[0].fit.filter.tables.records]
-    loud = float(np.sqrt(sum(np.sum(one**2) for one in records) / sum(one.size for one in records)))
-    return min(free_error(one.fit) for one in refits) < rules.followed * loud
+    rms = float(np.sqrt(sum(np.sum(one**2) for one in records) / sum(one.size for one in records)))
+    return min(one.fit.free_error for one in refits) < rules.followed * rms
 
 
 def _tied(sharp: list[Refit], rules: Rules) -> list[Refit]:
@@ -350,7 +350,7 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         one for one in CATALOGUE if one != name and one not in together and is_exact(name, one, names)
     )
     together += exact
-    before, after = free_error(found), free_error(fine)
+    before, after = found.free_error, fine.free_error
     explained = 1.0 - (after / before) ** 2 if np.isfinite(after) and before > 0.0 else 0.0
     noise = fine.is_noise or refit.plain is not None
     explained = 1.0 if noise else explained
@@ -395,4 +395,4 @@ def _is_alike(one: Refit, best: Refit, rules: Rules) -> bool:
 
 def _as_good(one: ErrorFit, best: ErrorFit, rules: Rules) -> bool:
     """Say whether a model follows the records about as well as another, when nothing is fed back."""
-    return free_error(one) <= free_error(best) * (1.0 + rules.free_run_tie)
+    return one.free_error <= best.free_error * (1.0 + rules.free_run_tie)

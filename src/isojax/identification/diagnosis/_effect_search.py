@@ -16,7 +16,6 @@ from ..innovations import (
     first_sizes,
     fit_errors,
     fit_measured,
-    free_squares,
     sharpened,
 )
 from ..jacobian import effects_without_signal
@@ -188,7 +187,7 @@ def refit_effect(
         whole: the fit without it, and its campaign.
         search: the scales of the campaign.
         begin: where else to start: the model with the effect, every coefficient from the measured forces.
-        best: criterion from which a law that the filter rounds is fitted more sharply.
+        best: criterion below which a law that is rounded over a width is fitted more sharply.
 
     Returns:
         The refit, with what speaks against it whatever it gains.
@@ -208,8 +207,10 @@ def refit_effect(
     found = fit_measured(
         model, places, scales, fit.filter.measured, sizes, starts, steps=fit.filter.steps, rough=True
     )
-    if model.splits and not found.is_noise_of_output and found.criterion < best:
-        found = sharpened(found, scales)
+    width = f"{score.element.name}.width"
+    rounded = any(entry.name == width for entry in model.parameters)
+    if rounded and not found.is_noise_of_output and found.criterion < best:
+        found = sharpened(found, width, scales)
     if begin is not None:
         # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
         drop, extra = fit.deviance.sum() - found.deviance.sum(), max(1, len(places) - len(fit.places))
@@ -298,5 +299,5 @@ def left_out(found: ErrorFit, search: Search) -> LeftOut:
             loudest=found.filter.measured.loudest,
         )
         deviance += float(part.deviance[unseen].sum())
-        squares += float(free_squares(part)[unseen].sum())
+        squares += float(part.free_squares[unseen].sum())
     return LeftOut(deviance, squares)

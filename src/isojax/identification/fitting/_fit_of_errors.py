@@ -12,7 +12,7 @@ from ..._results import RESULTS, is_successful
 from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thin_record
-from ..innovations import ErrorFit, Measured, fit_measured, free_squares
+from ..innovations import ErrorFit, Measured, fit_measured
 from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
@@ -167,7 +167,7 @@ def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fi
     estimate = Estimate(found.model, found.places, simulator, point, uncertainty, result, found.steps)
     deviance, owners = float(found.deviance.sum()), [one.record for one in found.filter.measured.segments]
     levels = np.array([noise.levels[fitted[place]] for place in owners])
-    chi2 = found.chi2 if found.is_noise else float(np.sum(free_squares(found) / levels**2))
+    chi2 = found.chi2 if found.is_noise else float(np.sum(found.free_squares / levels**2))
     stats = Statistics(
         int(samples),
         count,
@@ -216,7 +216,7 @@ def noise_of_errors(found: ErrorFit, campaign: Campaign, alone: bool) -> NoiseEs
         return shown
     owners = np.array([one.record for one in found.filter.measured.segments])
     lengths = np.array([one.stop - one.counted for one in found.filter.measured.segments], dtype=float)
-    squares = np.exp(found.sizes.noise) * lengths if alone else free_squares(found)
+    squares = np.exp(found.sizes.noise) * lengths if alone else found.free_squares
     own = np.array(
         [
             math.sqrt(squares[owners == place].sum() / lengths[owners == place].sum())

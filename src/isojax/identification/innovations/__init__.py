@@ -9,8 +9,6 @@ Read `_filter` (innovations of records side by side, and their derivatives), `_m
 from ._effect_products import EffectProducts as EffectProducts
 from ._effect_products import effect_products as effect_products
 from ._error_fit import ErrorFit as ErrorFit
-from ._error_fit import free_error as free_error
-from ._error_fit import free_squares as free_squares
 from ._error_fit import is_white as is_white
 from ._fit_errors import first_sizes as first_sizes
 from ._fit_errors import fit_errors as fit_errors

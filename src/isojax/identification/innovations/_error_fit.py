@@ -151,6 +151,26 @@ class ErrorFit:
         levels = self.products[-1, -1] / counted
         return self.colour < _WHITE_ENOUGH and bool(np.all(np.abs(levels - 1.0) < _RECORDS_ALIKE))
 
+    @cached_property
+    def free_squares(self) -> Float[np.ndarray, " record"]:
+        """Squared error of each record, simulated with nothing fed back [squared SI unit of the output]."""
+
+        def free(trace: Trace) -> Trace:
+            counted = jnp.isfinite(trace.deviation)
+            return trace._replace(
+                gains=tuple(jnp.zeros_like(gain) for gain in trace.gains),
+                deviation=jnp.where(counted, 1.0, jnp.inf),
+            )
+
+        way = self.way._replace(traces=[free(one) for one in self.way.traces])
+        return self.filter.products(self.places, self.values[None], way, columns=False)[0, 0, 0]
+
+    @property
+    def free_error(self) -> float:
+        """The rms of that error over all records [SI unit of the output]; infinite where one diverges."""
+        squares = self.free_squares.sum()
+        return float(np.sqrt(squares / self.samples)) if np.isfinite(squares) else np.inf
+
     @property
     def criterion(self) -> float:
         """Schwarz's criterion."""
@@ -182,37 +202,3 @@ def foretold(errors: Float[np.ndarray, " time"]) -> float:
     power = float(own @ own) or 1.0
     lags = range(1, min(_LAGS, own.size - 1) + 1)
     return sum((float(own[:-lag] @ own[lag:]) / power) ** 2 for lag in lags) - len(lags) / max(own.size, 1)
-
-
-def free_squares(fit: ErrorFit) -> Float[np.ndarray, " record"]:
-    """Give the squared error of each record, simulated with nothing fed back [squared SI unit].
-
-    Args:
-        fit: the model.
-
-    Returns:
-        The sums.
-    """
-
-    def free(trace: Trace) -> Trace:
-        counted = jnp.isfinite(trace.deviation)
-        return trace._replace(
-            gains=tuple(jnp.zeros_like(gain) for gain in trace.gains),
-            deviation=jnp.where(counted, 1.0, jnp.inf),
-        )
-
-    way = fit.way._replace(traces=[free(one) for one in fit.way.traces])
-    return fit.filter.products(fit.places, fit.values[None], way, columns=False)[0, 0, 0]
-
-
-def free_error(fit: ErrorFit) -> float:
-    """Give the error of each record, simulated with nothing fed back.
-
-    Args:
-        fit: the model.
-
-    Returns:
-        The rms over all records [SI unit of the output]; infinite where one diverges.
-    """
-    squares = free_squares(fit).sum()
-    return float(np.sqrt(squares / fit.samples)) if np.isfinite(squares) else np.inf

@@ -24,7 +24,7 @@ SMALL_SHARE = 3e-5
 """Change of the deviance by twice as many steps below which their error does not matter: and a sample."""
 
 SHARPER = 8.0
-"""Ratio of widths of laws that jump that are tried in turn."""
+"""Ratio of the widths of a rounded law that are tried in turn."""
 
 ROUGH_SHARE = 1e-3
 """The same a sample where a fit is only ranked."""
@@ -59,7 +59,8 @@ def fit_measured(
         The fit; that of the most steps where none suffice.
     """
     found = None
-    for finer in [one for one in SUBSTEPS if one >= steps]:
+    levels = (steps, *(one for one in SUBSTEPS if one > steps))
+    for finer in levels:
         record_filter = RecordFilter(model, measured, finer)
         first = first_sizes(record_filter) if sizes is None else sizes
         first = first._replace(noise=np.minimum(first.noise, measured.loudest))
@@ -73,7 +74,7 @@ def fit_measured(
             rough=rough,
         )
         if np.isfinite(found.deviance.sum()):
-            if model.slides or finer == SUBSTEPS[-1] or steps_are_fine(found, ROUGH_SHARE):
+            if model.slides or finer == levels[-1] or steps_are_fine(found, ROUGH_SHARE):
                 break
             starts = (found.values, *starts[: COPIES - 2])
             if is_successful(found.result):
@@ -116,13 +117,14 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     return found
 
 
-def sharpened(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
-    """Fit again with laws that are rounded less, as long as that explains the records better.
+def sharpened(found: ErrorFit, width: str, magnitudes: Sequence[float]) -> ErrorFit:
+    """Fit again with a law that is rounded less, as long as that explains the records better.
 
     A width that is right for the large motion of one record rounds all of the small motion of another.
 
     Args:
-        found: a fit of laws with a width.
+        found: a fit with the law.
+        width: name of the parameter over which it is rounded.
         magnitudes: of its coefficients.
 
     Returns:
@@ -130,7 +132,7 @@ def sharpened(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     """
     while True:
         numbers = [
-            entry.value / SHARPER if entry.name.endswith(".width") else entry.value
+            entry.value / SHARPER if entry.name == width else entry.value
             for entry in list_parameters(found.model)
         ]
         again = fit_measured(
