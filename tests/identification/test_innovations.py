@@ -37,7 +37,8 @@ def smooth_noise(rng, size):
 def kalman_deviance(drive, output, start, spread, force, noise, branch=None):
     """-2 log-likelihood but for a constant: the drive is straight between samples, its random force held.
 
-    `branch` is stiffness and time constant of a Maxwell branch, whose displacement is a third state.
+    Beyond four standard deviations an innovation counts for so much. Last it gives how many do. `branch` is
+    stiffness and time constant of a Maxwell branch, whose displacement is a third state.
     """
     rates = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]])
     if branch is not None:
@@ -48,29 +49,32 @@ def kalman_deviance(drive, output, start, spread, force, noise, branch=None):
     whole[:size, :size], whole[1, size], whole[size, size + 1] = rates / RATE, 1.0 / MASS / RATE, 1.0
     whole = expm(whole)
     ahead, held, ramp = whole[:size, :size], whole[:size, size], whole[:size, size + 1]
-    mean, covariance, deviance = start.copy(), np.diag(spread), 0.0
+    mean, covariance, deviance, spikes = start.copy(), np.diag(spread), 0.0, 0
     for k, measured in enumerate(output):
         variance = covariance[0, 0] + noise
         error, gain = measured - mean[0], covariance[:, 0] / variance
-        deviance += np.log(variance) + error**2 / variance
+        if abs(error) > 4.0 * np.sqrt(variance):  # a spike
+            spikes, gain = spikes + 1, gain * 4.0 * np.sqrt(variance) / abs(error)
+        deviance += np.log(variance) + min(error**2 / variance, 16.0)
         mean, covariance = mean + gain * error, covariance - np.outer(gain, covariance[0])
         if k + 1 < output.size:
             mean = ahead @ mean + held * drive[k] + ramp * (drive[k + 1] - drive[k])
             covariance = ahead @ covariance @ ahead.T + force * np.outer(held, held)
-    return deviance
+    return deviance, spikes
 
 
-def test_the_likelihood_is_that_of_a_kalman_filter():
+@pytest.mark.parametrize("force", [1.0, 10.0])
+def test_the_likelihood_is_that_of_a_kalman_filter(force):
     rng = np.random.default_rng(3)
     drive, output = smooth_noise(rng, 900), 1e-3 * smooth_noise(rng, 900)
     records = record(drive, output), record(drive[::-1], output[::-1], "two")
     own = RecordFilter(linear(), Measured(records, "displacement", "linear", np.full(2, 1.0)), 4)
-    force, noise = 0.3**2, 2e-5**2
+    force, noise = force**2, 2e-5**2
     way = own.follow((), np.zeros((7, 0)), Sizes(np.log(force), -30.0, np.log(np.full(2, noise))).around())
     for place, one in enumerate(records):
-        wanted = kalman_deviance(
-            one.input, one.output, own.starts[:, place], own.spread[:, place], force, noise
-        )
+        start, spread = own.starts[:, place], own.spread[:, place]
+        wanted, spikes = kalman_deviance(one.input, one.output, start, spread, force, noise)
+        assert (spikes > 100) == (force == 1.0)
         # The covariance goes on by an exponential that is cut off after its fourth term.
         assert way.deviance[0, place] == pytest.approx(wanted, rel=1e-4)
 
@@ -83,11 +87,11 @@ def test_the_likelihood_holds_for_a_state_that_follows_within_a_sample():
     model = linear().with_elements(MaxwellBranch(*branch))
     own = RecordFilter(model, Measured(records, "displacement", "linear", np.full(2, 1.0)), 16)
     own.spread[2] = 1e-8
-    force, noise = 0.3**2, 2e-5**2
+    force, noise = 10.0**2, 2e-5**2
     way = own.follow((), np.zeros((7, 0)), Sizes(np.log(force), -30.0, np.log(np.full(2, noise))).around())
     for place, one in enumerate(records):
         start, spread = own.starts[:, place], own.spread[:, place]
-        wanted = kalman_deviance(one.input, one.output, start, spread, force, noise, branch)
+        wanted, _ = kalman_deviance(one.input, one.output, start, spread, force, noise, branch)
         assert way.deviance[0, place] == pytest.approx(wanted, rel=1e-3)
 
 
@@ -103,7 +107,7 @@ def test_slopes_with_the_sizes_are_those_of_the_likelihood():
         sizes = Sizes(force, memory, np.array([noise, -21.0]))
         return own.follow((), np.zeros((7, 0)), sizes.around())
 
-    at, step = (np.log(0.1), 1.0, -20.0), 1e-3
+    at, step = (np.log(100.0), 1.0, -20.0), 1e-3
     slope = deviance(*at).slope
     for size in range(3):
         up, down = (tuple(a + sign * step * (i == size) for i, a in enumerate(at)) for sign in (1.0, -1.0))

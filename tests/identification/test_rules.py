@@ -47,7 +47,6 @@ ACCURACY = {
     "_fit": {"MOST_EVALUATIONS"},
     "_fit_of_errors": {"LEAST_KEPT", "LOUDEST", "MUCH_LESS", "POWER", "SHORTEST_RECORD"},
     # When what a fit leaves is the noise by which it was weighted.
-    "_weighted_fits": {"SAME_NOISE"},
     "_effect_search": {"MOST_FOLDS", "SMALLER"},
     "_by_innovations": {"MOST_INTERNAL"},
     "_segment_scatter": {"SAME_DRIVE_AND_RESPONSE", "SAME_FREQUENCY"},

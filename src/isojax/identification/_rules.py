@@ -85,9 +85,6 @@ class Rules:
     """Error of the best free run over the rms of the response from which free runs tell no laws apart: motion
     that is irregular."""
 
-    near_noise: float = 1.3
-    """chi2/dof below which laws that are split where they jump explain what their rounding left."""
-
     # Which candidates are refitted.
 
     survivors: int = 4

@@ -81,7 +81,7 @@ def diagnose_innovations(
     without = functools.cache(lambda: left_out(found, search))
     for refit in usable:
         clear = _gain(found, refit) > rules.clear_gain * found.samples
-        if refit.plain is not None or (refit.fit.is_noise_of_output and clear):
+        if refit.fit.is_noise_of_output and clear:
             best = Weighed(refit, Transfer(_gain(found, refit), 1.0))
             break
         by_runs = refit.fit.is_noise or _follows(usable, rules)
@@ -105,8 +105,7 @@ def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[R
 
     def refit(score: Score, begin: Isolator | None = None) -> bool:
         search.progress(f"refit with {score.element.name}")
-        best = min((one.fit.criterion for one in refits if one.violation is None), default=found.criterion)
-        refits.append(refit_effect(found, score, fit, search, begin, best))
+        refits.append(refit_effect(found, score, search, begin))
         return refits[-1].violation is None and refits[-1].explains
 
     asked = [
@@ -209,11 +208,7 @@ def _by_evidence(
             and gain - extra * np.log(found.samples) > rules.close_bic
         ):
             usable.append(refit)
-    sharp = [one for one in usable if one.plain is not None]
-    if sharp:
-        tied = _tied(sharp, rules)
-        usable = sorted(usable, key=lambda one: (one.plain is None, one.fit.criterion))
-    elif any(one.fit.is_noise for one in usable):
+    if any(one.fit.is_noise for one in usable):
         usable = sorted(usable, key=lambda one: (not one.fit.is_noise, one.fit.criterion))
         lowest = usable[0].fit.criterion + rules.close_bic
         tied = [one for one in usable if one.fit.is_noise and one.fit.criterion <= lowest]
@@ -238,21 +233,6 @@ def _follows(refits: list[Refit], rules: Rules) -> bool:
     records = [record.output for record in refits[0].fit.filter.tables.records]
     rms = float(np.sqrt(sum(np.sum(one**2) for one in records) / sum(one.size for one in records)))
     return min(one.fit.free_error for one in refits) < rules.followed * rms
-
-
-def _tied(sharp: list[Refit], rules: Rules) -> list[Refit]:
-    """List the laws that explain the records as well as the best of those that are split where they jump.
-
-    Each may be weighed by a noise of its own: their errors are compared by the rms that they leave.
-    """
-    bics = {}
-    for one in sharp:
-        assert one.plain is not None
-        left = one.plain.stats
-        square = left.chi2 / left.dof * one.plain.noise.sigma**2
-        bics[id(one)] = left.samples * np.log(square) + len(one.fit.places) * np.log(left.samples)
-    lowest = min(bics.values())
-    return [one for one in sharp if bics[id(one)] <= lowest + rules.close_bic]
 
 
 def _candidate(score: Score, refits: list[Refit], best: Refit | None, scores: Scores) -> Candidate:
@@ -330,12 +310,9 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
     """Word a finding."""
     found, rules, refit = fit.innovations, search.rules, best.refit
     assert found is not None
-    fine, whole = refit.fit, refit.plain
-    if whole is None:
-        sizes = magnitudes(fine.model, fine.places, search.scales)
-        search.progress("the finding, fitted to the end")
-        fine = refined(fine, sizes)
-        whole = fit_with_errors(fine, fit.model, fit.campaign, search)
+    search.progress("the finding, fitted to the end")
+    fine = refined(refit.fit, magnitudes(refit.fit.model, refit.fit.places, search.scales))
+    whole = fit_with_errors(fine, fit.model, fit.campaign, search)
     name = refit.score.element.name
     names = _free_effects(fine)
     together = tuple(
@@ -352,8 +329,7 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
     together += exact
     before, after = found.free_error, fine.free_error
     explained = 1.0 - (after / before) ** 2 if np.isfinite(after) and before > 0.0 else 0.0
-    noise = fine.is_noise or refit.plain is not None
-    explained = 1.0 if noise else explained
+    explained = 1.0 if fine.is_noise else explained
     good = whole.innovations is None or whole.innovations.is_noise or whole.estimate.inflation < rules.good
     verdict: VerdictWord = "found" if good else "unexplained"
     if not good and explained >= 1.0 - rules.smallest_share:
@@ -368,7 +344,7 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         ranking,
         separating_experiment(name, together),
     )
-    reason = _added_words(refit.score.element.words, best.transfer, noise)
+    reason = _added_words(refit.score.element.words, best.transfer, fine.is_noise)
     return Verdict(verdict, finding, ranking, together, 1.0 - explained, scores.hidden, {}, whole, reason)
 
 
@@ -385,8 +361,6 @@ def _added_words(words: str, gained: Transfer, noise: bool) -> str:
 
 def _is_alike(one: Refit, best: Refit, rules: Rules) -> bool:
     """Say whether the records do not tell a law from the best one."""
-    if best.plain is not None:
-        return one.plain is not None and one in _tied([one, best], rules)
     if best.fit.is_noise:
         tie = max(rules.close_bic, rules.smallest_gain * best.fit.samples)
         return one.fit.criterion <= best.fit.criterion + tie

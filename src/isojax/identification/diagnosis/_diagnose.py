@@ -63,7 +63,7 @@ def is_good(fit: Fit, rules: Rules) -> bool:
         to the drive than noise and the declared error of the response are.
     """
     if fit.innovations is not None:
-        return fit.innovations.is_noise or (fit.innovations.model.splits and _ratio(fit) <= rules.good)
+        return fit.innovations.is_noise
     return max(_ratio(fit), fit.noise.excess) <= rules.good and not is_locked(fit, rules)
 
 

@@ -9,14 +9,13 @@ from scipy import stats
 from ..._parameters import list_parameters
 from ...elements import CATALOGUE, AbstractElement
 from ...models import Isolator
-from ..fitting import Fit, Search, fit_without_force, magnitudes
+from ..fitting import Search, magnitudes
 from ..innovations import (
     ErrorFit,
     effect_products,
     first_sizes,
     fit_errors,
     fit_measured,
-    sharpened,
 )
 from ..jacobian import effects_without_signal
 from ._admissibility import find_violation
@@ -85,18 +84,16 @@ class Refit(NamedTuple):
         score: its score before.
         fit: the refit.
         violation: what speaks against it, or None.
-        plain: the refit without a random force, of laws that the filter rounds, where that leaves noise.
     """
 
     score: Score
     fit: ErrorFit
     violation: str | None
-    plain: Fit | None = None
 
     @property
     def explains(self) -> bool:
         """Whether nothing but noise of the output is left."""
-        return self.plain is not None or (self.fit.is_noise_of_output and not self.fit.has_force)
+        return self.fit.is_noise_of_output and not self.fit.has_force
 
 
 def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ()) -> Scores:
@@ -174,20 +171,16 @@ def coefficients(fit: ErrorFit, score: Score) -> int:
 def refit_effect(
     fit: ErrorFit,
     score: Score,
-    whole: Fit,
     search: Search,
     begin: Isolator | None = None,
-    best: float = np.inf,
 ) -> Refit:
     """Fit the model with one absent effect, everything free, from where the score points.
 
     Args:
         fit: the model without it.
         score: the effect.
-        whole: the fit without it, and its campaign.
         search: the scales of the campaign.
         begin: where else to start: the model with the effect, every coefficient from the measured forces.
-        best: criterion below which a law that is rounded over a width is fitted more sharply.
 
     Returns:
         The refit, with what speaks against it whatever it gains.
@@ -204,23 +197,15 @@ def refit_effect(
     if begin is None:
         sizes = sizes._replace(force=max(fit.sizes.force, sizes.force - _SMALLER))
     scales = magnitudes(model, places, search.scales)
-    found = fit_measured(
-        model, places, scales, fit.filter.measured, sizes, starts, steps=fit.filter.steps, rough=True
-    )
-    width = f"{score.element.name}.width"
-    rounded = any(entry.name == width for entry in model.parameters)
-    if rounded and not found.is_noise_of_output and found.criterion < best:
-        found = sharpened(found, width, scales)
+    measured, steps = fit.filter.measured, fit.filter.steps
+    found = fit_measured(model, places, scales, measured, sizes, starts, steps, rough=True)
     if begin is not None:
         # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
         drop, extra = fit.deviance.sum() - found.deviance.sum(), max(1, len(places) - len(fit.places))
         chance = len(CATALOGUE) * stats.chi2.sf(max(0.0, drop), extra)
         p_value = float(min(1.0, chance))
         score = score._replace(element=begin.elements[-1], p_value=p_value, admissible=True)
-    violation, plain = _violation(fit, found, score), None
-    if violation is None and found.model.splits and not found.is_noise_of_output:
-        plain = fit_without_force(found, whole.model, whole.campaign, search)
-    return Refit(score, found, violation, plain)
+    return Refit(score, found, _violation(fit, found, score))
 
 
 def _violation(fit: ErrorFit, found: ErrorFit, score: Score) -> str | None:

@@ -72,4 +72,3 @@ from ._unlocked_tone import Tone as Tone
 from ._unlocked_tone import unlocked_tone as unlocked_tone
 from ._weighted_fits import complete as complete
 from ._weighted_fits import fit_with_errors as fit_with_errors
-from ._weighted_fits import fit_without_force as fit_without_force

@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import median_abs_deviation, norm
 
 from ..._parameters import element_names, list_parameters
 from ..._results import RESULTS, is_successful
@@ -16,7 +15,6 @@ from ..innovations import ErrorFit, Measured, fit_measured
 from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
-from ._errors import restarted_runs
 from ._estimate import SMALLEST_SCATTER, Estimate, magnitudes
 from ._evaluation import FreeEvaluation
 from ._fit_result import Fit
@@ -227,27 +225,6 @@ def noise_of_errors(found: ErrorFit, campaign: Campaign, alone: bool) -> NoiseEs
         "" if alone else "the error is not noise of the output: errors are compared with those of free runs"
     )
     return _with_levels(shown, campaign, own, note)
-
-
-def noise_beside_jumps(plain: Fit, shown: NoiseEstimate) -> NoiseEstimate:
-    """Give the noise that a fit leaves, by the median of its residual: jumps are few, and pass for noise.
-
-    Args:
-        plain: the fit.
-        shown: noise that the output shows.
-
-    Returns:
-        The noise.
-    """
-    own = [median_abs_deviation(left, scale=float(norm.ppf(0.75))) for left in left_by_record(plain)]
-    return _with_levels(shown, plain.campaign, np.array(own), "")
-
-
-def left_by_record(plain: Fit) -> list[Float[np.ndarray, " time"]]:
-    """Give what a fit leaves of each of its records, where samples count."""
-    found = plain.estimate
-    runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
-    return [run.residual[run.counted > 0.0] for run in runs]
 
 
 def _with_levels(

@@ -6,12 +6,12 @@ import numpy as np
 
 from ..._results import is_successful
 from ...models import Integrator, Isolator
-from ...records import Campaign, NoiseEstimate, estimate_noise
-from ..innovations import ErrorFit, is_white
+from ...records import Campaign, NoiseEstimate
+from ..innovations import ErrorFit
 from ._build_problem import build_problem
 from ._estimate import Estimate, estimate
 from ._evaluation import Evaluation
-from ._fit_of_errors import as_fit_of_errors, left_by_record, noise_beside_jumps, noise_of_errors
+from ._fit_of_errors import as_fit_of_errors, noise_of_errors
 from ._fit_result import Fit
 from ._integration_steps import find_integrator
 from ._noise_left import less_noise
@@ -21,9 +21,6 @@ from ._simulator import Simulator
 
 _WEIGHINGS = 4
 """Times that a fit is weighted anew by less noise."""
-
-_SAME_NOISE = 0.9
-"""Share of the noise by which a fit was weighted from which what it leaves is the same."""
 
 _OF_A_SOLUTION = ("chi2", "aic", "bic", "stiffness_scatter", "segment_scatter", "next_stiffness_scatter")
 """Statistics that a search which failed does not have."""
@@ -42,7 +39,7 @@ def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search
     """Make a fit of a model that was fitted together with the sizes of its errors.
 
     Where noise of the output is the only error, a search without a random force ends it: initial states are
-    then exact, and laws that jump are split where they do.
+    then exact. Of a law that jumps the filter has them, and sees jumps that are misplaced as such.
 
     Args:
         found: the model with the sizes of its errors.
@@ -53,48 +50,14 @@ def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search
     Returns:
         The fit.
     """
-    plain = fit_without_force(found, start, campaign, search)
-    return as_fit_of_errors(found, start, campaign) if plain is None else plain
-
-
-def fit_without_force(found: ErrorFit, start: Isolator, campaign: Campaign, search: Search) -> Fit | None:
-    """Fit again without a random force, from where a filter ended; None where that leaves more than noise.
-
-    Args:
-        found: the model with the sizes of its errors.
-        start: the isolator that the search started from.
-        campaign: the measurements.
-        search: how to search.
-
-    Returns:
-        The fit, or None.
-    """
-    alone, shown = found.is_noise_of_output, estimate_noise(campaign)
-    known = 0.0 < shown.sigma < np.inf and loudness(shown, campaign) < search.rules.loudest
-    # Whatever the filter foretells worse by far than the noise allows no simulation follows.
-    floor = shown.sigma * np.sqrt(search.rules.contradicted)
-    if not (alone or (found.model.splits and known and float(np.median(found.misses)) < floor)):
-        return None
-    noise = noise_of_errors(found, campaign, alone=True) if alone else shown
-    simulator = simulator_for(found.model, campaign, noise, None, uncut=True)
-    near = search._replace(max_steps=_FEW_STEPS)
-    plain = complete(estimate(simulator, found.model, found.places, near), start, campaign, noise)
-    if not (is_successful(plain.result) and np.all(np.isfinite(plain.covariance))):
-        return None
-    if alone:
-        return plain._replace(innovations=found)
-    # The filter rounds laws that jump. Where these are split instead, its random force has nothing to say.
-    for _ in range(_WEIGHINGS):
-        left = noise_beside_jumps(plain, shown)
-        if all(new > _SAME_NOISE * old for new, old in zip(left.levels, plain.noise.levels, strict=True)):
-            break
-        again = weighted_by(plain, left, search)
-        if again is plain:
-            break
-        plain = again
-    near = plain.stats.chi2 < search.rules.near_noise * plain.stats.dof
-    near = near and all(map(is_white, left_by_record(plain)))
-    return plain if near and plain.noise.sigma < search.rules.near_noise * shown.sigma else None
+    if found.is_noise_of_output and not found.model.splits:
+        noise = noise_of_errors(found, campaign, alone=True)
+        simulator = simulator_for(found.model, campaign, noise, None, uncut=True)
+        near = search._replace(max_steps=_FEW_STEPS)
+        plain = complete(estimate(simulator, found.model, found.places, near), start, campaign, noise)
+        if is_successful(plain.result) and np.all(np.isfinite(plain.covariance)):
+            return plain._replace(innovations=found)
+    return as_fit_of_errors(found, start, campaign)
 
 
 def with_less_noise(found: Fit, search: Search) -> Fit:

@@ -1,7 +1,7 @@
 """The model of the error: noise of the output, and a random force that stands for what else disturbs.
 
 Read `_filter` (innovations of records side by side, and their derivatives), `_measured` and `_record_filter`
-(a model's filter over the records of a campaign), `_error_fit` (a fit with the sizes of its errors),
+(a model's filter over the records of a campaign), `_sizes` (of its errors), `_error_fit` (a fit with these),
 `_fit_errors` (the search), `_fit_measured` (as many integration steps as the motion needs) and
 `_effect_products` (what absent effects would add).
 """
@@ -9,12 +9,10 @@ Read `_filter` (innovations of records side by side, and their derivatives), `_m
 from ._effect_products import EffectProducts as EffectProducts
 from ._effect_products import effect_products as effect_products
 from ._error_fit import ErrorFit as ErrorFit
-from ._error_fit import is_white as is_white
 from ._fit_errors import first_sizes as first_sizes
 from ._fit_errors import fit_errors as fit_errors
 from ._fit_measured import fit_measured as fit_measured
 from ._fit_measured import refined as refined
-from ._fit_measured import sharpened as sharpened
 from ._measured import Measured as Measured
 from ._record_filter import RecordFilter as RecordFilter
-from ._record_filter import Sizes as Sizes
+from ._sizes import Sizes as Sizes

@@ -11,7 +11,8 @@ from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ...models import Isolator
 from ._filter import Trace
-from ._record_filter import RecordFilter, Sizes, Way
+from ._record_filter import RecordFilter
+from ._sizes import Sizes, Way
 
 _NO_FORCE = 0.05
 """Share of the innovations' variance below which the random force does not matter."""
@@ -175,18 +176,6 @@ class ErrorFit:
     def criterion(self) -> float:
         """Schwarz's criterion."""
         return float(self.deviance.sum()) + len(self.places) * float(np.log(self.samples))
-
-
-def is_white(errors: Float[np.ndarray, " time"]) -> bool:
-    """Say whether earlier errors hardly foretell one.
-
-    Args:
-        errors: sample by sample.
-
-    Returns:
-        Whether that is so.
-    """
-    return foretold(errors) < _WHITE_ENOUGH
 
 
 def foretold(errors: Float[np.ndarray, " time"]) -> float:

@@ -3,10 +3,11 @@
 `y_k = h(z_k, u_k + w_k) + e_k`, `z_(k+1) = f(z_k, u_k + w_k)`, `w_(k+1) = a w_k + n_k`. The random force w
 stands for noise of the drive and for what the model does not know; it is white (a = 0) or has a memory.
 e is the noise of the output. The mean of the state takes the whole nonlinear step, its covariance the step's
-derivatives.
+derivatives. A step is split where a law jumps or bends. An innovation that is far too large for its variance
+counts for less: a spike of the record, or a reading on the other side of a jump.
 
 Source: Jazwinski 1970, Stochastic Processes and Filtering Theory, sec. 8.3; Kristensen, Madsen & Jorgensen
-2004, Automatica 40:225 (grey-box models with system noise).
+2004, Automatica 40:225 (grey-box models with system noise); Huber 1964, Ann. Math. Stat. 35:73 (weights).
 """
 
 from collections.abc import Callable, Sequence
@@ -19,11 +20,14 @@ from jaxtyping import Array, Float
 from ..._kernel_scan import kernel_scan
 from ..._parameters import replace_parameters
 from ..._quick_jit import quick_jit
-from ...models import RK4, Instant, Isolator, Quantity, State, advance, split_stages
+from ...models import RK4, Instant, Isolator, Quantity, State, advance_record, read_record, split_stages
 from ..jacobian import Batch
 
 _IN_A_KERNEL = 4
 """Internal states up to which the loop is one kernel: to compile it takes long where it is large."""
+
+_USUAL = 4.0
+"""Standard deviations within which an innovation counts in full: of normal ones 1 in 16,000 lies beyond."""
 
 _ORDERS = 4
 """Terms of the exponential that carries the covariance over a sample."""
@@ -54,7 +58,8 @@ class Trace(NamedTuple):
         states: before each sample is seen, the random force last.
         gains: of each, over the innovation.
         error: innovations [SI unit of the output].
-        deviation: their standard deviation; infinite where a sample does not count.
+        deviation: by which they are weighed: their standard deviation, larger where one is unusually large;
+            infinite where a sample does not count.
     """
 
     states: State
@@ -68,7 +73,7 @@ class Followed(NamedTuple):
 
     Attributes:
         deviance: sum of `log s + e^2/s` over innovations e of variance s, -2 log-likelihood but for a
-            constant.
+            constant; `e^2/s` at most what is usual.
         square: mean square of each state.
         slope: of half the deviance with each of the sizes by which groups of lanes differ.
         fisher: its information.
@@ -84,7 +89,7 @@ class Followed(NamedTuple):
 
 def _read(model: Isolator, quantity: Quantity, state: State, at: Instant) -> Array:
     """Give the reading of a state, the random force last."""
-    return model.reading(state[:-1], at._replace(drive=at.drive + state[-1]), quantity)
+    return read_record(model, state[:-1], at._replace(drive=at.drive + state[-1]), quantity)
 
 
 def _predict(
@@ -92,7 +97,8 @@ def _predict(
 ) -> State:
     """Give the state one sample later, the random force constant on the way."""
     pushed = tuple(at._replace(drive=at.drive + state[-1]) for at in stages)
-    return (*advance(model, RK4(), quantity, step, state[:-1], pushed), memory * state[-1])
+    ahead, _ = advance_record(model, RK4(), quantity, step, state[:-1], pushed)
+    return (*ahead, memory * state[-1])
 
 
 def _delayed(
@@ -108,6 +114,11 @@ def _delayed(
 
 def _correct(state: State, gain: State, error: Array) -> State:
     return tuple(one + k * error for one, k in zip(state, gain, strict=True))
+
+
+def _trust(error: Array, variance: Array) -> Array:
+    """Give the share with which an innovation counts."""
+    return jnp.minimum(1.0, _USUAL * jnp.sqrt(variance) / jnp.maximum(jnp.abs(error), 1e-300))
 
 
 def _update(
@@ -129,26 +140,63 @@ def _update(
     def read(state: State) -> Array:
         return _read(model, quantity, state, stages[0])
 
-    predicted = read(state)
+    error = measured - read(state)
     slopes = [jax.jvp(read, (state,), (unit,))[1] for unit in units]
     seen = [sum(covariance[row][other] * slopes[other] for other in every) for row in every]
     variance = sum((slopes[row] * seen[row] for row in every), start=lanes.noise)
-    gain = tuple(used * one / variance for one in seen)
+    share = used * _trust(error, variance)
+    gain = tuple(share * one / variance for one in seen)
     after = [[covariance[row][other] - gain[row] * seen[other] for other in every] for row in every]
-    moved = _correct(state, gain, measured - predicted)
-    # A covariance needs no more than the rates' derivatives in the middle of the sample, in a truncated
-    # exponential: those of the whole step take three times as long to compile. Internal states that follow
-    # within a sample need it squared: as often as the step is halved.
+    moved = _correct(state, gain, error)
+    carry = _split_transition if model.splits else _smooth_transition
+    ahead = carry(model, quantity, step, lanes.memory, moved, stages)
+    mixed = [[sum(after[row][other] * ahead[other][to] for other in every) for row in every] for to in every]
+    upper: dict[tuple[int, int], Array] = {
+        (to, other): sum((ahead[row][other] * mixed[to][row] for row in every), start=zero)
+        for to in every
+        for other in range(to, len(state))
+    }
+    upper[last, last] = upper[last, last] + (1.0 - lanes.memory**2) * lanes.force
+    return gain, variance, tuple(tuple(upper[min(a, b), max(a, b)] for b in every) for a in every)
+
+
+def _split_transition(
+    model: Isolator, quantity: Quantity, step: float, memory: Array, state: State, stages: tuple[Instant, ...]
+) -> list[State]:
+    """Give what a unit of each state becomes a sample later, where the step is split at jumps and bends."""
+    size = len(state)
+    units = jnp.broadcast_to(jnp.eye(size)[..., None], (size, size, *state[0].shape))
+    _, ahead = jax.vmap(
+        lambda unit: jax.jvp(
+            lambda state: _predict(model, quantity, step, memory, state, stages), (state,), (tuple(unit),)
+        ),
+        out_axes=(None, 0),
+    )(units)
+    return [tuple(one[place] for one in ahead) for place in range(size)]
+
+
+def _smooth_transition(
+    model: Isolator, quantity: Quantity, step: float, memory: Array, state: State, stages: tuple[Instant, ...]
+) -> list[State]:
+    """Give what a unit of each state becomes a sample later, by the rates' derivatives in the middle of it.
+
+    A covariance needs no more, in a truncated exponential: the derivatives of the whole step take three
+    times as long to compile. Internal states that follow within a sample need it squared: as often as the
+    step is halved.
+    """
+    every, last = range(len(state)), len(state) - 1
+    zero = jnp.zeros_like(state[0])
+    units = [tuple(zero + float(row == place) for row in every) for place in every]
     halvings = (len(stages) // 2).bit_length() - 1 if model.internal_states else 0
     part = step / 2**halvings
-    ends = _predict(model, quantity, step, lanes.memory, moved, stages)
-    middle = tuple(0.5 * (one + other) for one, other in zip(moved[:-1], ends[:-1], strict=True))
+    ends = _predict(model, quantity, step, memory, state, stages)
+    middle = tuple(0.5 * (one + other) for one, other in zip(state[:-1], ends[:-1], strict=True))
     half = stages[len(stages) // 2]
 
     def rates(state: State) -> State:
         return model.rates(state[:-1], half._replace(drive=half.drive + state[-1]), quantity)
 
-    slope = [jax.jvp(rates, ((*middle, moved[-1]),), (unit,))[1] for unit in units]
+    slope = [jax.jvp(rates, ((*middle, state[-1]),), (unit,))[1] for unit in units]
     ahead = []
     for place in every:
         column = [part * one + zero for one in slope[place]]
@@ -164,15 +212,8 @@ def _update(
             tuple(sum((ahead[row][to] * column[row] for row in every), start=zero) for to in every)
             for column in ahead
         ]
-    ahead[last] = (*ahead[last][:last], lanes.memory + zero)
-    mixed = [[sum(after[row][other] * ahead[other][to] for other in every) for row in every] for to in every]
-    upper: dict[tuple[int, int], Array] = {
-        (to, other): sum((ahead[row][other] * mixed[to][row] for row in every), start=zero)
-        for to in every
-        for other in range(to, len(state))
-    }
-    upper[last, last] = upper[last, last] + (1.0 - lanes.memory**2) * lanes.force
-    return gain, variance, tuple(tuple(upper[min(a, b), max(a, b)] for b in every) for a in every)
+    ahead[last] = (*ahead[last][:last], memory + zero)
+    return ahead
 
 
 def _scan_of(model: Isolator) -> Callable[..., Any]:
@@ -220,18 +261,19 @@ def follow_records(
         )
         error = measured - _read(present, quantity, state, stages[0])
         variance = jnp.where(used > 0.0, variance, 1.0)
-        deviance = deviance + weight * (jnp.log(variance) + error**2 / variance)
+        trust = _trust(error, variance)
+        ratio = jnp.minimum(error**2 / variance, _USUAL**2)
+        deviance = deviance + weight * (jnp.log(variance) + ratio)
         square = tuple(old + weight * one**2 for old, one in zip(square, state, strict=True))
-        shares = [one.reshape(-1, kept) for one in (error, jnp.log(variance), variance, weight)]
-        by_error, by_log = ((one[1::2] - one[2::2]) / (2.0 * spacing) for one in shares[:2])
-        own, weigh = shares[2][0], shares[3][0]
-        excess = 0.5 * (1.0 - shares[0][0] ** 2 / own)
+        shares = [one.reshape(-1, kept) for one in (error, jnp.log(variance))]
+        by_error, by_log = ((one[1::2] - one[2::2]) / (2.0 * spacing) for one in shares)
+        own, weigh, first = variance[:kept], weight[:kept], trust[:kept] * error[:kept]
         scaled = by_error / jnp.sqrt(own)[None]
-        by_size = by_log * excess[None] + scaled * (shares[0][0] / jnp.sqrt(own))[None]
+        by_size = 0.5 * by_log * (1.0 - ratio[:kept])[None] + scaled * (first / jnp.sqrt(own))[None]
         slope = slope + weigh[None] * by_size
         squares = 0.5 * by_log[:, None] * by_log[None] + scaled[:, None] * scaled[None]
         fisher = fisher + weigh[None, None] * squares
-        seen = Trace(state, gain, error, jnp.where(weight > 0.0, jnp.sqrt(variance), jnp.inf))
+        seen = Trace(state, gain, error, jnp.where(weight > 0.0, jnp.sqrt(variance / trust), jnp.inf))
         after = _predict(present, quantity, step, lanes.memory, _correct(state, gain, error), stages)
         return (after, ahead, deviance, square, slope, fisher), jax.tree.map(lambda one: one[:kept], seen)
 
@@ -255,13 +297,14 @@ def innovation_products(
     values: tuple[Array, ...],
     directions: tuple[Array, ...],
     start: State,
+    start_directions: Float[Array, "state direction"],
     memory: Array,
     trace: Trace,
     batch: Batch,
     quantity: Quantity,
     step: float,
     tabled: tuple[Array, Array],
-) -> Float[Array, "column column lanes"]:
+) -> Float[Array, "row row lanes"]:
     """Differentiate the innovations with the gains and their deviations held.
 
     Args:
@@ -269,6 +312,7 @@ def innovation_products(
         values: its parameters, one a lane.
         directions: change of each with the columns; no entries of those that do not move.
         start: mean of the first state.
+        start_directions: change of it with the columns.
         memory: correlation of the random force from sample to sample.
         trace: gains and deviations.
         batch: the records.
@@ -279,8 +323,7 @@ def innovation_products(
     Returns:
         `A^T A` of each lane, with A the columns of de/dtheta and, last, e, over their deviations.
     """
-    columns = max((one.shape[0] for one in directions if one.size), default=0)
-    count = batch.measured.shape[1]
+    columns, count = start_directions.shape[1], batch.measured.shape[1]
     moving = [place for place, one in enumerate(directions) if one.size]
     known = tuple(values[place] for place in moving)
     seeds = tuple(jnp.broadcast_to(directions[place][:, None], (columns, count)) for place in moving)
@@ -314,7 +357,7 @@ def innovation_products(
         return (state, tangents, products + rows[:, None] * rows[None]), None
 
     begun = tuple(one + jnp.zeros(count) for one in start)
-    tangents = tuple(jnp.zeros((columns, count)) for _ in start)
+    tangents = tuple(jnp.broadcast_to(one[:, None], (columns, count)) for one in start_directions)
     empty = jnp.zeros((columns + 1, columns + 1, count))
     tables = batch.acting, batch.measured, trace.gains, trace.deviation
     return _scan_of(model)(body, (begun, tangents, empty), tables)[0][2]

@@ -11,7 +11,8 @@ from ..._parameters import list_parameters, replace_parameters, to_free
 from ..._results import RESULTS
 from ..._types import on_device
 from ._error_fit import ErrorFit
-from ._record_filter import COPIES, FURTHEST, RecordFilter, Sizes, Way, physical
+from ._record_filter import COPIES, RecordFilter, physical
+from ._sizes import FURTHEST, Sizes, Way
 
 _MOST_SCORINGS = 40
 """Steps of a search at most."""
@@ -38,7 +39,7 @@ _LEAST_NOISE = 1e-6
 """Noise below which the output has none but rounding and the error of the steps [rms of the output]."""
 
 _ASTRAY = 10.0
-"""Deviance a sample from which a filter may have begun in a wrong state."""
+"""Surprise a sample from which a filter may have begun in a wrong state."""
 
 _NO_WORSE = 10.0
 """Rise of the deviance up to which there is no random force: Schwarz's criterion of one size less."""
@@ -76,6 +77,12 @@ def first_sizes(record_filter: RecordFilter) -> Sizes:
         np.log(_FIRST_MEMORY) if record_filter.feeds_through else _WHITE,
         least.noise + 2.0 * np.log(0.01 / _LEAST_NOISE),
     )
+
+
+def simulation_sizes(record_filter: RecordFilter) -> Sizes:
+    """Give sizes of a filter that all but simulates: whatever its model leaves is noise."""
+    least = least_sizes(record_filter)
+    return least._replace(noise=least.noise - 2.0 * np.log(_LEAST_NOISE))
 
 
 def fit_errors(
@@ -150,11 +157,14 @@ def fit_errors(
     result: Any = RESULTS.not_converged
     for step in range(1, most + 1):
         way = followed([free] * COPIES, sizes.around())
-        if step == 1 and not over(way.deviance[0]) < _ASTRAY * record_filter.samples:
+        lost = not way.surprise < _ASTRAY * record_filter.samples
+        if step == 1 and (lost or np.all(np.isinf(loudest))):
             record_filter.seek_starts(places, points([free])[0], sizes)
             way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
             record_filter.spread[2:] = np.where(np.isfinite(way.squares), way.squares, 0.0)
+        if record_filter.model.splits:
+            record_filter.settle_starts(places, points([free])[0], way)
         deviance = float(over(way.deviance[0]))
         products = over(record_filter.products(places, points([free]), way, columns=True)[:, :, 0])
         if not (np.isfinite(deviance) and np.all(np.isfinite(products))):

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from ..._parameters import list_parameters, replace_parameters
 from ..._results import is_successful
 from ...models import Isolator
 from ._error_fit import ErrorFit
-from ._fit_errors import first_sizes, fit_errors
+from ._fit_errors import first_sizes, fit_errors, simulation_sizes
 from ._measured import Measured
-from ._record_filter import COPIES, RecordFilter, Sizes
+from ._record_filter import COPIES, RecordFilter
+from ._sizes import Sizes
 
 SUBSTEPS = (2, 8, 16)
 """Integration steps a sample that are tried in turn."""
@@ -22,9 +22,6 @@ MOST_SEARCHES = 3
 SMALL = 0.1
 SMALL_SHARE = 3e-5
 """Change of the deviance by twice as many steps below which their error does not matter: and a sample."""
-
-SHARPER = 8.0
-"""Ratio of the widths of a rounded law that are tried in turn."""
 
 ROUGH_SHARE = 1e-3
 """The same a sample where a fit is only ranked."""
@@ -42,8 +39,7 @@ def fit_measured(
 ) -> ErrorFit:
     """Fit a model to records, with as many integration steps as show which law it is.
 
-    A law that bends within a sample is another law where the steps are coarse. One that jumps is never
-    integrated well: it is split elsewhere.
+    A law that bends within a sample is another law where the steps are coarse, unless they are split there.
 
     Args:
         model: start.
@@ -63,7 +59,6 @@ def fit_measured(
     for finer in levels:
         record_filter = RecordFilter(model, measured, finer)
         first = first_sizes(record_filter) if sizes is None else sizes
-        first = first._replace(noise=np.minimum(first.noise, measured.loudest))
         found = fit_errors(
             record_filter,
             places,
@@ -73,6 +68,10 @@ def fit_measured(
             starts=starts,
             rough=rough,
         )
+        if model.splits and not found.is_noise_of_output:
+            found = min(
+                (found, _simulated(found, magnitudes, starts, rough)), key=lambda one: float(one.criterion)
+            )
         if np.isfinite(found.deviance.sum()):
             if model.slides or finer == levels[-1] or steps_are_fine(found, ROUGH_SHARE):
                 break
@@ -85,6 +84,8 @@ def fit_measured(
 
 def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     """Fit to the end, with twice as many integration steps until these leave the innovations as they are.
+
+    Where friction holds the mass readings beside a jump never are: they are split whatever the steps.
 
     Args:
         found: a fit.
@@ -105,7 +106,7 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
             loudest=measured.loudest,
             starts=(found.values,),
         )
-    while not steps_are_fine(found):
+    while not (found.model.slides or steps_are_fine(found)):
         steps = 2 * found.filter.steps
         if steps > SUBSTEPS[-1]:
             return found
@@ -117,36 +118,35 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     return found
 
 
-def sharpened(found: ErrorFit, width: str, magnitudes: Sequence[float]) -> ErrorFit:
-    """Fit again with a law that is rounded less, as long as that explains the records better.
+def _simulated(
+    found: ErrorFit,
+    magnitudes: Sequence[float],
+    starts: Sequence[Float[np.ndarray, " column"]],
+    rough: bool,
+) -> ErrorFit:
+    """Fit once more, from a filter on that all but simulates, whose noise is whatever the model leaves.
 
-    A width that is right for the large motion of one record rounds all of the small motion of another.
-
-    Args:
-        found: a fit with the law.
-        width: name of the parameter over which it is rounded.
-        magnitudes: of its coefficients.
-
-    Returns:
-        The best fit.
+    Where a law jumps a filter that trusts the records learns little of it; a simulation finds the jumps.
     """
-    while True:
-        numbers = [
-            entry.value / SHARPER if entry.name == width else entry.value
-            for entry in list_parameters(found.model)
-        ]
-        again = fit_measured(
-            replace_parameters(found.model, numbers),
-            found.places,
-            magnitudes,
-            found.filter.measured,
-            found.sizes,
-            steps=found.filter.steps,
-            rough=True,
-        )
-        if not again.criterion < found.criterion - ROUGH_SHARE * found.samples:
-            return found
-        found = again
+    old, measured = found.filter, found.filter.measured
+    begun = fit_errors(
+        RecordFilter(old.model, measured, old.steps),
+        found.places,
+        magnitudes,
+        simulation_sizes(old),
+        loudest=np.full_like(measured.loudest, np.inf),
+        starts=(*starts[: COPIES - 2], found.values),
+        rough=True,
+    )
+    return fit_errors(
+        begun.filter,
+        found.places,
+        magnitudes,
+        begun.sizes,
+        loudest=measured.loudest,
+        starts=(begun.values,),
+        rough=rough,
+    )
 
 
 def steps_are_fine(found: ErrorFit, share: float = SMALL_SHARE) -> bool:

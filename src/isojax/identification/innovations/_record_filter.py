@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -13,102 +13,15 @@ from ..._parameters import ParameterSpec, list_parameters
 from ..._types import on_device
 from ...models import Isolator, State
 from ..jacobian import FIRST_STATES, Batch, workers
-from ._filter import Followed, Lanes, Trace, follow_records, innovation_products
+from ._filter import Followed, Lanes, follow_records, innovation_products
 from ._measured import Measured
-
-SPACING = 0.05
-"""Difference of the logarithm of a size over which the likelihood is differentiated."""
+from ._sizes import SPACING, Sizes, Way
 
 COPIES = 7
 """Points at which a filter runs side by side: one, and six with other sizes."""
 
 _FINER = (1.0, 0.3, 0.1)
 """Spacing of the first states that are tried in turn, over that of `FIRST_STATES`."""
-
-_RIDGE = 1e-3
-"""Share of its own information that each size has beside it: those that depend on each other stay apart."""
-
-FURTHEST = 3.0
-"""Longest step of the logarithm of a size."""
-
-
-class Sizes(NamedTuple):
-    """Sizes of the errors.
-
-    Attributes:
-        force: variance of what is new in the random force at each sample, log [squared SI unit of the drive];
-            common to the records.
-        memory: its correlation time, log [samples]; white from sample to sample where it is short.
-        noise: variance of the output's noise in each record, log [squared SI unit of the output].
-    """
-
-    force: float
-    memory: float
-    noise: Float[np.ndarray, " record"]
-
-    def around(self) -> tuple["Sizes", ...]:
-        """Give these sizes, and each a little larger and a little smaller."""
-        ups = (SPACING, -SPACING)
-        return (
-            self,
-            *(self._replace(force=self.force + up) for up in ups),
-            *(self._replace(memory=self.memory + up) for up in ups),
-            *(self._replace(noise=self.noise + up) for up in ups),
-        )
-
-    def moved(
-        self,
-        way: "Way",
-        judged: Float[np.ndarray, " record"],
-        bounds: tuple["Sizes", "Sizes"],
-        furthest: float,
-    ) -> "Sizes":
-        """Give the sizes after a step of Fisher's scoring.
-
-        Of innovations that scale with a size the step is the logarithm of one plus the linear one, exactly.
-
-        Args:
-            way: the filter with these sizes, and its slopes with them.
-            judged: 1 for the records that are fitted, 0 for those that take no part.
-            bounds: smallest and largest sizes.
-            furthest: longest step.
-
-        Returns:
-            The sizes, within their bounds.
-        """
-        count = judged.size
-        # A record that takes no part may have diverged.
-        slopes, information = (np.where(np.isfinite(one), one, 0.0) for one in (way.slope, way.fisher))
-        here, lower, upper = (np.r_[one.force, one.memory, one.noise] for one in (self, *bounds))
-        slope = np.concatenate([(slopes[:2] * judged).sum(axis=1), slopes[2]])
-        fisher = np.zeros((2 + count, 2 + count))
-        fisher[:2, :2] = (information[:2, :2] * judged).sum(axis=-1)
-        fisher[:2, 2:] = information[:2, 2] * judged
-        fisher[2:, :2] = fisher[:2, 2:].T
-        fisher[range(2, 2 + count), range(2, 2 + count)] = information[2, 2]
-        fisher += _RIDGE * np.diag(np.diag(fisher)) + np.eye(2 + count)
-        # What stands at a bound and pushes against it stays there, and the others do not count on it.
-        held = ((here <= lower) & (slope >= 0.0)) | ((here >= upper) & (slope <= 0.0))
-        free, step = np.flatnonzero(~held), np.zeros(2 + count)
-        step[free] = -np.linalg.solve(fisher[np.ix_(free, free)], slope[free])
-        step = np.clip(np.log(np.maximum(1.0 + step, np.exp(-furthest))), -furthest, furthest)
-        moved = here + step
-        return Sizes(float(moved[0]), float(moved[1]), moved[2:]).within(bounds)
-
-    def within(self, bounds: tuple["Sizes", "Sizes"]) -> "Sizes":
-        """Give the sizes that lie nearest, between the smallest and the largest."""
-        force, memory, noise = (np.clip(*each) for each in zip(self, *bounds, strict=True))
-        return Sizes(float(force), float(memory), noise)
-
-    @property
-    def correlation(self) -> float:
-        """Correlation of the random force from sample to sample."""
-        return float(np.exp(-np.exp(-self.memory)))
-
-    @property
-    def variance(self) -> float:
-        """Variance of the random force [squared SI unit of the drive]."""
-        return float(np.exp(self.force) / (1.0 - self.correlation**2))
 
 
 def physical(
@@ -158,6 +71,7 @@ class RecordFilter:
         self.starts, self.spread = np.zeros((states, self.count)), np.zeros((states, self.count))
         self.starts[:2] = prepared.starts[:, : self.count]
         self.spread[:2] = prepared.spread[:, : self.count] ** 2
+        self.centers, self.prior = self.starts, self.spread
         self._tabled = (
             on_device(np.asarray(model.shift(), dtype=float)),
             on_device(np.asarray(model.skew(), dtype=float)),
@@ -192,6 +106,7 @@ class RecordFilter:
         """
         other = RecordFilter(model, self.measured, steps)
         other.starts, other.spread = self.starts.copy(), self.spread.copy()
+        other.centers, other.prior = self.centers, self.prior
         return other
 
     def follow(
@@ -200,7 +115,7 @@ class RecordFilter:
         points: Float[np.ndarray, "copy column"],
         sizes: Sequence[Sizes],
         starts: Float[np.ndarray, "copy state record"] | None = None,
-    ) -> "Way":
+    ) -> Way:
         """Filter every record at several points.
 
         Args:
@@ -255,7 +170,7 @@ class RecordFilter:
         )
 
     def products(
-        self, places: tuple[int, ...], points: Float[np.ndarray, "copy column"], way: "Way", columns: bool
+        self, places: tuple[int, ...], points: Float[np.ndarray, "copy column"], way: Way, columns: bool
     ) -> Float[np.ndarray, "row row copy record"]:
         """Give the products of innovations at several points, with the gains of a way held.
 
@@ -268,11 +183,23 @@ class RecordFilter:
         Returns:
             `A^T A`, see `innovation_products`; not finite where a motion diverged.
         """
-        copies, unit = len(points), np.eye(len(places))
+        unit = np.eye(len(places))
         directions = tuple(
             on_device(unit[places.index(place)] if columns and place in places else np.zeros(0))
             for place in range(len(self._numbers))
         )
+        still = np.zeros((len(self.starts) + 1, len(places) if columns else 0))
+        return self._products(places, points, way, directions, still)
+
+    def _products(
+        self,
+        places: tuple[int, ...],
+        points: Float[np.ndarray, "copy column"],
+        way: Way,
+        directions: tuple[Array, ...],
+        start_directions: Float[np.ndarray, "state direction"],
+    ) -> Float[np.ndarray, "row row copy record"]:
+        copies = len(points)
 
         def one(part: int) -> Array:
             trace = way.traces[part]
@@ -285,6 +212,7 @@ class RecordFilter:
                 values,
                 directions,
                 self._start(part, copies),
+                on_device(start_directions),
                 memory,
                 trace,
                 batch,
@@ -294,6 +222,39 @@ class RecordFilter:
             )
 
         return self._by_record(self._in_parts(one), copies)
+
+    def settle_starts(self, places: tuple[int, ...], point: Float[np.ndarray, " column"], way: Way) -> None:
+        """Begin each record where its innovations are least, by one step of Gauss and Newton.
+
+        A filter corrects its start by the first samples. Where a law jumps that does not do: the position at
+        which dry friction holds a mass shows much later.
+
+        Args:
+            places: parameters that are given.
+            point: their values.
+            way: the filter with them.
+        """
+        size, none = len(self.starts), (on_device(np.zeros(0)),) * len(self._numbers)
+        unit = np.vstack([np.eye(size), np.zeros((1, size))])
+        products = self._products(places, point[None], way, none, unit)[:, :, 0]
+        scale = np.sqrt(np.maximum(self.prior, 1e-300))
+        moved, known = self.starts.copy(), self.spread.copy()
+        for record in np.flatnonzero(np.isfinite(products).all(axis=(0, 1))):
+            own = scale[:, record]
+            inner = products[:-1, :-1, record] * np.outer(own, own) + np.eye(size)
+            outer = products[:-1, -1, record] * own + (self.starts - self.centers)[:, record] / own
+            moved[:, record] -= own * np.linalg.solve(inner, outer)
+            known[:, record] = own**2 * np.diag(np.linalg.inv(inner))
+        tried = [moved]
+        if self.model.slides:  # no small step leads to where friction holds the mass
+            tried.append(np.array([row if state != 1 else 0.0 * row for state, row in enumerate(moved)]))
+        least = products[-1, -1]
+        for starts in tried:
+            old, self.starts = self.starts, starts
+            squares = self.products(places, point[None], way, columns=False)[0, 0, 0]
+            better = squares < least
+            self.starts, least = np.where(better, starts, old), np.where(better, squares, least)
+            self.spread = np.where(better, known, self.spread)
 
     def _in_parts(self, work: Callable[[int], Any]) -> list[Any]:
         """Work on each batch in a thread of its own."""
@@ -373,23 +334,3 @@ class RecordFilter:
                 lambda one: on_device(np.tile(np.asarray(one), copies)) if np.ndim(one) else one, batch
             )
         return self._copied[part, copies]
-
-
-class Way(NamedTuple):
-    """A filter along the records.
-
-    Attributes:
-        deviance: at each point and record; infinite where the filter diverged.
-        squares: mean square of each internal state at the first point.
-        slope: of half the deviance of each record there with the sizes.
-        fisher: its information.
-        correlation: of the random force there, from sample to sample.
-        traces: of each batch, at the first point.
-    """
-
-    deviance: Float[np.ndarray, "copy record"]
-    squares: Float[np.ndarray, "internal record"]
-    slope: Float[np.ndarray, "size record"]
-    fisher: Float[np.ndarray, "size size record"]
-    correlation: float
-    traces: list[Trace]
