@@ -20,6 +20,7 @@ from ._estimate import Estimate, estimate, free_places
 from ._fit_of_errors import fit_errors_of, suits_innovations
 from ._fit_result import Fit
 from ._noise_left import noise_left
+from ._problem import Problem
 from ._search import DEFAULT_SOLVER, MOST_EVALUATIONS, Search, search_of
 from ._weighted_fits import complete, fit_with_errors, loudness, simulator_for, weighted_by, with_less_noise
 
@@ -149,8 +150,9 @@ def fit_by_output(
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
     usual = is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof
-    lost = whole and not is_successful(found.result) and suits_innovations(campaign, stepped=True)
-    if lost or (followed and not (usual and loudness(noise, campaign) < search.rules.loudest)):
+    lost = whole and (not is_successful(found.result) or found.chi2 > _of_none(found.problem))
+    far = followed and not (usual and loudness(noise, campaign) < search.rules.loudest)
+    if far or (lost and suits_innovations(campaign, stepped=True)):
         search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     return with_less_noise(complete(found, model, campaign, noise), search)
@@ -189,6 +191,12 @@ def weighted_by_output(found: Fit, search: Search) -> Fit:
     if found.noise.method != "residual" or found.innovations is not None or jumps:
         return found
     return with_less_noise(weighted_by(found, estimate_noise(found.campaign), search), search)
+
+
+def _of_none(problem: Problem) -> float:
+    """Give chi2 of a mass that stands still: a fit that leaves more is none."""
+    pairs = zip(problem.records, problem.noise, strict=True)
+    return problem.share * sum(float(np.sum((record.output / noise) ** 2)) for record, noise in pairs)
 
 
 def _linear_part(model: Isolator, places: tuple[int, ...]) -> Isolator:

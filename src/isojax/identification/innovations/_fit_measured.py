@@ -85,7 +85,8 @@ def fit_measured(
 def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     """Fit to the end, with twice as many integration steps until these leave the innovations as they are.
 
-    Where friction holds the mass readings beside a jump never are: they are split whatever the steps.
+    Readings beside the jumps of dry friction hardly ever are; there, until they make the records no more
+    probable.
 
     Args:
         found: a fit.
@@ -106,13 +107,14 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
             loudest=measured.loudest,
             starts=(found.values,),
         )
-    while not (found.model.slides or steps_are_fine(found)):
+    while not steps_are_fine(found):
         steps = 2 * found.filter.steps
         if steps > SUBSTEPS[-1]:
             return found
         finer = found.filter.with_steps(steps, found.model)
         again = fit_errors(finer, found.places, magnitudes, found.sizes, loudest=measured.loudest)
-        if not np.isfinite(again.deviance.sum()):
+        gain = float(found.deviance.sum() - again.deviance.sum())
+        if not (np.isfinite(gain) and (gain > SMALL or not found.model.slides)):
             return found
         found = again
     return found
