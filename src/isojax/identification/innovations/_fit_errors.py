@@ -162,9 +162,8 @@ def fit_errors(
             record_filter.seek_starts(places, points([free])[0], sizes)
             way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
-            record_filter.spread[2:] = np.where(np.isfinite(way.squares), way.squares, 0.0)
-        if record_filter.model.splits:
-            record_filter.settle_starts(places, points([free])[0], way)
+            record_filter.widen(way.squares)
+        record_filter.settle_starts(places, points([free])[0], way)
         deviance = float(over(way.deviance[0]))
         products = over(record_filter.products(places, points([free]), way, columns=True)[:, :, 0])
         if not (np.isfinite(deviance) and np.all(np.isfinite(products))):

@@ -73,7 +73,7 @@ def fit_measured(
                 (found, _simulated(found, magnitudes, starts, rough)), key=lambda one: float(one.criterion)
             )
         if np.isfinite(found.deviance.sum()):
-            if model.slides or finer == levels[-1] or steps_are_fine(found, ROUGH_SHARE):
+            if model.splits or finer == levels[-1] or steps_are_fine(found, ROUGH_SHARE):
                 break
             starts = (found.values, *starts[: COPIES - 2])
             if is_successful(found.result):
@@ -140,6 +140,8 @@ def _simulated(
         starts=(*starts[: COPIES - 2], found.values),
         rough=True,
     )
+    if not begun.criterion < found.criterion:
+        return found
     return fit_errors(
         begun.filter,
         found.places,

@@ -71,7 +71,7 @@ class RecordFilter:
         self.starts, self.spread = np.zeros((states, self.count)), np.zeros((states, self.count))
         self.starts[:2] = prepared.starts[:, : self.count]
         self.spread[:2] = prepared.spread[:, : self.count] ** 2
-        self.centers, self.prior = self.starts, self.spread
+        self._centers, self._prior = self.starts.copy(), self.spread.copy()
         self._tabled = (
             on_device(np.asarray(model.shift(), dtype=float)),
             on_device(np.asarray(model.skew(), dtype=float)),
@@ -106,7 +106,7 @@ class RecordFilter:
         """
         other = RecordFilter(model, self.measured, steps)
         other.starts, other.spread = self.starts.copy(), self.spread.copy()
-        other.centers, other.prior = self.centers, self.prior
+        other._centers, other._prior = self._centers.copy(), self._prior.copy()
         return other
 
     def follow(
@@ -223,11 +223,19 @@ class RecordFilter:
 
         return self._by_record(self._in_parts(one), copies)
 
+    def widen(self, squares: Float[np.ndarray, "internal record"]) -> None:
+        """Let the internal states begin anywhere in the range that they visit.
+
+        Args:
+            squares: mean square of each.
+        """
+        self.spread[2:] = self._prior[2:] = np.where(np.isfinite(squares), squares, 0.0)
+
     def settle_starts(self, places: tuple[int, ...], point: Float[np.ndarray, " column"], way: Way) -> None:
         """Begin each record where its innovations are least, by one step of Gauss and Newton.
 
-        A filter corrects its start by the first samples. Where a law jumps that does not do: the position at
-        which dry friction holds a mass shows much later.
+        A filter corrects its start by the first samples. Where its spread was too small, or a law jumps, that
+        does not do: the position at which dry friction holds a mass shows much later.
 
         Args:
             places: parameters that are given.
@@ -237,12 +245,12 @@ class RecordFilter:
         size, none = len(self.starts), (on_device(np.zeros(0)),) * len(self._numbers)
         unit = np.vstack([np.eye(size), np.zeros((1, size))])
         products = self._products(places, point[None], way, none, unit)[:, :, 0]
-        scale = np.sqrt(np.maximum(self.prior, 1e-300))
+        scale = np.sqrt(np.maximum(self._prior, 1e-300))
         moved, known = self.starts.copy(), self.spread.copy()
         for record in np.flatnonzero(np.isfinite(products).all(axis=(0, 1))):
             own = scale[:, record]
             inner = products[:-1, :-1, record] * np.outer(own, own) + np.eye(size)
-            outer = products[:-1, -1, record] * own + (self.starts - self.centers)[:, record] / own
+            outer = products[:-1, -1, record] * own + (self.starts - self._centers)[:, record] / own
             moved[:, record] -= own * np.linalg.solve(inner, outer)
             known[:, record] = own**2 * np.diag(np.linalg.inv(inner))
         tried = [moved]
@@ -292,6 +300,7 @@ class RecordFilter:
             best = np.argmin(found, axis=0)
             self.starts[:2] = center = tried[best, :, np.arange(self.count)].T
             self.spread[:2] = (finer * scale) ** 2
+        self._centers, self._prior = self.starts.copy(), self.spread.copy()
 
     def _start(
         self, part: int, copies: int, starts: Float[np.ndarray, "copy state record"] | None = None
