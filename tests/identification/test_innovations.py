@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from isojax import Isolator, read_campaign
-from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
+from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
 from isojax.identification import diagnose, fit
 from isojax.identification.innovations import Measured, RecordFilter, Sizes, fit_measured, refined
 from isojax.records import Record
@@ -168,6 +168,35 @@ def test_records_that_start_in_a_large_motion_and_do_not_repeat_are_followed():
     errors = np.sqrt(np.diag(np.linalg.inv(found.information)))
     assert np.all(np.abs(found.values / [STIFFNESS, 1e9, DAMPING] - 1.0) < 0.01)
     assert np.all(np.abs(found.values - [STIFFNESS, 1e9, DAMPING]) < 5.0 * errors)
+
+
+@pytest.mark.slow
+def test_dry_friction_as_large_as_the_spring_is_found_from_far_off_and_among_spikes():
+    from _simulated_motion import FINE, Oscillator, simulate
+    from strong_effects import driven
+
+    # In units of the linear oscillator; the simulator of the benchmarks shares no code with the models.
+    plant, rng, size = (
+        Oscillator(0.03, law="coulomb_friction", numbers=(0.4,)),
+        np.random.default_rng(8),
+        2400,
+    )
+    records = []
+    for level in (1.0, 2.0):
+        fine = driven(np.random.default_rng(int(level)), "random", level)[0][: (size - 1) * FINE + 1]
+        output = simulate(plant, fine).acceleration
+        output = output + 0.004 * output.std() * rng.standard_normal(size)
+        output[rng.integers(100, size, 5)] += 10.0 * output.std()
+        time, drive = np.arange(size) * 2.0 * np.pi / 40.0, fine[::FINE]
+        name = f"{level:g}"
+        records.append(Record(name, Path(name), time, 40.0 / (2.0 * np.pi), drive, output, drive, output))
+    measured = Measured(tuple(records), "acceleration", "band_limited", np.full(2, 0.3))
+    start = Isolator(1.0, (LinearStiffness(1.3), LinearDamping(0.3), CoulombFriction(0.1, 0.01)))
+    found = fit_measured(start, (1, 2, 3), (1.0, 0.1, 1.0), measured)
+    errors = np.sqrt(np.diag(np.linalg.inv(found.information)))
+    assert np.all(np.abs(found.values - [1.0, 0.06, 0.4]) < 4.0 * errors)
+    assert np.all(errors < [1e-3, 1e-3, 1e-3])
+    assert found.is_noise_of_output
 
 
 BUILDING = """\
