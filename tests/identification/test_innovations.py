@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from isojax import Isolator, read_campaign
 from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
 from isojax.identification import diagnose, fit
-from isojax.identification.innovations import Measured, RecordFilter, Sizes, fit_measured, refined
+from isojax.identification.innovations import Measured, RecordFilter, Sizes, fit_errors, fit_measured, refined
 from isojax.records import Record
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
@@ -152,6 +152,16 @@ def test_a_start_that_is_far_off_is_not_lost():
     assert np.all(errors < [4.0, 4e5, 0.1])
     assert found.is_noise_of_output
     np.testing.assert_allclose(np.exp(0.5 * found.sizes.noise), 0.01, rtol=0.05)
+
+
+def test_a_search_leaves_the_first_states_of_the_fit_that_it_starts_from():
+    records = tuple(driven_cubic(seed, level, 0.01) for seed, level in enumerate((4.0, 10.0)))
+    own = RecordFilter(linear(), Measured(records, "acceleration", "band_limited", np.full(2, 0.1)), 2)
+    before = own.starts.copy(), own.spread.copy()
+    sizes = Sizes(0.0, 1.0, np.full(2, -4.0))
+    found = fit_errors(own, (1, 2), (STIFFNESS, DAMPING), sizes, loudest=np.zeros(2), rough=True)
+    np.testing.assert_array_equal((own.starts, own.spread), before)
+    assert np.all(found.filter.spread < own.spread)
 
 
 @pytest.mark.slow

@@ -118,6 +118,8 @@ def fit_errors(
 
     Source: Ljung 1999, System Identification, sec. 7.2 (innovations); Kristensen, Madsen & Jorgensen 2004.
     """
+    # Another fit may hold this filter, with the first states that belong to its coefficients.
+    record_filter = record_filter.with_own_starts()
     listed = list_parameters(record_filter.model)
     part = np.ones(record_filter.count) if judged is None else judged
 

@@ -99,14 +99,7 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     for _ in range(MOST_SEARCHES):
         if is_successful(found.result):
             break
-        found = fit_errors(
-            found.filter,
-            found.places,
-            magnitudes,
-            found.sizes,
-            loudest=measured.loudest,
-            starts=(found.values,),
-        )
+        found = _onward(found, magnitudes)
     while not steps_are_fine(found):
         steps = 2 * found.filter.steps
         if steps > SUBSTEPS[-1]:
@@ -142,13 +135,18 @@ def _simulated(
     )
     if not begun.criterion < found.criterion:
         return found
+    return _onward(begun, magnitudes, rough)
+
+
+def _onward(found: ErrorFit, magnitudes: Sequence[float], rough: bool = False) -> ErrorFit:
+    """Search on from where a fit ended, its noise no louder than the records show."""
     return fit_errors(
-        begun.filter,
+        found.filter,
         found.places,
         magnitudes,
-        begun.sizes,
-        loudest=measured.loudest,
-        starts=(begun.values,),
+        found.sizes,
+        loudest=found.filter.measured.loudest,
+        starts=(found.values,),
         rough=rough,
     )
 

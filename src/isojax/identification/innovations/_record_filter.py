@@ -1,5 +1,6 @@
 """A model's filter over the records of a campaign: many points at once, side by side."""
 
+import copy
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -107,6 +108,13 @@ class RecordFilter:
         other = RecordFilter(model, self.measured, steps)
         other.starts, other.spread = self.starts.copy(), self.spread.copy()
         other._centers, other._prior = self._centers.copy(), self._prior.copy()
+        return other
+
+    def with_own_starts(self) -> "RecordFilter":
+        """Give the same filter, whose first states may move while those of this one stay."""
+        other = copy.copy(self)
+        for name in ("starts", "spread", "_centers", "_prior"):
+            setattr(other, name, getattr(self, name).copy())
         return other
 
     def follow(
