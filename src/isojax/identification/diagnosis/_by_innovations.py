@@ -105,7 +105,8 @@ def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[R
 
     def refit(score: Score, begin: Isolator | None = None) -> bool:
         search.progress(f"refit with {score.element.name}")
-        refits.append(refit_effect(found, score, search, begin))
+        rivals = [one.fit.criterion for one in refits if one.violation is None]
+        refits.append(refit_effect(found, score, search, begin, min(rivals, default=np.inf)))
         return refits[-1].violation is None and refits[-1].explains
 
     asked = [

@@ -173,6 +173,7 @@ def refit_effect(
     score: Score,
     search: Search,
     begin: Isolator | None = None,
+    rival: float = np.inf,
 ) -> Refit:
     """Fit the model with one absent effect, everything free, from where the score points.
 
@@ -181,6 +182,7 @@ def refit_effect(
         score: the effect.
         search: the scales of the campaign.
         begin: where else to start: the model with the effect, every coefficient from the measured forces.
+        rival: criterion of the best refit so far.
 
     Returns:
         The refit, with what speaks against it whatever it gains.
@@ -198,7 +200,7 @@ def refit_effect(
         sizes = sizes._replace(force=max(fit.sizes.force, sizes.force - _SMALLER))
     scales = magnitudes(model, places, search.scales)
     measured, steps = fit.filter.measured, fit.filter.steps
-    found = fit_measured(model, places, scales, measured, sizes, starts, steps, rough=True)
+    found = fit_measured(model, places, scales, measured, sizes, starts, steps, rough=True, rival=rival)
     if begin is not None:
         # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
         drop, extra = fit.deviance.sum() - found.deviance.sum(), max(1, len(places) - len(fit.places))

@@ -160,11 +160,11 @@ class ErrorFit:
             counted = jnp.isfinite(trace.deviation)
             return trace._replace(
                 gains=tuple(jnp.zeros_like(gain) for gain in trace.gains),
-                deviation=jnp.where(counted, 1.0, jnp.inf),
+                deviation=jnp.where(counted, jnp.ones_like(trace.deviation), jnp.inf),
             )
 
         way = self.way._replace(traces=[free(one) for one in self.way.traces])
-        return self.filter.products(self.places, self.values[None], way, columns=False)[0, 0, 0]
+        return self.filter.squares(self.places, self.values[None], way)[0]
 
     @property
     def free_error(self) -> float:

@@ -131,8 +131,8 @@ def _update(
     stages: tuple[Instant, ...],
     measured: Array,
     used: Array,
-) -> tuple[State, Array, tuple[State, ...]]:
-    """Give the gains and the variance of a sample, and the covariance at the next."""
+) -> tuple[Array, State, Array, State, tuple[State, ...]]:
+    """Give the innovation of a sample, its gains and variance, the state at the next, and its covariance."""
     every, last = range(len(state)), len(state) - 1
     zero = jnp.zeros_like(measured)
     units = [tuple(zero + float(row == place) for row in every) for place in every]
@@ -149,7 +149,7 @@ def _update(
     after = [[covariance[row][other] - gain[row] * seen[other] for other in every] for row in every]
     moved = _correct(state, gain, error)
     carry = _split_transition if model.splits else _smooth_transition
-    ahead = carry(model, quantity, step, lanes.memory, moved, stages)
+    ends, ahead = carry(model, quantity, step, lanes.memory, moved, stages)
     mixed = [[sum(after[row][other] * ahead[other][to] for other in every) for row in every] for to in every]
     upper: dict[tuple[int, int], Array] = {
         (to, other): sum((ahead[row][other] * mixed[to][row] for row in every), start=zero)
@@ -157,28 +157,34 @@ def _update(
         for other in range(to, len(state))
     }
     upper[last, last] = upper[last, last] + (1.0 - lanes.memory**2) * lanes.force
-    return gain, variance, tuple(tuple(upper[min(a, b), max(a, b)] for b in every) for a in every)
+    return (
+        error,
+        gain,
+        variance,
+        ends,
+        tuple(tuple(upper[min(a, b), max(a, b)] for b in every) for a in every),
+    )
 
 
 def _split_transition(
     model: Isolator, quantity: Quantity, step: float, memory: Array, state: State, stages: tuple[Instant, ...]
-) -> list[State]:
-    """Give what a unit of each state becomes a sample later, where the step is split at jumps and bends."""
+) -> tuple[State, list[State]]:
+    """Give the state a sample later, and what a unit of each becomes, the step split at jumps and bends."""
     size = len(state)
     units = jnp.broadcast_to(jnp.eye(size)[..., None], (size, size, *state[0].shape))
-    _, ahead = jax.vmap(
+    ends, ahead = jax.vmap(
         lambda unit: jax.jvp(
             lambda state: _predict(model, quantity, step, memory, state, stages), (state,), (tuple(unit),)
         ),
         out_axes=(None, 0),
     )(units)
-    return [tuple(one[place] for one in ahead) for place in range(size)]
+    return ends, [tuple(one[place] for one in ahead) for place in range(size)]
 
 
 def _smooth_transition(
     model: Isolator, quantity: Quantity, step: float, memory: Array, state: State, stages: tuple[Instant, ...]
-) -> list[State]:
-    """Give what a unit of each state becomes a sample later, by the rates' derivatives in the middle of it.
+) -> tuple[State, list[State]]:
+    """Give the state a sample later, and what a unit of each becomes, by derivatives in the middle.
 
     A covariance needs no more, in a truncated exponential: the derivatives of the whole step take three
     times as long to compile. Internal states that follow within a sample need it squared: as often as the
@@ -213,7 +219,7 @@ def _smooth_transition(
             for column in ahead
         ]
     ahead[last] = (*ahead[last][:last], memory + zero)
-    return ahead
+    return ends, ahead
 
 
 def _scan_of(model: Isolator) -> Callable[..., Any]:
@@ -256,10 +262,9 @@ def follow_records(
         state, covariance, deviance, square, slope, fisher = carry
         acting, measured, weight, used = table
         stages = _delayed(present, split_stages(acting), tabled)
-        gain, variance, ahead = _update(
+        error, gain, variance, after, ahead = _update(
             present, quantity, step, lanes, state, covariance, stages, measured, used
         )
-        error = measured - _read(present, quantity, state, stages[0])
         variance = jnp.where(used > 0.0, variance, 1.0)
         trust = _trust(error, variance)
         ratio = jnp.minimum(error**2 / variance, _USUAL**2)
@@ -274,7 +279,6 @@ def follow_records(
         squares = 0.5 * by_log[:, None] * by_log[None] + scaled[:, None] * scaled[None]
         fisher = fisher + weigh[None, None] * squares
         seen = Trace(state, gain, error, jnp.where(weight > 0.0, jnp.sqrt(variance / trust), jnp.inf))
-        after = _predict(present, quantity, step, lanes.memory, _correct(state, gain, error), stages)
         return (after, ahead, deviance, square, slope, fisher), jax.tree.map(lambda one: one[:kept], seen)
 
     every = range(len(lanes.spread))

@@ -99,9 +99,9 @@ def fit_errors(
     """Fit coefficients and the sizes of the errors.
 
     With the gains held the innovations are a problem of least squares: each step is one of Gauss and Newton,
-    with several dampings tried side by side. The sizes take a step of Fisher's scoring. A filter follows the
-    records however far the coefficients are off, as long as its random force is large. So it starts large,
-    and falls as the innovations do.
+    with several dampings tried side by side; each record's first states follow the coefficients. The sizes
+    take a step of Fisher's scoring. A filter follows the records however far the coefficients are off, as
+    long as its random force is large. So it starts large, and falls as the innovations do.
 
     Args:
         record_filter: the model and the records.
@@ -151,7 +151,7 @@ def fit_errors(
             places, points([*frees, *[frees[0]] * more]), [*sizes, *[sizes[0]] * more]
         )
 
-    free, damping = frees[0], 1e-3
+    free, damping, slack = frees[0], 1e-3, np.full(record_filter.count, 1e-3)
     if len(frees) > 1:
         deviances = over(followed(frees, [sizes] * len(frees)).deviance)
         free = frees[int(np.argmin(deviances[: len(frees)]))]
@@ -165,24 +165,34 @@ def fit_errors(
             way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
             record_filter.widen(way.squares)
-        record_filter.settle_starts(places, points([free])[0], way)
         deviance = float(over(way.deviance[0]))
-        products = over(record_filter.products(places, points([free]), way, columns=True)[:, :, 0])
-        if not (np.isfinite(deviance) and np.all(np.isfinite(products))):
+        products = record_filter.slopes(places, points([free])[0], way)
+        if not (np.isfinite(deviance) and np.all(np.isfinite(over(products)))):
             result = RESULTS.not_finite
             break
-        slopes = np.append(physical(free, specs, scales)[1], 1.0)
-        products = products * np.outer(slopes, slopes)
+        unit = np.r_[physical(free, specs, scales)[1], np.ones(len(products) - size)]
+        first = record_filter.eliminate(products * np.outer(unit, unit)[..., None], slack)
         tried, promised = _damped_steps(
-            products, damping * _TRIED, np.where(bounded, _FAR + np.abs(free), np.inf)
+            over(first.reduced), damping * _TRIED, np.where(bounded, _FAR + np.abs(free), np.inf)
         )
-        squares = record_filter.products(places, points([free + one for one in tried]), way, columns=False)
-        squares = np.nan_to_num(over(squares[0, 0]), nan=np.inf)
-        best = int(np.argmin(squares)) if size else 0
-        gain = float(products[-1, -1] - squares[best]) if size else 0.0
-        if gain > 0.0:
+        steps = np.array([*tried, *np.zeros((2, size))])
+        begins = record_filter.starts + first.settled + np.einsum("src,tr->tsc", first.along, steps)
+        if record_filter.model.slides:  # no small step leads to where friction holds the mass
+            begins[-1, 1] = 0.0
+        squares = record_filter.squares(places, points(list(free + steps)), way, begins)
+        squares = np.nan_to_num(squares + record_filter.penalties(begins), nan=np.inf)
+        here = products[-1, -1] + record_filter.penalties(record_filter.starts[None])[0]
+        slack = np.where(squares[-2] < here, np.maximum(1e-9, 1e-3 * slack), np.minimum(1e9, 1e3 * slack))
+        standing = np.array([here, *squares[len(tried) :]])  # with the coefficients as they are
+        best, lowest = int(np.argmin(over(squares[: len(tried)]))), standing.min(axis=0)
+        gain = float(over(here) - over(lowest))
+        if over(squares[best]) < over(lowest):
+            gain = float(over(here) - over(squares[best]))
+            record_filter.begin(begins[best], first.spread, (part > 0.0) | (squares[best] < here))
             free, damping = free + tried[best], float(np.clip(damping * _TRIED[best], 1e-9, 1e9))
         else:
+            for begin, own in zip(begins[len(tried) :], standing[1:], strict=True):
+                record_filter.begin(begin, first.spread, (own == lowest) & (own < here))
             damping = min(1e9, 1e3 * damping)
         if deviance > last + settled_at:  # the last step of the sizes went too far
             trust *= 0.25
@@ -207,7 +217,7 @@ def fit_errors(
             break
         sizes, last = new, deviance
     way = followed([free] * COPIES, sizes.around())
-    numbers = [entry.value for entry in listed]
+    numbers, rows = [entry.value for entry in listed], np.r_[:size, -1]
     for place, value in zip(places, physical(free, specs, scales)[0], strict=True):
         numbers[place] = on_device(np.asarray(value))
     return ErrorFit(
@@ -215,7 +225,7 @@ def fit_errors(
         places,
         sizes,
         way.deviance[0],
-        record_filter.products(places, points([free]), way, columns=True)[:, :, 0],
+        record_filter.slopes(places, points([free])[0], way)[np.ix_(rows, rows)],
         record_filter.samples,
         result,
         step,

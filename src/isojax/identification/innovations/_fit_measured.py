@@ -14,7 +14,7 @@ from ._record_filter import COPIES, RecordFilter
 from ._sizes import Sizes
 
 SUBSTEPS = (2, 8, 16)
-"""Integration steps a sample that are tried in turn."""
+"""Integration steps a sample that are tried in turn; the most at once where a filter diverges."""
 
 MOST_SEARCHES = 3
 """Searches of full length that end a rough one: large records creep along a valley."""
@@ -22,6 +22,9 @@ MOST_SEARCHES = 3
 SMALL = 0.1
 SMALL_SHARE = 3e-5
 """Change of the deviance by twice as many steps below which their error does not matter: and a sample."""
+
+SMALL_MOVE = 0.01
+"""Squared step of the coefficients over their errors that does not matter."""
 
 ROUGH_SHARE = 1e-3
 """The same a sample where a fit is only ranked."""
@@ -36,6 +39,7 @@ def fit_measured(
     starts: Sequence[Float[np.ndarray, " column"]] = (),
     steps: int = SUBSTEPS[0],
     rough: bool = False,
+    rival: float = np.inf,
 ) -> ErrorFit:
     """Fit a model to records, with as many integration steps as show which law it is.
 
@@ -50,20 +54,18 @@ def fit_measured(
         starts: other values of the coefficients, of which the best is taken.
         steps: integration steps a sample to begin with.
         rough: whether the fit is only ranked among others.
+        rival: criterion of the best of the others; what stays behind it needs no finer steps.
 
     Returns:
         The fit; that of the most steps where none suffice.
     """
-    found = None
-    levels = (steps, *(one for one in SUBSTEPS if one > steps))
-    for finer in levels:
-        record_filter = RecordFilter(model, measured, finer)
-        first = first_sizes(record_filter) if sizes is None else sizes
+    while True:
+        record_filter = RecordFilter(model, measured, steps)
         found = fit_errors(
             record_filter,
             places,
             magnitudes,
-            first,
+            first_sizes(record_filter) if sizes is None else sizes,
             loudest=measured.loudest,
             starts=starts,
             rough=rough,
@@ -72,14 +74,17 @@ def fit_measured(
             found = min(
                 (found, _simulated(found, magnitudes, starts, rough)), key=lambda one: float(one.criterion)
             )
-        if np.isfinite(found.deviance.sum()):
-            if model.splits or finer == levels[-1] or steps_are_fine(found, ROUGH_SHARE):
-                break
-            starts = (found.values, *starts[: COPIES - 2])
-            if is_successful(found.result):
-                sizes = found.sizes
-    assert found is not None
-    return found
+        finer = [one for one in SUBSTEPS if one > steps]
+        if not finer:
+            return found
+        if not np.isfinite(found.deviance.sum()):
+            steps = finer[-1]
+            continue
+        if model.splits or steps_are_fine(found, ROUGH_SHARE, rival):
+            return found
+        steps, starts = finer[0], (found.values, *starts[: COPIES - 2])
+        if is_successful(found.result):
+            sizes = found.sizes
 
 
 def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
@@ -151,17 +156,25 @@ def _onward(found: ErrorFit, magnitudes: Sequence[float], rough: bool = False) -
     )
 
 
-def steps_are_fine(found: ErrorFit, share: float = SMALL_SHARE) -> bool:
-    """Say whether twice as many integration steps leave the innovations as they are.
+def steps_are_fine(found: ErrorFit, share: float = SMALL_SHARE, rival: float = np.inf) -> bool:
+    """Say whether twice as many integration steps leave the coefficients where they are.
+
+    Where the error is noise, the likelihood decides, and must stay as well.
 
     Args:
         found: a fit.
         share: change of the deviance a sample that does not matter.
+        rival: criterion of another fit; nothing matters that leaves this one behind it.
 
     Returns:
         Whether that is so.
     """
     finer = found.filter.with_steps(2 * found.filter.steps, found.model)
-    squares = finer.products(found.places, found.values[None], found.way, columns=False)[0, 0, 0]
-    change = float(np.sum(np.abs(squares - found.products[-1, -1])))
-    return change < max(SMALL, share * found.samples)
+    size = len(found.places)
+    change = finer.slopes(found.places, found.values, found.way).sum(axis=-1)[:, -1]
+    change = np.append(change[:size], change[-1]) - found.products.sum(axis=-1)[:, -1]
+    moved = float(change[:-1] @ np.linalg.pinv(found.information, hermitian=True) @ change[:-1])
+    risen = abs(float(change[-1]))
+    if found.criterion - risen > rival:
+        return True
+    return moved < SMALL_MOVE and (not found.is_noise or risen < max(SMALL, share * found.samples))

@@ -8,13 +8,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from ..._parameters import ParameterSpec, list_parameters
 from ..._types import on_device
 from ...models import Isolator, State
 from ..jacobian import FIRST_STATES, Batch, workers
 from ._filter import Followed, Lanes, follow_records, innovation_products
+from ._first_states import FirstStates, eliminate
 from ._measured import Measured
 from ._sizes import SPACING, Sizes, Way
 
@@ -177,27 +178,53 @@ class RecordFilter:
             [each.trace for each in found],
         )
 
-    def products(
-        self, places: tuple[int, ...], points: Float[np.ndarray, "copy column"], way: Way, columns: bool
-    ) -> Float[np.ndarray, "row row copy record"]:
-        """Give the products of innovations at several points, with the gains of a way held.
+    def slopes(
+        self, places: tuple[int, ...], point: Float[np.ndarray, " column"], way: Way
+    ) -> Float[np.ndarray, "row row record"]:
+        """Differentiate the innovations with the coefficients and each record's first states.
 
         Args:
             places: parameters that are given.
-            points: their values.
+            point: their values.
             way: whose gains and deviations count.
-            columns: whether the innovations are differentiated with the parameters.
 
         Returns:
-            `A^T A`, see `innovation_products`; not finite where a motion diverged.
+            `A^T A`, see `innovation_products`: coefficients, first states, innovations; not finite where a
+            motion diverged.
         """
-        unit = np.eye(len(places))
+        unit = np.eye(len(places) + len(self.starts))
         directions = tuple(
-            on_device(unit[places.index(place)] if columns and place in places else np.zeros(0))
+            on_device(unit[places.index(place)] if place in places else np.zeros(0))
             for place in range(len(self._numbers))
         )
-        still = np.zeros((len(self.starts) + 1, len(places) if columns else 0))
-        return self._products(places, points, way, directions, still)
+        first = np.vstack([unit[len(places) :], np.zeros(len(unit))])
+        return self._products(places, point[None], way, directions, first)[:, :, 0]
+
+    def squares(
+        self,
+        places: tuple[int, ...],
+        points: Float[np.ndarray, "copy column"],
+        way: Way,
+        starts: Float[np.ndarray, "copy state record"] | None = None,
+    ) -> Float[np.ndarray, "copy record"]:
+        """Give the squared innovations at several points, with the gains of a way held.
+
+        Args:
+            places: parameters that are given.
+            points: their values, `COPIES` at most.
+            way: whose gains and deviations count.
+            starts: means of the first states at each point; those of the filter if omitted.
+
+        Returns:
+            Their sums, over variances; not finite where a motion diverged.
+        """
+        # Always as many points, so that they share compiled code.
+        chosen = np.minimum(np.arange(COPIES), len(points) - 1)
+        still = np.zeros((len(self.starts) + 1, 0))
+        begun = np.repeat(self.starts[None], len(points), axis=0) if starts is None else starts
+        none = (on_device(np.zeros(0)),) * len(self._numbers)
+        products = self._products(places, points[chosen], way, none, still, begun[chosen])
+        return products[0, 0, : len(points)]
 
     def _products(
         self,
@@ -205,7 +232,8 @@ class RecordFilter:
         points: Float[np.ndarray, "copy column"],
         way: Way,
         directions: tuple[Array, ...],
-        start_directions: Float[np.ndarray, "state direction"],
+        start_directions: Float[np.ndarray, "carried direction"],
+        starts: Float[np.ndarray, "copy state record"] | None = None,
     ) -> Float[np.ndarray, "row row copy record"]:
         copies = len(points)
 
@@ -219,7 +247,7 @@ class RecordFilter:
                 self.model,
                 values,
                 directions,
-                self._start(part, copies),
+                self._start(part, copies, starts),
                 on_device(start_directions),
                 memory,
                 trace,
@@ -239,38 +267,41 @@ class RecordFilter:
         """
         self.spread[2:] = self._prior[2:] = np.where(np.isfinite(squares), squares, 0.0)
 
-    def settle_starts(self, places: tuple[int, ...], point: Float[np.ndarray, " column"], way: Way) -> None:
-        """Begin each record where its innovations are least, by one step of Gauss and Newton.
+    def eliminate(
+        self, products: Float[np.ndarray, "row row record"], damping: Float[np.ndarray, " record"]
+    ) -> FirstStates:
+        """Give how the first states of each record follow the coefficients.
 
         A filter corrects its start by the first samples. Where its spread was too small, or a law jumps, that
         does not do: the position at which dry friction holds a mass shows much later.
 
         Args:
-            places: parameters that are given.
-            point: their values.
-            way: the filter with them.
+            products: of `slopes`.
+            damping: Marquardt's, of the first states of each record.
+
+        Returns:
+            The steps of Gauss and Newton.
         """
-        size, none = len(self.starts), (on_device(np.zeros(0)),) * len(self._numbers)
-        unit = np.vstack([np.eye(size), np.zeros((1, size))])
-        products = self._products(places, point[None], way, none, unit)[:, :, 0]
-        scale = np.sqrt(np.maximum(self._prior, 1e-300))
-        moved, known = self.starts.copy(), self.spread.copy()
-        for record in np.flatnonzero(np.isfinite(products).all(axis=(0, 1))):
-            own = scale[:, record]
-            inner = products[:-1, :-1, record] * np.outer(own, own) + np.eye(size)
-            outer = products[:-1, -1, record] * own + (self.starts - self._centers)[:, record] / own
-            moved[:, record] -= own * np.linalg.solve(inner, outer)
-            known[:, record] = own**2 * np.diag(np.linalg.inv(inner))
-        tried = [moved]
-        if self.model.slides:  # no small step leads to where friction holds the mass
-            tried.append(np.array([row if state != 1 else 0.0 * row for state, row in enumerate(moved)]))
-        least = products[-1, -1]
-        for starts in tried:
-            old, self.starts = self.starts, starts
-            squares = self.products(places, point[None], way, columns=False)[0, 0, 0]
-            better = squares < least
-            self.starts, least = np.where(better, starts, old), np.where(better, squares, least)
-            self.spread = np.where(better, known, self.spread)
+        return eliminate(products, self.starts, self._centers, self._prior, damping)
+
+    def penalties(self, starts: Float[np.ndarray, "copy state record"]) -> Float[np.ndarray, "copy record"]:
+        """Give what first states cost that lie off their centres."""
+        return np.sum((starts - self._centers) ** 2 / np.maximum(self._prior, 1e-300), axis=1)
+
+    def begin(
+        self,
+        starts: Float[np.ndarray, "state record"],
+        spread: Float[np.ndarray, "state record"],
+        where: Bool[np.ndarray, " record"],
+    ) -> None:
+        """Begin some records elsewhere.
+
+        Args:
+            starts: means of the first states.
+            spread: their variances.
+            where: the records.
+        """
+        self.starts, self.spread = np.where(where, starts, self.starts), np.where(where, spread, self.spread)
 
     def _in_parts(self, work: Callable[[int], Any]) -> list[Any]:
         """Work on each batch in a thread of its own."""

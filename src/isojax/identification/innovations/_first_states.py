@@ -1,0 +1,60 @@
+"""First states of the records, which follow the coefficients of the model."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+
+class FirstStates(NamedTuple):
+    """Normal equations of the coefficients, without the first states of each record, and what these do.
+
+    Attributes:
+        reduced: `A^T A` of the coefficients and, last, the innovations.
+        settled: step of the first states where the coefficients stay.
+        along: what it changes with each coefficient.
+        spread: variances of the first states after it.
+    """
+
+    reduced: Float[np.ndarray, "row row record"]
+    settled: Float[np.ndarray, "state record"]
+    along: Float[np.ndarray, "state column record"]
+    spread: Float[np.ndarray, "state record"]
+
+
+def eliminate(
+    products: Float[np.ndarray, "whole whole record"],
+    starts: Float[np.ndarray, "state record"],
+    centers: Float[np.ndarray, "state record"],
+    prior: Float[np.ndarray, "state record"],
+    damping: Float[np.ndarray, " record"],
+) -> FirstStates:
+    """Solve for the first states of each record.
+
+    Args:
+        products: `A^T A` of coefficients, first states and innovations, over standard deviations.
+        starts: means of the first states.
+        centers: their means before the record was seen.
+        prior: their variances before.
+        damping: Marquardt's, of each record.
+
+    Returns:
+        The equations that are left. Where the products are not finite the first states stay.
+    """
+    size, count = starts.shape
+    columns = products.shape[0] - size - 1
+    rows = np.r_[:columns, products.shape[0] - 1]
+    settled, along = np.zeros((size, count)), np.zeros((size, columns, count))
+    reduced, spread = products[np.ix_(rows, rows)].copy(), prior.copy()
+    scale = np.sqrt(np.maximum(prior, 1e-300))
+    for record in np.flatnonzero(np.isfinite(products).all(axis=(0, 1))):
+        own, whole = scale[:, record], products[:, :, record]
+        inner = whole[columns:-1, columns:-1] * np.outer(own, own)
+        outer = whole[columns:-1][:, rows] * own[:, None]
+        outer[:, -1] += (starts - centers)[:, record] / own
+        known = inner + np.eye(size)
+        back = own[:, None] * np.linalg.solve(known + damping[record] * np.diag(np.diag(inner)), outer)
+        reduced[:, :, record] -= (outer / own[:, None]).T @ back
+        settled[:, record], along[:, :, record] = -back[:, -1], -back[:, :-1]
+        spread[:, record] = own**2 * np.diag(np.linalg.inv(known))
+    return FirstStates(reduced, settled, along, spread)
