@@ -16,6 +16,7 @@ FINDING = {
     "indistinguishable",
     "p_value",
     "excess_explained",
+    "held_out_share",
     "ranking",
     "separating_experiment",
 }
@@ -57,7 +58,7 @@ def check_schema(result):
     for finding in result["findings"]:
         assert set(finding) == FINDING
         for entry in finding["ranking"]:
-            assert set(entry) == RANKED
+            assert set(entry) - {"held_out_share"} == RANKED  # of those that were tried on unseen records
             assert isinstance(entry["admissible"], bool)
     for bound in result["bounds"].values():
         assert set(bound) == {"upper", "unit"}

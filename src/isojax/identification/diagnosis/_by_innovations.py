@@ -25,10 +25,14 @@ from ._effect_search import (
     transfer,
 )
 from ._findings import Candidate, Finding, Verdict, VerdictWord
+from ._remaining_error import remaining_words
 from ._separating_words import is_exact, separating_experiment
 
 CHANNELS = ("The drive and the floor", "The response channel")
 """Groups of effects that are no laws of the isolator: they have a share of the refits of their own."""
+
+_NEXT = 2
+"""Candidates that were not named whose share of the error of unseen records is told."""
 
 _BALANCED = 3
 """Effects that are refitted because the measured forces balance best with them."""
@@ -78,7 +82,14 @@ def diagnose_innovations(
     usable = _by_evidence(found, refits, scores, level, rules)
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
+    shares: dict[str, float] = {}
     without = functools.cache(lambda: left_out(found, search))
+
+    def weigh(refit: Refit) -> Weighed:
+        one = Weighed(refit, transfer(without(), left_out(refit.fit, search)))
+        shares[refit.score.element.name] = one.transfer.share
+        return one
+
     for refit in usable:
         clear = _gain(found, refit) > rules.clear_gain * found.samples
         if refit.fit.is_noise_of_output and clear:
@@ -88,15 +99,18 @@ def diagnose_innovations(
         needed = 0.0 if refit.fit.is_noise else rules.smallest_share
         if needed and by_runs and not refit.fit.free_error < found.free_error * np.sqrt(1.0 - needed):
             continue  # what does not even help the records that it was fitted to helps no others
-        one = Weighed(refit, transfer(without(), left_out(refit.fit, search)))
+        one = weigh(refit)
         least = 0.0 if by_runs else rules.clear_gain * found.samples
         if one.transfer.deviance > least and (one.transfer.share >= needed or not by_runs):
             best = one
             break
         reason = f"{refit.score.element.name} does not carry over to records left out of its refit"
     if best is None:
-        return _nothing(found, scores, refits, reason, fit, rules)
-    return _finding(search, fit, scores, refits, best)
+        return _nothing(found, scores, refits, reason, fit, rules, shares)
+    if shares:
+        for refit in [one for one in usable if one.score.element.name not in shares][:_NEXT]:
+            weigh(refit)
+    return _finding(search, fit, scores, refits, best, shares)
 
 
 def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[Refit]:
@@ -236,7 +250,9 @@ def _follows(refits: list[Refit], rules: Rules) -> bool:
     return min(one.fit.free_error for one in refits) < rules.followed * rms
 
 
-def _candidate(score: Score, refits: list[Refit], best: Refit | None, scores: Scores) -> Candidate:
+def _candidate(
+    score: Score, refits: list[Refit], best: Refit | None, scores: Scores, shares: dict[str, float]
+) -> Candidate:
     name = score.element.name
     refit = next((one for one in refits if one.score.element.name == name), None)
     strength, error, chi2, delta, admissible = score.strength, score.error, np.nan, np.nan, score.admissible
@@ -265,20 +281,29 @@ def _candidate(score: Score, refits: list[Refit], best: Refit | None, scores: Sc
         float(delta),
         0.0 if place is None else float(score.likeness[place]),
         admissible,
+        shares.get(element.name, np.nan),
     )
 
 
-def _ranking(scores: Scores, refits: list[Refit], best: Refit | None) -> tuple[Candidate, ...]:
+def _ranking(
+    scores: Scores, refits: list[Refit], best: Refit | None, shares: dict[str, float]
+) -> tuple[Candidate, ...]:
     first = [] if best is None else [best.score]
     others = sorted((one for one in refits if one is not best), key=lambda one: one.fit.criterion)
     order = [*first, *(one.score for one in others)]
     done = {one.element.name for one in order}
     order += [one for one in scores.scores if one.element.name not in done]
-    return tuple(_candidate(score, refits, best, scores) for score in order)
+    return tuple(_candidate(score, refits, best, scores, shares) for score in order)
 
 
 def _nothing(
-    found: ErrorFit, scores: Scores, refits: list[Refit], reason: str, fit: Fit, rules: Rules
+    found: ErrorFit,
+    scores: Scores,
+    refits: list[Refit],
+    reason: str,
+    fit: Fit,
+    rules: Rules,
+    shares: dict[str, float],
 ) -> Verdict:
     """Word that nothing is named."""
     good = found.is_noise
@@ -290,7 +315,10 @@ def _nothing(
         }
     verdict: VerdictWord = "none" if good else "unexplained"
     words = f"{_error_words(found, fit)} {reason[0].upper()}{reason[1:]}."
-    return Verdict(verdict, None, _ranking(scores, refits, None), (), 1.0, scores.hidden, bounds, None, words)
+    if not good:
+        words = f"{words} {remaining_words(fit.free_runs)}".strip()
+    ranking = _ranking(scores, refits, None, shares)
+    return Verdict(verdict, None, ranking, (), 1.0, scores.hidden, bounds, None, words)
 
 
 def _error_words(found: ErrorFit, fit: Fit) -> str:
@@ -307,7 +335,14 @@ def _error_words(found: ErrorFit, fit: Fit) -> str:
     return f"The error is the model's and not noise: a random force of {force} would explain it."
 
 
-def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best: Weighed) -> Verdict:
+def _finding(
+    search: Search,
+    fit: Fit,
+    scores: Scores,
+    refits: list[Refit],
+    best: Weighed,
+    shares: dict[str, float],
+) -> Verdict:
     """Word a finding."""
     found, rules, refit = fit.innovations, search.rules, best.refit
     assert found is not None
@@ -335,7 +370,7 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
     verdict: VerdictWord = "found" if good else "unexplained"
     if not good and explained >= 1.0 - rules.smallest_share:
         verdict = "partly_explained"
-    ranking = _ranking(scores, refits, refit)
+    ranking = _ranking(scores, refits, refit, shares)
     finding = Finding(
         name,
         together,
@@ -345,19 +380,29 @@ def _finding(search: Search, fit: Fit, scores: Scores, refits: list[Refit], best
         ranking,
         separating_experiment(name, together),
     )
-    reason = _added_words(refit.score.element.words, best.transfer, fine.is_noise)
+    reason = _added_words(ranking, best.transfer, fine.is_noise)
+    if not good:
+        reason = f"{reason} {remaining_words(whole.free_runs)}".strip()
     return Verdict(verdict, finding, ranking, together, 1.0 - explained, scores.hidden, {}, whole, reason)
 
 
-def _added_words(words: str, gained: Transfer, noise: bool) -> str:
-    """Say what a finding adds."""
+def _added_words(ranking: tuple[Candidate, ...], gained: Transfer, noise: bool) -> str:
+    """Say what a finding adds, and what others would in its place."""
+    words, unseen = ranking[0].words, "records left out of its refit"
     if noise:
         return f"With {words} what the model leaves is noise."
-    unseen = "records left out of its refit"
-    if gained.share > 0.0:
-        share = 100.0 * gained.share
-        return f"Adding {words} takes {share:.3g} % off the squared error of free runs of {unseen}."
-    return f"Adding {words} foretells {unseen} better. Their motion is irregular: no free run follows it."
+    if gained.share <= 0.0:
+        return f"Adding {words} foretells {unseen} better. Their motion is irregular: no free run follows it."
+    others = [
+        f"{one.words} {_percent(one.held_out_share)}" for one in ranking[1:] if one.held_out_share > 0.0
+    ]
+    instead = f"; in its place {', '.join(others)}" if others else ""
+    share = _percent(gained.share)
+    return f"Adding {words} takes {share} off the squared error of free runs of {unseen}{instead}."
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
 
 
 def _is_alike(one: Refit, best: Refit, rules: Rules) -> bool:

@@ -1,5 +1,6 @@
 """What a diagnosis says: candidates, findings and verdicts."""
 
+import math
 from typing import Literal, NamedTuple
 
 from ..._quantities import typeset_p_value
@@ -34,6 +35,8 @@ class Candidate(NamedTuple):
             refitted.
         likeness: correlation with the best candidate's trace, -1 to 1.
         admissible: whether its sign and its dissipation are physical.
+        held_out_share: share of the squared error of free runs that it takes off records which its refit did
+            not see; NaN where that was not asked.
     """
 
     effect: str
@@ -48,6 +51,7 @@ class Candidate(NamedTuple):
     delta_bic: float
     likeness: float
     admissible: bool
+    held_out_share: float = math.nan
 
     def _headline(self) -> str:
         likely = "" if self.admissible else ", not physical"

@@ -73,7 +73,7 @@ class Followed(NamedTuple):
 
     Attributes:
         deviance: sum of `log s + e^2/s` over innovations e of variance s, -2 log-likelihood but for a
-            constant; `e^2/s` at most what is usual.
+            constant; beyond `e^2/s = 16` in place of it `16 + 16 log(e^2/16 s)`.
         square: mean square of each state.
         slope: of half the deviance with each of the sizes by which groups of lanes differ.
         fisher: its information.
@@ -267,16 +267,20 @@ def follow_records(
         )
         variance = jnp.where(used > 0.0, variance, 1.0)
         trust = _trust(error, variance)
-        ratio = jnp.minimum(error**2 / variance, _USUAL**2)
-        deviance = deviance + weight * (jnp.log(variance) + ratio)
+        ratio = error**2 / variance
+        usual = jnp.minimum(ratio, _USUAL**2)
+        # Beyond what is usual the cost is the one whose slope with the variance stays what it was there.
+        cost = usual * (1.0 + jnp.log(jnp.maximum(ratio / _USUAL**2, 1.0)))
+        deviance = deviance + weight * (jnp.log(variance) + cost)
         square = tuple(old + weight * one**2 for old, one in zip(square, state, strict=True))
         shares = [one.reshape(-1, kept) for one in (error, jnp.log(variance))]
         by_error, by_log = ((one[1::2] - one[2::2]) / (2.0 * spacing) for one in shares)
-        own, weigh, first = variance[:kept], weight[:kept], trust[:kept] * error[:kept]
-        scaled = by_error / jnp.sqrt(own)[None]
-        by_size = 0.5 * by_log * (1.0 - ratio[:kept])[None] + scaled * (first / jnp.sqrt(own))[None]
+        own, weigh, counted = jnp.sqrt(variance[:kept]), weight[:kept], usual[:kept]
+        share = jnp.where(counted < ratio[:kept], counted / jnp.maximum(ratio[:kept], 1e-300), 1.0)
+        scaled = by_error / own[None]
+        by_size = 0.5 * by_log * (1.0 - counted)[None] + scaled * (share * error[:kept] / own)[None]
         slope = slope + weigh[None] * by_size
-        squares = 0.5 * by_log[:, None] * by_log[None] + scaled[:, None] * scaled[None]
+        squares = 0.5 * by_log[:, None] * by_log[None] + share[None, None] * scaled[:, None] * scaled[None]
         fisher = fisher + weigh[None, None] * squares
         seen = Trace(state, gain, error, jnp.where(weight > 0.0, jnp.sqrt(variance / trust), jnp.inf))
         return (after, ahead, deviance, square, slope, fisher), jax.tree.map(lambda one: one[:kept], seen)

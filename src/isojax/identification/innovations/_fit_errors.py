@@ -20,6 +20,10 @@ _MOST_SCORINGS = 40
 _SETTLED_DEVIANCE = 0.05
 """Change of the deviance by a step below which a search is over."""
 
+_SMALL_CHANGE = 0.005
+"""Step of the logarithm of a size below which it is over as well, however the deviance creeps: beside a jump
+a sample may hold a size down to where nothing else asks for it."""
+
 _MOST_ROUGH_SCORINGS, _ROUGH_DEVIANCE = 16, 0.5
 """The same of a search whose end is only ranked: far below what tells two laws apart."""
 
@@ -204,7 +208,9 @@ def fit_errors(
         else:
             trust, before, new = min(2.0 * trust, FURTHEST), sizes, sizes.moved(way, part, bounds, trust)
 
-        settled = step > 2 and abs(last - deviance) < settled_at and gain < settled_at
+        aim = sizes.moved(way, part, bounds, FURTHEST)
+        still = abs(last - deviance) < settled_at or aim.distance(sizes) < _SMALL_CHANGE
+        settled = step > 2 and still and gain < settled_at
         if settled and (promised < settled_at or damping >= 1e6):
             if record_filter.feeds_through and not alone and sizes.force > least.force:
                 alone = True

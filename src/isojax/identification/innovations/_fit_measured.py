@@ -100,22 +100,19 @@ def refined(found: ErrorFit, magnitudes: Sequence[float]) -> ErrorFit:
     Returns:
         The fit; that of the most steps where none suffice.
     """
-    measured = found.filter.measured
-    for _ in range(MOST_SEARCHES):
-        if is_successful(found.result):
-            break
-        found = _onward(found, magnitudes)
-    while not steps_are_fine(found):
+    while True:
+        for _ in range(MOST_SEARCHES):
+            if is_successful(found.result):
+                break
+            found = _onward(found, magnitudes)
         steps = 2 * found.filter.steps
-        if steps > SUBSTEPS[-1]:
+        if steps > SUBSTEPS[-1] or steps_are_fine(found):
             return found
-        finer = found.filter.with_steps(steps, found.model)
-        again = fit_errors(finer, found.places, magnitudes, found.sizes, loudest=measured.loudest)
+        again = _onward(found, magnitudes, found.filter.with_steps(steps, found.model))
         gain = float(found.deviance.sum() - again.deviance.sum())
         if not (np.isfinite(gain) and (gain > SMALL or not found.model.slides)):
             return found
         found = again
-    return found
 
 
 def _simulated(
@@ -140,13 +137,15 @@ def _simulated(
     )
     if not begun.criterion < found.criterion:
         return found
-    return _onward(begun, magnitudes, rough)
+    return _onward(begun, magnitudes, rough=rough)
 
 
-def _onward(found: ErrorFit, magnitudes: Sequence[float], rough: bool = False) -> ErrorFit:
+def _onward(
+    found: ErrorFit, magnitudes: Sequence[float], over: RecordFilter | None = None, rough: bool = False
+) -> ErrorFit:
     """Search on from where a fit ended, its noise no louder than the records show."""
     return fit_errors(
-        found.filter,
+        found.filter if over is None else over,
         found.places,
         magnitudes,
         found.sizes,

@@ -85,6 +85,11 @@ class Sizes(NamedTuple):
         force, memory, noise = (np.clip(*each) for each in zip(self, *bounds, strict=True))
         return Sizes(float(force), float(memory), noise)
 
+    def distance(self, other: "Sizes") -> float:
+        """Give the largest difference of the logarithm of a size."""
+        apart = (np.max(np.abs(one - another)) for one, another in zip(self, other, strict=True))
+        return float(max(apart))
+
     @property
     def correlation(self) -> float:
         """Correlation of the random force from sample to sample."""

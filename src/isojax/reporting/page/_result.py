@@ -87,6 +87,7 @@ def _finding_dict(finding: Finding) -> dict[str, Any]:
         "indistinguishable": list(finding.indistinguishable),
         "p_value": finite_or_none(finding.p_value),
         "excess_explained": finite_or_none(finding.excess_explained),
+        "held_out_share": finite_or_none(finding.transfer),
         "ranking": [
             {
                 "effect": candidate.effect,
@@ -94,6 +95,7 @@ def _finding_dict(finding: Finding) -> dict[str, Any]:
                 "p_value": finite_or_none(candidate.p_value),
                 "delta_bic": finite_or_none(candidate.delta_bic),
                 "admissible": candidate.admissible,
+                **({"held_out_share": share} if math.isfinite(share := candidate.held_out_share) else {}),
             }
             for candidate in finding.ranking
         ],
