@@ -87,7 +87,7 @@ def diagnose_innovations(
 
     def weigh(refit: Refit) -> Weighed:
         one = Weighed(refit, transfer(without(), left_out(refit.fit, search)))
-        shares[refit.score.element.name] = one.transfer.share
+        shares[refit.score.element.name] = one.transfer.share if one.transfer.settled else np.nan
         return one
 
     for refit in usable:
@@ -107,9 +107,12 @@ def diagnose_innovations(
         reason = f"{refit.score.element.name} does not carry over to records left out of its refit"
     if best is None:
         return _nothing(found, scores, refits, reason, fit, rules, shares)
-    if shares:
-        for refit in [one for one in usable if one.score.element.name not in shares][:_NEXT]:
-            weigh(refit)
+    others = [one for one in usable if one.score.element.name not in shares] if shares else []
+    told = 0
+    for refit in others:
+        if told == _NEXT:
+            break
+        told += weigh(refit).transfer.settled
     return _finding(search, fit, scores, refits, best, shares)
 
 

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from scipy import stats
 
 from ..._parameters import list_parameters
+from ..._results import is_successful
 from ...elements import CATALOGUE, AbstractElement
 from ...models import Isolator
 from ..fitting import Search, magnitudes
@@ -227,10 +228,13 @@ class LeftOut(NamedTuple):
     Attributes:
         deviance: -2 log-likelihood, but for a constant.
         squares: squared error of free runs [squared SI unit of the output].
+        settled: whether each of its refits converged; one that did not may have stayed at what it was told by
+            the record that it should not see.
     """
 
     deviance: float
     squares: float
+    settled: bool
 
 
 class Transfer(NamedTuple):
@@ -239,10 +243,12 @@ class Transfer(NamedTuple):
     Attributes:
         deviance: decrease of -2 log-likelihood: above 0 where the unseen records are more probable with it.
         share: of the squared error of their free runs.
+        settled: whether the refits with it converged.
     """
 
     deviance: float
     share: float
+    settled: bool = True
 
 
 def transfer(before: LeftOut, after: LeftOut) -> Transfer:
@@ -256,7 +262,7 @@ def transfer(before: LeftOut, after: LeftOut) -> Transfer:
         Both measures.
     """
     share = 1.0 - after.squares / before.squares if before.squares > 0.0 else 0.0
-    return Transfer(before.deviance - after.deviance, share)
+    return Transfer(before.deviance - after.deviance, share, after.settled)
 
 
 def left_out(found: ErrorFit, search: Search) -> LeftOut:
@@ -267,13 +273,13 @@ def left_out(found: ErrorFit, search: Search) -> LeftOut:
         search: the scales of the campaign.
 
     Returns:
-        The deviance of all records together, and the squared error of their free runs.
+        What they say of all records together.
     """
     count = found.filter.count
     folds = [np.arange(count) == place for place in range(count)]
     if count > _MOST_FOLDS:
         folds = [np.arange(count) % _MOST_FOLDS == place for place in range(_MOST_FOLDS)]
-    deviance, squares = 0.0, 0.0
+    deviance, squares, settled = 0.0, 0.0, True
     for unseen in folds:
         part = fit_errors(
             found.filter,
@@ -287,4 +293,5 @@ def left_out(found: ErrorFit, search: Search) -> LeftOut:
         )
         deviance += float(part.deviance[unseen].sum())
         squares += float(part.free_squares[unseen].sum())
-    return LeftOut(deviance, squares)
+        settled = settled and is_successful(part.result)
+    return LeftOut(deviance, squares, settled)
