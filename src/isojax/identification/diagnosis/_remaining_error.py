@@ -8,8 +8,8 @@ from scipy.signal import periodogram
 
 from ..fitting import Run
 
-_PIECES = 30
-"""Pieces of a record, whose motions are compared."""
+_STRETCHES = 30
+"""Stretches of a record, whose motions are compared."""
 
 _APART = 1.5
 """Ratio of relative errors from which the size of the motion matters."""
@@ -29,8 +29,10 @@ def remaining_words(runs: Sequence[Run]) -> str:
         return ""
     low, high = _half_of(fitted)
     band = f"Half of the square of what is left lies from {low:.3g} to {high:.3g} Hz"
-    sizes = np.concatenate([_pieces(run.record.output - np.mean(run.record.output), run) for run in fitted])
-    errors = np.concatenate([_pieces(run.residual, run) for run in fitted])
+    sizes = np.concatenate(
+        [_in_stretches(run.record.output - np.mean(run.record.output), run) for run in fitted]
+    )
+    errors = np.concatenate([_in_stretches(run.residual, run) for run in fitted])
     order = np.argsort(sizes)
     third = order.size // 3
     small, large = (
@@ -42,10 +44,10 @@ def remaining_words(runs: Sequence[Run]) -> str:
     return f"{band}; it is {100.0 * small:.2g} % of small motion and {100.0 * large:.2g} % of large."
 
 
-def _pieces(signal: Float[np.ndarray, " time"], run: Run) -> Float[np.ndarray, " piece"]:
-    """Give the sum of squares in each piece of a record, of samples that count."""
+def _in_stretches(signal: Float[np.ndarray, " time"], run: Run) -> Float[np.ndarray, " stretch"]:
+    """Give the sum of squares in each stretch of a record, of samples that count."""
     counted = np.where(run.counted > 0.0, signal, 0.0)
-    return np.array([np.sum(part**2) for part in np.array_split(counted, _PIECES)])
+    return np.array([np.sum(part**2) for part in np.array_split(counted, _STRETCHES)])
 
 
 def _half_of(runs: Sequence[Run]) -> tuple[float, float]:
