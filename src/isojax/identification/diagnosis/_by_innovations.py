@@ -25,6 +25,7 @@ from ._effect_search import (
     transfer,
 )
 from ._findings import Candidate, Finding, Verdict, VerdictWord
+from ._innovation_words import added_words, error_words
 from ._remaining_error import remaining_words
 from ._separating_words import is_exact, separating_experiment
 
@@ -317,25 +318,11 @@ def _nothing(
             for one in scores.scores
         }
     verdict: VerdictWord = "none" if good else "unexplained"
-    words = f"{_error_words(found, fit)} {reason[0].upper()}{reason[1:]}."
+    words = f"{error_words(found, fit)} {reason[0].upper()}{reason[1:]}."
     if not good:
         words = f"{words} {remaining_words(fit.free_runs)}".strip()
     ranking = _ranking(scores, refits, None, shares)
     return Verdict(verdict, None, ranking, (), 1.0, scores.hidden, bounds, None, words)
-
-
-def _error_words(found: ErrorFit, fit: Fit) -> str:
-    """Say what the error of a model is."""
-    if found.is_noise_of_output:
-        return "What the model leaves is noise of the output."
-    unit = "m/s^2" if fit.model.excitation == "base_acceleration" else "N"
-    force = f"{np.sqrt(found.sizes.variance):.3g} {unit} rms"
-    if found.is_noise:
-        return (
-            f"What the model leaves is noise of the output, and {force} of noise of the drive or of a force "
-            "on the mass: repeats at equal drive would separate the two."
-        )
-    return f"The error is the model's and not noise: a random force of {force} would explain it."
 
 
 def _finding(
@@ -383,29 +370,10 @@ def _finding(
         ranking,
         separating_experiment(name, together),
     )
-    reason = _added_words(ranking, best.transfer, fine.is_noise)
-    if not good:
+    reason = added_words(ranking, best.transfer.share, fine.is_noise)
+    if not fine.is_noise:
         reason = f"{reason} {remaining_words(whole.free_runs)}".strip()
     return Verdict(verdict, finding, ranking, together, 1.0 - explained, scores.hidden, {}, whole, reason)
-
-
-def _added_words(ranking: tuple[Candidate, ...], gained: Transfer, noise: bool) -> str:
-    """Say what a finding adds, and what others would in its place."""
-    words, unseen = ranking[0].words, "records left out of its refit"
-    if noise:
-        return f"With {words} what the model leaves is noise."
-    if gained.share <= 0.0:
-        return f"Adding {words} foretells {unseen} better. Their motion is irregular: no free run follows it."
-    others = [
-        f"{one.words} {_percent(one.held_out_share)}" for one in ranking[1:] if one.held_out_share > 0.0
-    ]
-    instead = f"; in its place {', '.join(others)}" if others else ""
-    share = _percent(gained.share)
-    return f"Adding {words} takes {share} off the squared error of free runs of {unseen}{instead}."
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
 
 
 def _is_alike(one: Refit, best: Refit, rules: Rules) -> bool:

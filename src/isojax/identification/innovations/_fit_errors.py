@@ -20,7 +20,7 @@ _MOST_SCORINGS = 40
 _SETTLED_DEVIANCE = 0.05
 """Change of the deviance by a step below which a search is over."""
 
-_SMALL_CHANGE = 0.005
+_SMALL_CHANGE = 0.01
 """Step of the logarithm of a size below which it is over as well, however the deviance creeps: beside a jump
 a sample may hold a size down to where nothing else asks for it."""
 
