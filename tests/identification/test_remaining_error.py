@@ -39,3 +39,9 @@ def test_half_of_the_square_of_two_tones_lies_on_the_larger():
 def test_no_error_has_no_words():
     assert remaining_words([run_of(tone(2.0), 0.0 * tone(2.0))]) == ""
     assert remaining_words([run_of(tone(2.0), tone(5.0), role="holdout")]) == ""
+
+
+def test_a_run_that_diverged_has_no_words():
+    error = tone(5.0)
+    error[3000:] = np.nan
+    assert remaining_words([run_of(tone(2.0), error), run_of(tone(2.0), tone(5.0))]) == ""

@@ -94,7 +94,7 @@ def diagnose_innovations(
     for refit in usable:
         clear = _gain(found, refit) > rules.clear_gain * found.samples
         if refit.fit.is_noise_of_output and clear:
-            best = Weighed(refit, Transfer(_gain(found, refit), 1.0))
+            best = Weighed(refit, Transfer(_gain(found, refit), 1.0, True))
             break
         by_runs = refit.fit.is_noise or _follows(usable, rules)
         needed = 0.0 if refit.fit.is_noise else rules.smallest_share
@@ -108,12 +108,10 @@ def diagnose_innovations(
         reason = f"{refit.score.element.name} does not carry over to records left out of its refit"
     if best is None:
         return _nothing(found, scores, refits, reason, fit, rules, shares)
-    others = [one for one in usable if one.score.element.name not in shares] if shares else []
     told = 0
-    for refit in others:
-        if told == _NEXT:
-            break
-        told += weigh(refit).transfer.settled
+    for refit in usable if shares else []:
+        if refit.score.element.name not in shares and told < _NEXT:
+            told += weigh(refit).transfer.settled
     return _finding(search, fit, scores, refits, best, shares)
 
 

@@ -248,7 +248,7 @@ class Transfer(NamedTuple):
 
     deviance: float
     share: float
-    settled: bool = True
+    settled: bool
 
 
 def transfer(before: LeftOut, after: LeftOut) -> Transfer:

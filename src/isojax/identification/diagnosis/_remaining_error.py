@@ -22,10 +22,10 @@ def remaining_words(runs: Sequence[Run]) -> str:
         runs: free runs of the records that were fitted.
 
     Returns:
-        A sentence; "" where there is no error.
+        A sentence; "" where there is no error, or a run diverged.
     """
     fitted = [run for run in runs if run.record.role == "fit" and np.any(run.residual)]
-    if not fitted:
+    if not fitted or not all(np.all(np.isfinite(run.residual)) for run in fitted):
         return ""
     low, high = _half_of(fitted)
     band = f"Half of the square of what is left lies from {low:.3g} to {high:.3g} Hz"
