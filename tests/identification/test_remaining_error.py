@@ -23,7 +23,7 @@ def test_the_band_and_the_size_of_the_motion_are_told():
     loud = np.where(np.arange(6000) < 3000, 1.0, 0.1)
     words = remaining_words([run_of(loud * tone(2.0), 0.2 * loud**2 * tone(5.0))])
     assert "lies from 5 to 5" in words
-    assert "2 % of small motion and 20 % of large" in words
+    assert "2.00 % of small motion and 20.0 % of large" in words
 
 
 def test_an_error_in_proportion_is_called_so():

@@ -66,6 +66,13 @@ def test_of_what_is_below_the_noise_no_share_is_told(found):
     finding = found.findings[0]
     assert "it leaves no excess." in finding_words(finding._replace(transfer=1014.4))[1]
     assert "it removes 62.0 % of the excess." in finding_words(finding._replace(transfer=0.62))[1]
+    assert not any("In its place" in line for line in finding_words(finding))
+    tried = (
+        finding.ranking[0]._replace(held_out_share=0.62),
+        finding.ranking[1]._replace(held_out_share=0.25),
+    )
+    lines = finding_words(finding._replace(transfer=0.62, ranking=tried))
+    assert "In its place others would remove there: presliding (Dahl) friction 25.0 %." in lines
 
 
 def test_headline_without_findings_names_nothing(found):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..._quantities import typeset_share
 from ..fitting import Fit
 from ..innovations import ErrorFit
 from ._findings import Candidate
@@ -46,11 +47,8 @@ def added_words(ranking: tuple[Candidate, ...], share: float, noise: bool) -> st
     if share <= 0.0:
         return f"Adding {words} foretells {unseen} better. Their motion is irregular: no free run follows it."
     others = [
-        f"{one.words} {_percent(one.held_out_share)}" for one in ranking[1:] if one.held_out_share > 0.0
+        f"{one.words} {typeset_share(one.held_out_share)}" for one in ranking[1:] if one.held_out_share > 0.0
     ]
     instead = f"; in its place {', '.join(others)}" if others else ""
-    return f"Adding {words} takes {_percent(share)} off the squared error of free runs of {unseen}{instead}."
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
+    taken = f"{typeset_share(share)} off the squared error of free runs of {unseen}"
+    return f"Adding {words} takes {taken}{instead}."

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.signal import periodogram
 
+from ..._quantities import typeset_share
 from ..fitting import Run
 
 _STRETCHES = 30
@@ -41,7 +42,7 @@ def remaining_words(runs: Sequence[Run]) -> str:
     )
     if max(small, large) < _APART * min(small, large):
         return f"{band}; it is as large a share of small motion as of large."
-    return f"{band}; it is {100.0 * small:.2g} % of small motion and {100.0 * large:.2g} % of large."
+    return f"{band}; it is {typeset_share(small)} of small motion and {typeset_share(large)} of large."
 
 
 def _in_stretches(signal: Float[np.ndarray, " time"], run: Run) -> Float[np.ndarray, " stretch"]:

@@ -235,6 +235,13 @@ def finding_words(finding: Finding) -> tuple[str, ...]:
             else f"removes {typeset_share(finding.transfer)} of the excess"
         )
         lines.append(f"On data that its refit did not see, it {removed}.")
+    told = [
+        f"{effect_words(one.effect)} {typeset_share(one.held_out_share)}"
+        for one in finding.ranking
+        if one.effect != finding.effect and one.held_out_share > 0.0
+    ]
+    if told:
+        lines.append(f"In its place others would remove there: {', '.join(told)}.")
     others = [name for name in finding.indistinguishable if name != finding.effect]
     if others:
         lines.append(
