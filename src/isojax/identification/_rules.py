@@ -87,6 +87,14 @@ class Rules:
 
     # Which candidates are refitted.
 
+    unbalanced: float = 1.5
+    """Measured force that an effect leaves unbalanced, over that of the best, from which it is not refitted
+    where the error is more than noise."""
+
+    hopeless: float = 0.2
+    """Gain that a score promises, over what the best refit's own score did, below which an effect is not
+    refitted."""
+
     survivors: int = 4
     """Families of effects that are refitted."""
 

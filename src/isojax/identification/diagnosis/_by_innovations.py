@@ -7,10 +7,8 @@ import numpy as np
 from scipy import stats
 
 from ...elements import CATALOGUE
-from ...models import Isolator
 from .._rules import Rules
 from ..fitting import Fit, Search, fit_with_errors, magnitudes
-from ..guess import balance_starts
 from ..innovations import ErrorFit, refined
 from ._bounds import WIDTH_95, strength_unit
 from ._effect_search import (
@@ -18,28 +16,18 @@ from ._effect_search import (
     Score,
     Scores,
     Transfer,
-    coefficients,
     left_out,
-    refit_effect,
     score_effects,
     transfer,
 )
 from ._findings import Candidate, Finding, Verdict, VerdictWord
 from ._innovation_words import added_words, error_words
+from ._refit_search import free_effects, place_of, seek_refits
 from ._remaining_error import remaining_words
 from ._separating_words import is_exact, separating_experiment
 
-CHANNELS = ("The drive and the floor", "The response channel")
-"""Groups of effects that are no laws of the isolator: they have a share of the refits of their own."""
-
 _NEXT = 2
 """Candidates that were not named whose share of the error of unseen records is told."""
-
-_BALANCED = 3
-"""Effects that are refitted because the measured forces balance best with them."""
-
-MOST_INTERNAL = 4
-"""Internal states of a model that is refitted: the filter's covariance grows with their square."""
 
 
 class Weighed(NamedTuple):
@@ -79,7 +67,7 @@ def diagnose_innovations(
     level = rules.significance if significance is None else significance
     scores = score_effects(found, search, excluded)
     search.progress(f"score test of {len(scores.scores)} absent effects")
-    refits = _refits(found, fit, scores, search)
+    refits = seek_refits(found, fit, scores, search)
     usable = _by_evidence(found, refits, scores, level, rules)
     reason = "no absent effect is both significant and physical"
     best: Weighed | None = None
@@ -113,92 +101,6 @@ def diagnose_innovations(
         if refit.score.element.name not in shares and told < _NEXT:
             told += weigh(refit).transfer.settled
     return _finding(search, fit, scores, refits, best, shares)
-
-
-def _refits(found: ErrorFit, fit: Fit, scores: Scores, search: Search) -> list[Refit]:
-    """Refit the effects that the balance of forces and the scores ask for; then what looks like the best."""
-    rules, refits = search.rules, list[Refit]()
-
-    def refit(score: Score, begin: Isolator | None = None) -> bool:
-        search.progress(f"refit with {score.element.name}")
-        rivals = [one.fit.criterion for one in refits if one.violation is None]
-        refits.append(refit_effect(found, score, search, begin, min(rivals, default=np.inf)))
-        return refits[-1].violation is None and refits[-1].explains
-
-    asked = [
-        score
-        for score in scores.scores
-        if score.admissible
-        and abs(score.pull) > _least_pull(scores)
-        and found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
-    ]
-    left = {True: rules.survivors // 2, False: rules.survivors}
-    held = {element.name for element in found.model.elements}
-    absent = tuple(one for one in scores.probes if one.group not in CHANNELS and held.isdisjoint(one.absorbs))
-    for start in [] if found.is_noise else balance_starts(fit.campaign, found.model, absent)[:_BALANCED]:
-        score = next((one for one in scores.scores if one.element.name == start.element.name), None)
-        if score is None:
-            continue
-        asked = [one for one in asked if one is not score]
-        if refit(score, start.model):
-            asked = []
-            break
-    while asked := [one for one in asked if left[one.element.group in CHANNELS]]:
-        # Of those that stand out about as much the plainest goes first: it may do.
-        near = [one for one in asked if abs(one.pull) > rules.about_as_large * abs(asked[0].pull)]
-        plainest = min(near, key=lambda one: (coefficients(found, one), one.element.internal_states))
-        asked = [one for one in asked if one is not plainest]
-        left[plainest.element.group in CHANNELS] -= 1
-        if refit(plainest):
-            break  # nothing can explain more, but another law may explain as much
-    best = min(
-        (one for one in refits if one.violation is None), key=lambda one: one.fit.criterion, default=None
-    )
-    if best is None:
-        return refits
-    alike = _look_alikes(best.score.element.name)
-    place, free = _place(scores, best), _free_effects(best.fit)
-    for index, score in enumerate(scores.scores):
-        near = score.element.name in alike or abs(best.score.likeness[index]) > rules.likeness
-        done = any(_place(scores, one) == index for one in refits)
-        few = found.model.internal_states + score.element.internal_states <= MOST_INTERNAL
-        # Where a law leaves nothing but noise one with more coefficients cannot be told from it, unless they
-        # would be one law if what is known beside them were not.
-        pair = best.score.element.name, score.element.name
-        twin = is_exact(*pair, set(CATALOGUE)) and not is_exact(*pair, free)
-        told = not best.explains or twin or coefficients(found, score) <= len(best.fit.places)
-        if near and few and told and not done and index != place and score.admissible:
-            refit(score)
-    return refits
-
-
-def _place(scores: Scores, refit: Refit) -> int:
-    """Give the place of a refitted effect among the scores, of which there is one a name."""
-    names = [one.element.name for one in scores.scores]
-    return names.index(refit.score.element.name)
-
-
-def _least_pull(scores: Scores) -> float:
-    """Give the score below which chance explains the largest of so many."""
-    return float(stats.norm.isf(0.5 * 0.05 / max(1, len(scores.scores))))
-
-
-def _look_alikes(name: str) -> set[str]:
-    """Give the catalogue names of effects that are declared to look like one."""
-    found: set[str] = set()
-    for kind_name, kind in CATALOGUE.items():
-        for alike in kind.look_alikes:
-            group = {kind_name, *alike.others}
-            if name == kind_name or (name in group and alike.among):
-                found |= group
-            elif name in alike.others:
-                found.add(kind_name)
-    return found - {name}
-
-
-def _free_effects(fit: ErrorFit) -> set[str]:
-    """Give the catalogue names of the effects whose strength is fitted."""
-    return {name for name, kind in CATALOGUE.items() if f"{name}.{kind.strength}" in fit.names}
 
 
 def _gain(found: ErrorFit, refit: Refit) -> float:
@@ -269,7 +171,7 @@ def _candidate(
         chi2 = own.chi2 / max(1.0, own.samples - len(own.places))
         delta = np.nan if best is None else own.criterion - best.fit.criterion
         admissible = admissible and refit.violation is None
-    place = None if best is None else _place(scores, best)
+    place = None if best is None else place_of(scores, best)
     return Candidate(
         element.name,
         element.words,
@@ -338,7 +240,7 @@ def _finding(
     fine = refined(refit.fit, magnitudes(refit.fit.model, refit.fit.places, search.scales))
     whole = fit_with_errors(fine, fit.model, fit.campaign, search)
     name = refit.score.element.name
-    names = _free_effects(fine)
+    names = free_effects(fine)
     together = tuple(
         one.score.element.name
         for one in refits

@@ -20,6 +20,7 @@ from ._equivalent_coefficients import invert_equivalent as invert_equivalent
 from ._equivalent_coefficients import normalised_law as normalised_law
 from ._half_power import HalfPower as HalfPower
 from ._half_power import find_half_power as find_half_power
+from ._internal_path import internal_states_along as internal_states_along
 from ._linear_response import linear_response as linear_response
 from ._measured_receptance import MeasuredResponse as MeasuredResponse
 from ._measured_receptance import measured_receptance as measured_receptance

@@ -14,10 +14,10 @@ from ._restoring_force import band_projections
 
 
 class BalanceStart(NamedTuple):
-    """An absent effect without which the measured forces do not balance.
+    """What the balance of measured forces says of an absent effect.
 
     Attributes:
-        element: the effect, at its estimated strength.
+        element: the effect, of the shape and strength that leave least; of strength zero where none helps.
         model: the model with it, every coefficient from the balance.
         unexplained: rms of the force that it leaves unbalanced, as a share of the measured force [1].
         before: the same without it.
@@ -27,6 +27,11 @@ class BalanceStart(NamedTuple):
     model: Isolator
     unexplained: float
     before: float
+
+    @property
+    def helps(self) -> bool:
+        """Whether the forces balance better with it."""
+        return self.unexplained < self.before
 
 
 def find_balance_start(
@@ -42,7 +47,7 @@ def find_balance_start(
         campaign: the measurements; only records to fit are used.
         model: the fitted model, for its structure.
         scales: magnitudes of the records.
-        absent: absent effects; those without internal states take part.
+        absent: absent effects; every shape of their grids takes part.
 
     Returns:
         The effect that leaves the smallest unbalanced force, or None if none leaves so little.
@@ -50,27 +55,25 @@ def find_balance_start(
     Source: Masri & Caughey 1979.
     """
     kinds = dict.fromkeys(type(probe) for probe in absent)
-    starts = balance_starts(campaign, model, tuple(kind.guess(scales) for kind in kinds))
-    return starts[0] if starts else None
+    starts = balance_starts(campaign, model, tuple(shape for kind in kinds for shape in kind.grid(scales)))
+    return starts[0] if starts and starts[0].helps else None
 
 
 def balance_starts(
     campaign: Campaign, model: Isolator, absent: tuple[AbstractElement, ...]
 ) -> list[BalanceStart]:
-    """List the absent effects without which the measured forces balance less well, the best first.
+    """List the absent effects that take part in the balance of measured forces, the best first.
 
     Args:
         campaign: the measurements; only records to fit are used.
         model: the fitted model, for its structure.
-        absent: absent effects, of any shapes; those without internal states take part.
+        absent: absent effects, of any shapes.
 
     Returns:
         One a name, of the shape that leaves the smallest unbalanced force.
     """
-    if any(element.internal_states for element in model.elements):
-        return []
     balance, names = _balance(campaign, model), tuple(element.name for element in model.elements)
-    before, found = balance.fit(names).unexplained, dict[str, BalanceStart]()
+    before, found = balance.fit(names), dict[str, BalanceStart]()
     for probe in absent:
         tried = balance.fit(names, probe)
         if probe.name not in tried.fitted:
@@ -78,9 +81,10 @@ def balance_starts(
         element = tried.model.elements[-1]
         strength = float(getattr(element, element.strength))
         lower = dict(own_parameters(element))[element.strength].lower
-        best = found[probe.name].unexplained if probe.name in found else before
+        useless = BalanceStart(probe, before.model, before.unexplained, before.unexplained)
+        best = found.setdefault(probe.name, useless).unexplained
         if (element.signed or strength > 0.0) and strength > lower and tried.unexplained < best:
-            found[probe.name] = BalanceStart(element, tried.model, tried.unexplained, before)
+            found[probe.name] = BalanceStart(element, tried.model, tried.unexplained, before.unexplained)
     return sorted(found.values(), key=lambda one: one.unexplained)
 
 

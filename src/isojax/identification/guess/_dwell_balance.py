@@ -42,6 +42,8 @@ def dwell_motion(model: Isolator, responses: tuple[MeasuredResponse, ...]) -> Mo
         _over_a_cycle(angular**2 * displacement),
         _over_a_cycle(drive),
         ExcitedBand(float(np.min(frequency)), float(np.max(frequency)) * displacement.shape[1]),
+        np.repeat(1.0 / (_PHASES * frequency), _PHASES),
+        cycle=_PHASES,
     )
 
 

@@ -2,18 +2,20 @@
 
 import dataclasses
 from collections.abc import Callable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 from scipy.optimize import lsq_linear
 
 from ..._parameters import own_parameters
 from ..._quick_jit import quick_jit
 from ..._types import on_device
 from ...elements import AbstractElement
-from ...models import Instant, Isolator
+from ...models import Instant, Isolator, State
+from ._internal_path import internal_states_along
 from ._motion import Motion
 
 BalanceProjection = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, " row"]]
@@ -21,6 +23,9 @@ BalanceProjection = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, " r
 
 _SIGNALS = ("displacement", "velocity", "acceleration", "drive")
 """What of a measured motion enters the balance."""
+
+_LAPS = 3
+"""Times that each dwell's cycle is gone through, by the last of which internal states have settled."""
 
 _UNDRIVEN = 0.01
 """A measured force below this share of the inertia is taken for noise, and the motion for a free decay."""
@@ -67,7 +72,9 @@ def _unbalanced_force(model: Isolator, signals: tuple[Array, ...]) -> Float[Arra
 
 
 @quick_jit
-def _force_of(base: Isolator, element: AbstractElement, signals: tuple[Array, ...]) -> Float[Array, " time"]:
+def _force_of(
+    base: Isolator, element: AbstractElement, signals: tuple[Array, ...], internal: State
+) -> Float[Array, " time"]:
     """Give the contribution of an element to the balance [N], never as a difference of large forces.
 
     Of `base` the mass and what is driven count.
@@ -76,7 +83,7 @@ def _force_of(base: Isolator, element: AbstractElement, signals: tuple[Array, ..
     gained = element.drive(u, jnp.zeros_like(u))[0] - u
     on_base = base.excitation == "base_acceleration"
     inertia = element.inertia() * (a + u if on_base else a)
-    return element.force(x, v, ()) + inertia + (base.mass * gained if on_base else -gained)
+    return element.force(x, v, internal) + inertia + (base.mass * gained if on_base else -gained)
 
 
 def _where_proportional(
@@ -88,11 +95,35 @@ def _where_proportional(
     return unit if size > 0 and in_proportion and np.all(np.isfinite(unit)) else None
 
 
+class _Path(NamedTuple):
+    """The way that internal states go along measured motions.
+
+    Attributes:
+        visited: the samples in turn; each cycle of a dwell several times, until its start is forgotten.
+        seen: where on that way each sample is seen, at its last visit.
+    """
+
+    visited: Int[np.ndarray, " visit"]
+    seen: Int[np.ndarray, " time"]
+
+
+def _path(motions: tuple[Motion, ...]) -> _Path:
+    visited, seen, first, before = [], [], 0, 0
+    for motion in motions:
+        size = motion.drive.size
+        laps, cycle = (_LAPS, motion.cycle) if motion.cycle else (1, size)
+        own = np.tile(first + np.arange(size).reshape(-1, 1, cycle), (1, laps, 1))
+        visited.append(own.ravel())
+        seen.append(before + np.arange(own.size).reshape(own.shape)[:, -1].ravel())
+        first, before = first + size, before + own.size
+    return _Path(np.concatenate(visited), np.concatenate(seen))
+
+
 class ForceBalance:
     """The balance of measured forces for one structure; the force of each law is evaluated once.
 
-    `m x'' + sum coefficient_i phi_i(x, x') = F` is linear in every coefficient, in the mass, in a gain and in
-    an offset.
+    `m x'' + sum coefficient_i phi_i(x, x', s) = F` is linear in every coefficient, in the mass, in a gain and
+    in an offset. Internal states `s` follow the measured motion.
 
     Source: S. F. Masri and T. K. Caughey, A nonparametric identification technique for nonlinear dynamic
     problems, J. Appl. Mech. 46 (1979) 433.
@@ -113,9 +144,10 @@ class ForceBalance:
             projections: how the balance of each is summarised.
             mass_free: whether the mass is unknown too; without a measured force it stays as declared.
         """
-        # End to end: laws have no memory here, and compiled code is made for each length.
-        rows = ([getattr(one, name) for one in motions] for name in _SIGNALS)
-        self._signals = tuple(on_device(np.concatenate(row)) for row in rows)
+        # End to end: compiled code is made for each length.
+        rows = ([getattr(one, name) for one in motions] for name in (*_SIGNALS, "step"))
+        *self._signals, self._step = (on_device(np.concatenate(row)) for row in rows)
+        self._signals, self._path = tuple(self._signals), _path(motions)
         self._ends = np.cumsum([one.drive.size for one in motions])[:-1]
         self._projections = projections
         self._elements = tuple(with_strength(element, 0.0) for element in model.elements)
@@ -173,6 +205,17 @@ class ForceBalance:
             fitted=tuple(elements[place].name for place in regressors),
         )
 
+    def _internal(self, element: AbstractElement) -> State:
+        """Give the internal states of a law at each sample."""
+        if not element.internal_states:
+            return ()
+        alone = Isolator(self._base.mass, (element,), self._base.excitation)
+        x, v, _, u, step = (
+            on_device(np.asarray(signal)[self._path.visited]) for signal in (*self._signals, self._step)
+        )
+        histories = internal_states_along(alone, x, v, x, u, step)
+        return tuple(on_device(np.asarray(history)[self._path.seen]) for history in histories)
+
     def _apart(self, forces: Float[Array, " time"]) -> list[Float[np.ndarray, " _"]]:
         """Give forces motion by motion."""
         return np.split(np.asarray(forces), self._ends)
@@ -183,12 +226,10 @@ class ForceBalance:
 
     def _regressor(self, element: AbstractElement) -> Float[np.ndarray, " row"] | None:
         """Give the balance of an element of strength one; None where it has no such force."""
-        if element.internal_states:
-            return None
         bare = Isolator(self._base.mass, (), self._base.excitation)
         unit, twice = (
-            self._apart(_force_of(bare, with_strength(element, strength), self._signals))
-            for strength in (1.0, 2.0)
+            self._apart(_force_of(bare, one, self._signals, self._internal(one)))
+            for one in (with_strength(element, strength) for strength in (1.0, 2.0))
         )
         forces = [_where_proportional(*pair) for pair in zip(unit, twice, strict=True)]
         if all(force is None for force in forces):

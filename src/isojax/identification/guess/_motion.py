@@ -30,7 +30,9 @@ class Motion:
         acceleration: [m/s^2].
         drive: the recorded drive [N, or m/s^2 for base excitation].
         band: where the motion exceeds its noise and, where it was integrated, has no drift.
+        step: time from each sample to the next [s].
         margin: samples at each end whose integrals are unreliable.
+        cycle: samples of a cycle, where each dwell is one and repeats; 0 where the motion goes on.
     """
 
     displacement: Float[np.ndarray, " time"]
@@ -38,7 +40,9 @@ class Motion:
     acceleration: Float[np.ndarray, " time"]
     drive: Float[np.ndarray, " time"]
     band: ExcitedBand
+    step: Float[np.ndarray, " time"]
     margin: int = 0
+    cycle: int = 0
 
     @property
     def trusted(self) -> slice:
@@ -93,4 +97,4 @@ def measured_motion(campaign: Campaign, record: Record, origin: float = 0.0) -> 
         band = ExcitedBand(lowest, band.highest)
         margin = round(min(_MARGIN_PERIODS * record.rate / lowest, _LARGEST_MARGIN * record.time.size))
     x, v, a = measured_state(own, campaign.output.quantity, band.lowest, band.highest)
-    return Motion(x, v, a, record.input, band, margin)
+    return Motion(x, v, a, record.input, band, np.full(x.size, 1.0 / record.rate), margin)

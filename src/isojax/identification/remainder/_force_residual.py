@@ -3,8 +3,6 @@
 import dataclasses
 from typing import NamedTuple
 
-import diffrax
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -14,15 +12,12 @@ from ..._parameters import list_parameters
 from ..._quick_jit import quick_jit
 from ...elements import Channels
 from ...excitations import Hold
-from ...models import RK4, Instant, Isolator, State, share_internal
+from ...models import Instant, Isolator, State
 from ...records import Campaign, ExcitedBand, Record, measured_state
 from ...records.spectrum import shift_order
 from ..fitting import Fit, Run
-from ..guess import Motion, is_absolute, measured_motion
-from ..jacobian import channel_table, drive_table, follow_motion, scaled_model
-
-_STEPS_A_SAMPLE = 2
-"""Integration steps per sample for internal states that follow the measured motion."""
+from ..guess import Motion, internal_states_along, is_absolute, measured_motion
+from ..jacobian import channel_table, drive_table, scaled_model
 
 _STEEP = 6
 """Order of the filter below the band."""
@@ -60,50 +55,6 @@ class ForceResidual(NamedTuple):
     noise: Float[np.ndarray, "draw time"]
     highest: float
     trusted: slice
-
-
-@quick_jit
-def follow_internal_states(
-    model: Isolator, x: Array, v: Array, y: Array, u: Array, sample_time: float
-) -> tuple[Array, ...]:
-    """Integrate the internal states of a model's elements along a given motion, from rest.
-
-    Args:
-        model: the isolator; its force balance takes no part.
-        x: displacement [m].
-        v: velocity [m/s].
-        y: motion at the sensor [its SI unit].
-        u: drive [N, or m/s^2 for base excitation].
-        sample_time: [s].
-
-    Returns:
-        One history per internal state.
-    """
-    solver, based = RK4(), model.excitation == "base_acceleration"
-
-    def field(t: float, internal: State, ends: tuple[tuple[Array, ...], tuple[Array, ...]]) -> State:
-        far, fast, seen, drive = (one + t * (other - one) for one, other in zip(*ends, strict=True))
-        rates: list[Array] = []
-        for element, own in zip(
-            model.elements, share_internal(model.elements, (far, fast, *internal)), strict=True
-        ):
-            rates.extend(follow_motion(element, far, fast, seen, drive if based else None, own))
-        return tuple(sample_time * rate for rate in rates)
-
-    term = diffrax.ODETerm(field)  # pyright: ignore[reportArgumentType]
-
-    def body(internal: State, ends: tuple[tuple[Array, ...], tuple[Array, ...]]) -> tuple[State, State]:
-        moved = internal
-        for step in range(_STEPS_A_SAMPLE):
-            moved, *_ = solver.step(
-                term, step / _STEPS_A_SAMPLE, (step + 1) / _STEPS_A_SAMPLE, moved, ends, None, False
-            )
-        return moved, internal
-
-    signals = (x, v, y, u)
-    ahead = tuple(jnp.concatenate([values[1:], values[-1:]]) for values in signals)
-    rest = (jnp.zeros(()),) * model.internal_states
-    return jax.lax.scan(body, rest, (signals, ahead))[1]
 
 
 @quick_jit
@@ -183,7 +134,8 @@ def _force_residual(
     x, v, a = (jnp.asarray(s) for s in (motion.displacement, motion.velocity, motion.acceleration))
     internal = ()
     if model.internal_states:
-        internal = follow_internal_states(model, x, v, jnp.asarray(seen.output), u, 1.0 / record.rate)
+        step = jnp.full_like(x, 1.0 / record.rate)
+        internal = internal_states_along(model, x, v, jnp.asarray(seen.output), u, step)
     values = tuple(entry.value for entry in list_parameters(model))
     scaled = scaled_model(model, values, jnp.asarray(scale))
 
