@@ -49,7 +49,6 @@ ACCURACY = {
     # When what a fit leaves is the noise by which it was weighted.
     "_effect_search": {"MOST_FOLDS", "SMALLER"},
     "_by_innovations": {"NEXT"},
-    "_refit_search": {"MOST_INTERNAL"},
     "_segment_scatter": {"SAME_DRIVE_AND_RESPONSE", "SAME_FREQUENCY"},
     "_segments": {"DECAY_TIMES_A_WINDOW", "FEWEST_WINDOWS", "SHORTEST", "SHORTEST_WINDOW"},
     # What is drawn up and shown.

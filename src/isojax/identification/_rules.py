@@ -88,8 +88,8 @@ class Rules:
     # Which candidates are refitted.
 
     unbalanced: float = 1.5
-    """Measured force that an effect leaves unbalanced, over that of the best, from which it is not refitted
-    where the error is more than noise."""
+    """Measured force left unbalanced, over what the best effect leaves, from which it tells effects apart:
+    those that leave more are not refitted."""
 
     hopeless: float = 0.2
     """Gain that a score promises, over what the best refit's own score did, below which an effect is not

@@ -61,7 +61,7 @@ class _RefitSearch:
         self._most = MOST_INTERNAL - found.model.internal_states
 
     def by_balance(self) -> list[Score]:
-        """Refit the effects with which measured forces balance best.
+        """Refit the effects with which measured forces balance far better than without.
 
         Returns:
             The scores of what is still to be refitted, largest first.
@@ -87,10 +87,13 @@ class _RefitSearch:
         scored = {score.element.name: score for score in scores}
         starts = balance_starts(self._fit.campaign, found.model, absent)
         starts = [one for one in starts if one.element.name in scored]
-        near = [one for one in starts if one.unexplained <= self._rules.unbalanced * starts[0].unexplained]
+        most = self._rules.unbalanced * starts[0].unexplained if starts else np.inf
+        if not starts or starts[0].before <= most:
+            return asked  # forces that balance without any effect tell none apart
+        near = [one for one in starts if one.unexplained <= most]
         for start in near[:_BALANCED]:
             asked = [one for one in asked if one.element.name != start.element.name]
-            if start.helps and self._refit(scored[start.element.name], start.model):
+            if self._refit(scored[start.element.name], start.model):
                 return []
         if self._best() is None:
             return asked
