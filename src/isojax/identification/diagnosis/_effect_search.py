@@ -174,35 +174,38 @@ def refit_effect(
     score: Score,
     search: Search,
     begin: Isolator | None = None,
+    far: bool = False,
     rival: float = np.inf,
 ) -> Refit:
-    """Fit the model with one absent effect, everything free, from where the score points.
+    """Fit the model with one absent effect, everything free, from the best of several starts.
 
     Args:
         fit: the model without it.
-        score: the effect.
+        score: the effect, and where its score points.
         search: the scales of the campaign.
         begin: where else to start: the model with the effect, every coefficient from the measured forces.
+        far: whether the model is so far from the records that its scores mean little.
         rival: criterion of the best refit so far.
 
     Returns:
         The refit, with what speaks against it whatever it gains.
     """
-    model = extended_model(fit, score.element, score.strength, score.step) if begin is None else begin
-    places = new_places(fit, model)
-    starts = []
-    for share in _SHARES[1:] if begin is None else ():
-        listed = list_parameters(
-            extended_model(fit, score.element, share * score.strength, share * score.step)
-        )
-        starts.append(np.array([float(listed[place].value) for place in places]))
+    shares = _SHARES if score.admissible else ()
+    models = [extended_model(fit, score.element, one * score.strength, one * score.step) for one in shares]
+    if begin is not None:
+        models.insert(0 if far else len(models), begin)
+    model, places = models[0], new_places(fit, models[0])
+    starts = [
+        np.array([float(listed[place].value) for place in places])
+        for listed in map(list_parameters, models[1:])
+    ]
     sizes = first_sizes(fit.filter)
-    if begin is None:
+    if not far:
         sizes = sizes._replace(force=max(fit.sizes.force, sizes.force - _SMALLER))
     scales = magnitudes(model, places, search.scales)
     measured, steps = fit.filter.measured, fit.filter.steps
     found = fit_measured(model, places, scales, measured, sizes, starts, steps, rough=True, rival=rival)
-    if begin is not None:
+    if far and begin is not None:
         # Far from the records the score has no say in the sign; the likelihood ratio stands for its p-value.
         drop, extra = fit.deviance.sum() - found.deviance.sum(), max(1, len(places) - len(fit.places))
         chance = len(CATALOGUE) * stats.chi2.sf(max(0.0, drop), extra)

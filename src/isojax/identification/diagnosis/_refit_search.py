@@ -57,7 +57,7 @@ class _RefitSearch:
     def __init__(self, found: ErrorFit, fit: Fit, scores: Scores, search: Search):
         self.refits: list[Refit] = []
         self._found, self._fit, self._scores, self._search = found, fit, scores, search
-        self._rules = search.rules
+        self._rules, self._begins = search.rules, dict[str, Isolator]()
         self._most = MOST_INTERNAL - found.model.internal_states
 
     def by_balance(self) -> list[Score]:
@@ -88,12 +88,13 @@ class _RefitSearch:
         starts = balance_starts(self._fit.campaign, found.model, absent)
         starts = [one for one in starts if one.element.name in scored]
         most = self._rules.unbalanced * starts[0].unexplained if starts else np.inf
+        near = [one for one in starts if one.unexplained <= most]
+        self._begins = {one.element.name: one.model for one in near if one.helps}
         if not starts or starts[0].before <= most:
             return asked  # forces that balance without any effect tell none apart
-        near = [one for one in starts if one.unexplained <= most]
         for start in near[:_BALANCED]:
             asked = [one for one in asked if one.element.name != start.element.name]
-            if self._refit(scored[start.element.name], start.model):
+            if self._refit(scored[start.element.name], far=True):
                 return []
         if self._best() is None:
             return asked
@@ -136,12 +137,13 @@ class _RefitSearch:
             if wanted and score.admissible and self._is_hopeful(score):
                 self._refit(score)
 
-    def _refit(self, score: Score, begin: Isolator | None = None) -> bool:
+    def _refit(self, score: Score, far: bool = False) -> bool:
         """Refit an effect; say whether it leaves nothing but noise."""
         self._search.progress(f"refit with {score.element.name}")
         best = self._best()
         rival = np.inf if best is None else best.fit.criterion
-        self.refits.append(refit_effect(self._found, score, self._search, begin, rival))
+        begin = self._begins.get(score.element.name)
+        self.refits.append(refit_effect(self._found, score, self._search, begin, far, rival))
         return self.refits[-1].violation is None and self.refits[-1].explains
 
     def _best(self) -> Refit | None:
