@@ -28,7 +28,7 @@ ACCURACY = {
     "_passivity": {"STEADY", "WORK_OF_STEPS"},
     # Where a search stands still, or goes astray.
     "_descent": {"IDLE", "KEPT", "REFUSALS_A_STEP", "SHRINKS", "STALLED"},
-    "_estimate": {"ROUGH", "SMALLEST_SCATTER"},
+    "_estimate": {"MUCH_LESS_SCATTER", "ROUGH", "SMALLEST_SCATTER"},
     "_initial_states": {"BAD_START", "HALVINGS", "MOST_WORSENING", "SETTLED", "SHORTEST", "SMALL_STEP"},
     # Draws and intervals.
     "_scatter_mixture": {"LEAST_TAIL"},

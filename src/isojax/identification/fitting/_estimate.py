@@ -162,6 +162,9 @@ def magnitudes(model: Isolator, places: tuple[int, ...], scales: Scales) -> tupl
     return tuple(sizes)
 
 
+MUCH_LESS_SCATTER = 0.1
+"""Scatter that a model shows, over that of a model before it, below which that was the model's own error."""
+
 SMALLEST_SCATTER = 1e-5
 """Least scatter of the linear stiffness between records [relative]: that of a rig whose repeats show none."""
 
@@ -254,8 +257,8 @@ def estimate(
         places: free coefficients.
         search: how to search.
         nuisances: known nuisances of an earlier fit, with the scatter of the stiffness; else it is estimated.
-        anew: whether the scatter of the stiffness within records is estimated again with this model, though
-            it is known with another.
+        anew: whether the scatter of the stiffness is estimated again with this model, though it is known with
+            another: that within records, and that between them where it was another's error.
 
     Returns:
         The estimate.
@@ -276,10 +279,10 @@ def estimate(
             own = search._replace(tolerance=rough)
             found = descend(simulator, found.point.model, places, sizes, found.point.nuisances, own)
             steps += found.steps
-    if is_successful(found.result) and not known and may_start_wrong(simulator, found.point):
+    if is_successful(found.result) and may_start_wrong(simulator, found.point, known):
         settled = best_nuisances(simulator, found.point.model, HELD, places=places)
         if settled.chi2 < found.point.chi2 - search.rules.close_bic:
-            start = settled.nuisances._replace(spread=Spread(FIRST_SCATTER))
+            start = settled.nuisances._replace(spread=found.point.nuisances.spread)
             found = descend(simulator, settled.model, places, sizes, start, search._replace(tolerance=rough))
             steps += found.steps
     if is_successful(found.result) and scatters and (anew or not known):
@@ -339,9 +342,9 @@ def _with_scatter(
     """Give the nuisances with the scatter that repeats show; None where it is known and stays as it is."""
     problem, old, rules = simulator.problem, point.nuisances, search.rules
     within = segment_scatter(problem.records, problem.segments, point, _inflation(point), rules)
-    if known and within == old.spread.segments:
-        return None
     spread = _spread(simulator, point, places, within, rules)
+    if known and within == old.spread.segments and spread.records > MUCH_LESS_SCATTER * old.spread.records:
+        return None
     search.progress(
         f"linear stiffness scatters by {100 * spread.records:.2g} % between records"
         + (f" and by {100 * within:.2g} % within them" if within else "")

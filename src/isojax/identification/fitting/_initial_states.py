@@ -69,20 +69,22 @@ def best_nuisances(
     return further if further.chi2 < point.chi2 else point
 
 
-def may_start_wrong(simulator: Simulator, point: Point) -> bool:
+def may_start_wrong(simulator: Simulator, point: Point, from_others: bool = False) -> bool:
     """Say whether what is left may come of the initial states.
 
-    No dwells settle, and it is more than noise; or laws jump, which look like noise in the output themselves.
+    It is more than noise, or laws jump, which look like noise in the output themselves. Dwells settle: their
+    measured states are right, but those on which a search moved from another model's may not be.
 
     Args:
         simulator: the records.
         point: the equations at some coefficients.
+        from_others: whether the search for the states began at those of another model.
 
     Returns:
         Whether to seek the states further.
     """
-    stepped = any(record.dwells for record in simulator.problem.records)
-    return not stepped and (point.model.splits or not point.chi2 < _BAD_START * max(1.0, point.free_samples))
+    settles = any(record.dwells for record in simulator.problem.records) and not from_others
+    return not settles and (point.model.splits or not point.chi2 < _BAD_START * max(1.0, point.free_samples))
 
 
 def _first_periods(simulator: Simulator, model: Isolator, start: Nuisances) -> Nuisances:
