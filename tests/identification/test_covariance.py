@@ -1,8 +1,11 @@
 """Error bars against closed forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from isojax.identification.fitting import invert_information
+from isojax.identification.innovations import ErrorFit
 
 
 def _line(count=50):
@@ -55,3 +58,13 @@ def test_nothing_is_known_where_the_information_is_not_finite():
     found = invert_information(np.array([[1.0, np.nan], [np.nan, 1.0]]))
     assert not found.determined.any()
     assert np.isnan(found.covariance).all()
+
+
+def test_coefficients_of_any_size_keep_their_variance_beside_each_other():
+    stiff, cubic, likeness = 1e-9, 1e-19, 0.8  # inverse variances of N/m and of N/m^3
+    cross = likeness * np.sqrt(stiff * cubic)
+    found = ErrorFit.__dict__["covariance"].fget(
+        SimpleNamespace(information=np.array([[stiff, cross], [cross, cubic]]))
+    )
+    expected = np.array([[cubic, -cross], [-cross, stiff]]) / (stiff * cubic * (1.0 - likeness**2))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)

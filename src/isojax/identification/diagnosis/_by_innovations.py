@@ -166,8 +166,7 @@ def _candidate(
         name = f"{element.name}.{element.strength}"
         place = own.names.index(name)
         strength = float(own.values[place])
-        inverse = np.linalg.pinv(own.information, hermitian=True)
-        error = float(np.sqrt(max(inverse[place, place], 0.0)))
+        error = float(np.sqrt(max(own.covariance[place, place], 0.0)))
         chi2 = own.chi2 / max(1.0, own.samples - len(own.places))
         delta = np.nan if best is None else own.criterion - best.fit.criterion
         admissible = admissible and refit.violation is None

@@ -96,10 +96,13 @@ class _RefitSearch:
             asked = [one for one in asked if one.element.name != start.element.name]
             if self._refit(scored[start.element.name], far=True):
                 return []
-        if self._best() is None:
+        best = self._best()
+        if best is None:
             return asked
         far = {one.element.name for one in starts} - {one.element.name for one in near}
-        return [one for one in asked if one.element.name not in far]
+        # Integrals of a measured motion err, and a law may make up for that: the scores must agree.
+        stands_out = abs(best.score.pull)
+        return [one for one in asked if one.element.name not in far or abs(one.pull) > stands_out]
 
     def by_scores(self, asked: list[Score]) -> None:
         """Refit effects until one explains everything."""

@@ -225,7 +225,12 @@ class ForceBalance:
         return np.concatenate([project(force) for project, force in pairs])
 
     def _regressor(self, element: AbstractElement) -> Float[np.ndarray, " row"] | None:
-        """Give the balance of an element of strength one; None where it has no such force."""
+        """Give the balance of an element of strength one; None where it has no such force.
+
+        Without a measured force nothing would balance as well as no mass and no springs.
+        """
+        if not self._is_driven and float(with_strength(element, 1.0).inertia()) != 0.0:
+            return None
         bare = Isolator(self._base.mass, (), self._base.excitation)
         unit, twice = (
             self._apart(_force_of(bare, one, self._signals, self._internal(one)))

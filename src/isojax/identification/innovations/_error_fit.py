@@ -78,6 +78,15 @@ class ErrorFit:
         return self.products.sum(axis=-1)[:-1, :-1]
 
     @property
+    def covariance(self) -> Float[np.ndarray, "column column"]:
+        """Of the coefficients [product of their units]; zero where the records determine nothing."""
+        information = self.information
+        # Stiffness in N/m and in N/m^3 would spoil each other.
+        size = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+        scales = np.outer(size, size)
+        return np.linalg.pinv(information * scales, rcond=1e-12, hermitian=True) * scales
+
+    @property
     def chi2(self) -> float:
         """Sum of squared innovations over their variances."""
         return float(self.products[-1, -1].sum())

@@ -172,7 +172,7 @@ def steps_are_fine(found: ErrorFit, share: float = SMALL_SHARE, rival: float = n
     size = len(found.places)
     change = finer.slopes(found.places, found.values, found.way).sum(axis=-1)[:, -1]
     change = np.append(change[:size], change[-1]) - found.products.sum(axis=-1)[:, -1]
-    moved = float(change[:-1] @ np.linalg.pinv(found.information, hermitian=True) @ change[:-1])
+    moved = float(change[:-1] @ found.covariance @ change[:-1])
     risen = abs(float(change[-1]))
     if found.criterion - risen > rival:
         return True
