@@ -90,14 +90,15 @@ def test_hysteresis_is_found_by_the_forces_alone(campaign):
     first, *others = balance_starts(campaign, classical_guess(campaign).model, shapes)
     assert first.element.name == "dahl_friction"
     assert first.unexplained < 0.3 * min(one.unexplained for one in others)
+    chosen = find_balance_start(campaign, classical_guess(campaign).model, own, shapes)
+    # Where the motion is integrated no law that may forget what drifts is taken for a start.
+    assert chosen is not None
+    assert (chosen.element.name == "dahl_friction") == bool(campaign.records[0].dwells)
 
 
 def test_with_its_own_shape_it_gives_the_coefficients(campaign):
     model = classical_guess(campaign).model
     element = CATALOGUE["dahl_friction"](0.0, PRESLIDING)
-    start = find_balance_start(campaign, model, scales(campaign), (element,))
-    assert start is not None
-    assert start.helps
     (start,) = balance_starts(campaign, model, (element,))
     assert float(start.element.force_level) == pytest.approx(SLIP, rel=0.01)
     assert float(start.model["linear_stiffness.coefficient"]) == pytest.approx(STIFFNESS, rel=0.01)

@@ -47,7 +47,8 @@ def find_balance_start(
         campaign: the measurements; only records to fit are used.
         model: the fitted model, for its structure.
         scales: magnitudes of the records.
-        absent: absent effects; every shape of their grids takes part.
+        absent: absent effects; of dwells every shape of their grids takes part, else those without internal
+            states.
 
     Returns:
         The effect that leaves the smallest unbalanced force, or None if none leaves so little.
@@ -55,7 +56,11 @@ def find_balance_start(
     Source: Masri & Caughey 1979.
     """
     kinds = dict.fromkeys(type(probe) for probe in absent)
-    starts = balance_starts(campaign, model, tuple(shape for kind in kinds for shape in kind.grid(scales)))
+    if all(record.dwells for record in campaign.fit_records):
+        shapes = tuple(shape for kind in kinds for shape in kind.grid(scales))
+    else:  # integrals of a motion drift, and laws that forget make up for that
+        shapes = tuple(kind.guess(scales) for kind in kinds if not kind.internal_states)
+    starts = balance_starts(campaign, model, shapes)
     return starts[0] if starts and starts[0].helps else None
 
 
