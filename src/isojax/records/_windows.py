@@ -57,6 +57,22 @@ def cut_into_windows(campaign: Campaign, seconds: float) -> Campaign:
     return dataclasses.replace(campaign, records=tuple(records))
 
 
+def check_window(seconds: float, rate: float) -> None:
+    """Refuse a window that holds no motion.
+
+    Args:
+        seconds: its length [s].
+        rate: samples per second [Hz].
+
+    Raises:
+        ValueError: if it is shorter than two samples.
+    """
+    if not seconds * rate >= 2.0:
+        raise ValueError(
+            f"Argument `seconds` must span two samples and more, {2.0 / rate:g} s, but is {seconds}."
+        )
+
+
 def windows_of(record: Record, seconds: float, most: int | None = None) -> list[Record]:
     """Give the windows of one record.
 
@@ -71,10 +87,7 @@ def windows_of(record: Record, seconds: float, most: int | None = None) -> list[
     Raises:
         ValueError: if a window would be shorter than two samples.
     """
-    if not seconds * record.rate >= 2.0:
-        raise ValueError(
-            f"Argument `seconds` must span two samples and more, {2.0 / record.rate:g} s, but is {seconds}."
-        )
+    check_window(seconds, record.rate)
     length = round(seconds * record.rate)
     head = max(_SHORTEST_HEAD, round(min(_LONGEST_HEAD, seconds) * record.rate))
     first = max(0, record.settle - head)

@@ -255,7 +255,7 @@ def _finding(
     before, after = found.free_error, fine.free_error
     explained = 1.0 - (after / before) ** 2 if np.isfinite(after) and before > 0.0 else 0.0
     explained = 1.0 if fine.is_noise else explained
-    good = whole.innovations is None or whole.innovations.is_noise or whole.estimate.inflation < rules.good
+    good = whole.innovations is None or whole.innovations.is_noise
     verdict: VerdictWord = "found" if good else "unexplained"
     if not good and explained >= 1.0 - rules.smallest_share:
         verdict = "partly_explained"

@@ -29,9 +29,6 @@ _SHARES = (1.0, 0.3, 0.1, 0.03)
 _SMALLER = 4.0
 """How far below a first guess the random force of a refit may start [log of variance]."""
 
-_MOST_FOLDS = 4
-"""Parts of the records of which each is left out in turn, at most."""
-
 
 class Score(NamedTuple):
     """What the innovations say of an absent effect, before any refit.
@@ -269,7 +266,7 @@ def transfer(before: LeftOut, after: LeftOut) -> Transfer:
 
 
 def left_out(found: ErrorFit, search: Search) -> LeftOut:
-    """Refit a model without each record in turn, and predict that record.
+    """Refit a model without a part of the records in turn, and predict that part.
 
     Args:
         found: the model.
@@ -278,12 +275,8 @@ def left_out(found: ErrorFit, search: Search) -> LeftOut:
     Returns:
         What they say of all records together.
     """
-    count = found.filter.count
-    folds = [np.arange(count) == place for place in range(count)]
-    if count > _MOST_FOLDS:
-        folds = [np.arange(count) % _MOST_FOLDS == place for place in range(_MOST_FOLDS)]
     deviance, squares, settled = 0.0, 0.0, True
-    for unseen in folds:
+    for unseen in found.filter.measured.folds:
         part = fit_errors(
             found.filter,
             found.places,

@@ -10,7 +10,7 @@ from ..._parameters import element_names, list_parameters
 from ..._results import RESULTS, is_successful
 from ...excitations import Hold
 from ...models import Integrator, Isolator
-from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thin_record
+from ...records import Campaign, NoiseEstimate, Record, estimate_noise
 from ..innovations import ErrorFit, Measured, fit_measured
 from ._build_problem import build_problem
 from ._covariance import invert_information
@@ -96,8 +96,7 @@ def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:
     factor = _thinning(campaign.fit_records, campaign.input.hold)
     least = [_SMALL_NOISE * float(np.std(record.output)) for record in campaign.fit_records]
     loudest = np.maximum(_LOUDEST * np.array(noise.whites)[fitted], least)
-    records = tuple(thin_record(record, factor) for record in campaign.fit_records)
-    return Measured(records, campaign.output.quantity, campaign.input.hold, loudest)
+    return Measured(campaign.fit_records, campaign.output.quantity, campaign.input.hold, loudest, factor)
 
 
 def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, search: Search) -> ErrorFit:

@@ -7,7 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ..._show import Row, number, shown
-from ...records import windows_of
+from ...records import check_window, windows_of
+from ..innovations import ErrorFit, RecordFilter, Way, squares_ahead
 from ._as_fit import Fitted, as_fit
 from ._build_problem import build_problem
 from ._errors import run_freely
@@ -15,6 +16,13 @@ from ._fit_result import Fit
 
 _MOST_WINDOWS = 64
 """Predictions of one record and horizon, evenly spread over it."""
+
+_SHARES = (0.01, 0.03, 0.1, 0.3)
+"""Usual times of predictions, over that of the shortest stretch that a filter follows."""
+
+_FED = 0.03
+"""Time over which a filter follows a record between two predictions, at least, over the same; else as long as
+these run."""
 
 
 @shown
@@ -41,13 +49,16 @@ class PredictionErrors(NamedTuple):
         ]
 
 
-def prediction_errors(fit: Fit | Fitted, horizons: Sequence[float] = (0.1, 1.0, 10.0)) -> PredictionErrors:
+def prediction_errors(fit: Fit | Fitted, horizons: Sequence[float] | None = None) -> PredictionErrors:
     """Give the rms errors of a fitted model that runs for given times with nothing fed back.
+
+    Each prediction starts from what was measured before it: from the state to which a filter brings the model
+    where the fit has one, else from the best state of the time before.
 
     Args:
         fit: the fit.
-        horizons: times [s]. Each record is cut into windows of this length, see
-            `isojax.records.cut_into_windows`.
+        horizons: times [s]. If omitted 1, 3, 10 and 30 % of the shortest stretch that the filter follows; of a
+            fit without a filter the time of its dwells or windows.
 
     Returns:
         The errors, fitted and held-out records apart.
@@ -63,10 +74,56 @@ def prediction_errors(fit: Fit | Fitted, horizons: Sequence[float] = (0.1, 1.0, 
         True
     """
     fit = as_fit(fit)
-    errors = {
-        role: np.array([_error(fit, role, horizon) for horizon in horizons]) for role in ("fit", "holdout")
-    }
-    return PredictionErrors(tuple(map(float, horizons)), errors["fit"], errors["holdout"])
+    if horizons is not None:
+        for horizon in horizons:
+            check_window(horizon, fit.campaign.records[0].rate)
+    if fit.innovations is not None:
+        return _filtered(fit, fit.innovations, horizons)
+    if horizons is None:
+        return _restarted(fit)
+    own, held = (np.array([_error(fit, role, one) for one in horizons]) for role in ("fit", "holdout"))
+    return PredictionErrors(tuple(map(float, horizons)), own, held)
+
+
+def _filtered(fit: Fit, found: ErrorFit, horizons: Sequence[float] | None) -> PredictionErrors:
+    """Give the errors of predictions that start where the filter has brought the model."""
+    campaign, measured = fit.campaign, found.filter.measured
+    rate, shortest = measured.records[0].rate, min(one.stop - one.counted for one in measured.segments)
+    if horizons is None:
+        usual = [float(f"{share * shortest / rate:.1g}") for share in _SHARES]
+        horizons = [one for one in usual if one * rate >= 2.0]
+    steps = [round(one * rate) for one in horizons]
+
+    def errors(record_filter: RecordFilter, way: Way, count: int) -> Float[np.ndarray, " horizon"]:
+        found_at = [
+            squares_ahead(
+                record_filter, found.places, found.values, way, own, max(own, round(_FED * shortest))
+            )
+            for own in steps
+        ]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.array(
+                [float(np.sqrt(squares[:count].sum() / one[:count].sum())) for squares, one in found_at]
+            )
+
+    own = errors(found.filter, found.way, found.filter.count)
+    held = np.full(len(steps), np.nan)
+    others = tuple(record for record in campaign.records if record.role == "holdout")
+    if others:
+        unseen, count = measured.others(others)
+        held = errors(*found.followed(unseen), count)
+    return PredictionErrors(tuple(map(float, horizons)), own, held)
+
+
+def _restarted(fit: Fit) -> PredictionErrors:
+    """Give the errors of segments that are restarted from their own best state."""
+    segments = fit.estimate.problem.segments
+    time = float(np.median([one.stop - one.counted for one in segments])) / fit.campaign.records[0].rate
+    own, held = (
+        np.array([np.nan if one is None else one.nrmse_segments * one.rmse / one.nrmse])
+        for one in (fit.errors["fit"], fit.errors["holdout"])
+    )
+    return PredictionErrors((float(f"{time:.2g}"),), own, held)
 
 
 def _error(fit: Fit, role: str, horizon: float) -> float:

@@ -2,10 +2,11 @@
 
 Read `_filter` (innovations of records side by side, and their derivatives), `_measured` and `_record_filter`
 (a model's filter over the records of a campaign), `_sizes` (of its errors), `_error_fit` (a fit with these),
-`_fit_errors` (the search), `_fit_measured` (as many integration steps as the motion needs) and
-`_effect_products` (what absent effects would add).
+`_ahead` (errors of predictions), `_fit_errors` (the search), `_fit_measured` (as many integration steps as the
+motion needs) and `_effect_products` (what absent effects would add).
 """
 
+from ._ahead import squares_ahead as squares_ahead
 from ._effect_products import EffectProducts as EffectProducts
 from ._effect_products import effect_products as effect_products
 from ._error_fit import ErrorFit as ErrorFit
@@ -16,3 +17,4 @@ from ._fit_measured import refined as refined
 from ._measured import Measured as Measured
 from ._record_filter import RecordFilter as RecordFilter
 from ._sizes import Sizes as Sizes
+from ._sizes import Way as Way

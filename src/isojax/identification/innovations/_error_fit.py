@@ -3,15 +3,15 @@
 import dataclasses
 from functools import cached_property
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ...models import Isolator
-from ._filter import Trace
-from ._record_filter import RecordFilter
+from ._ahead import squares_ahead
+from ._measured import Measured
+from ._record_filter import COPIES, RecordFilter
 from ._sizes import Sizes, Way
 
 _NO_FORCE = 0.05
@@ -164,16 +164,23 @@ class ErrorFit:
     @cached_property
     def free_squares(self) -> Float[np.ndarray, " record"]:
         """Squared error of each record, simulated with nothing fed back [squared SI unit of the output]."""
+        return squares_ahead(self.filter, self.places, self.values, self.way)[0]
 
-        def free(trace: Trace) -> Trace:
-            counted = jnp.isfinite(trace.deviation)
-            return trace._replace(
-                gains=tuple(jnp.zeros_like(gain) for gain in trace.gains),
-                deviation=jnp.where(counted, jnp.ones_like(trace.deviation), jnp.inf),
-            )
+    def followed(self, measured: Measured) -> tuple[RecordFilter, Way]:
+        """Filter other records of the campaign, their noise as loud as that of the fitted ones.
 
-        way = self.way._replace(traces=[free(one) for one in self.way.traces])
-        return self.filter.squares(self.places, self.values[None], way)[0]
+        Args:
+            measured: the records.
+
+        Returns:
+            The filter of the model over them, and its way along them.
+        """
+        other = RecordFilter(self.model, measured, self.filter.steps)
+        noise = np.log(np.mean(np.exp(self.sizes.noise)))
+        sizes = self.sizes._replace(noise=np.full(other.count, noise)).around()
+        points = np.repeat(self.values[None], COPIES, axis=0)
+        other.widen(other.follow(self.places, points, sizes).squares)
+        return other, other.follow(self.places, points, sizes)
 
     @property
     def free_error(self) -> float:

@@ -24,8 +24,12 @@ _SMALL_CHANGE = 0.01
 """Step of the logarithm of a size below which it is over as well, however the deviance creeps: beside a jump
 a sample may hold a size down to where nothing else asks for it."""
 
-_MOST_ROUGH_SCORINGS, _ROUGH_DEVIANCE = 16, 0.5
-"""The same of a search whose end is only ranked: far below what tells two laws apart."""
+_USUAL_SCORINGS, _ROUGH_DEVIANCE = 16, 0.5
+"""The same of a search whose end is only ranked: far below what tells two laws apart. It goes on beyond its usual
+steps where it may still overtake the best of the others."""
+
+_PACE = 4
+"""Steps over which the pace of a search is taken."""
 
 _TRIED = np.array([1e-3, 0.03, 1.0, 30.0])
 """Marquardt's dampings that a step tries side by side, over that of the last step."""
@@ -99,6 +103,7 @@ def fit_errors(
     rough: bool = False,
     starts: Sequence[Float[np.ndarray, " column"]] = (),
     judged: Float[np.ndarray, " record"] | None = None,
+    rival: float = -np.inf,
 ) -> ErrorFit:
     """Fit coefficients and the sizes of the errors.
 
@@ -116,6 +121,8 @@ def fit_errors(
         rough: whether the fit is only ranked among others.
         starts: other values of the coefficients, of which the best is taken.
         judged: 1 for the records that are fitted, 0 for those that take no part; all if omitted.
+        rival: deviance of the best of the others; a rough search that falls fast enough to overtake it takes
+            more than the usual steps.
 
     Returns:
         The fit.
@@ -142,9 +149,7 @@ def fit_errors(
     longest = _LONGEST_MEMORY if record_filter.feeds_through else least.memory
     bounds = least, Sizes(np.inf, longest, np.maximum(loudest, least.noise))
     sizes = sizes.within(bounds)
-    most, settled_at = (
-        (_MOST_ROUGH_SCORINGS, _ROUGH_DEVIANCE) if rough else (_MOST_SCORINGS, _SETTLED_DEVIANCE)
-    )
+    settled_at = _ROUGH_DEVIANCE if rough else _SETTLED_DEVIANCE
 
     def points(frees: Sequence[np.ndarray]) -> Float[np.ndarray, "copy column"]:
         return np.array([physical(free, specs, scales)[0] for free in frees])
@@ -161,7 +166,12 @@ def fit_errors(
         free = frees[int(np.argmin(deviances[: len(frees)]))]
     last, before, trust, alone = np.inf, sizes, FURTHEST, False
     result: Any = RESULTS.not_converged
-    for step in range(1, most + 1):
+    fallen: list[float] = []
+    for step in range(1, _MOST_SCORINGS + 1):
+        if rough and step > _USUAL_SCORINGS:
+            pace = (fallen[-1 - _PACE] - fallen[-1]) / _PACE
+            if fallen[-1] - (_MOST_SCORINGS + 1 - step) * pace > rival:
+                break
         way = followed([free] * COPIES, sizes.around())
         lost = not way.surprise < _ASTRAY * record_filter.samples
         if step == 1 and (lost or np.all(np.isinf(loudest))):
@@ -170,6 +180,7 @@ def fit_errors(
         if step in (1, 3):  # internal states start anywhere in the range that they visit
             record_filter.widen(way.squares)
         deviance = float(over(way.deviance[0]))
+        fallen.append(deviance)
         products = record_filter.slopes(places, points([free])[0], way)
         if not (np.isfinite(deviance) and np.all(np.isfinite(over(products)))):
             result = RESULTS.not_finite

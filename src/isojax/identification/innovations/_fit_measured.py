@@ -54,7 +54,7 @@ def fit_measured(
         starts: other values of the coefficients, of which the best is taken.
         steps: integration steps a sample to begin with.
         rough: whether the fit is only ranked among others.
-        rival: criterion of the best of the others; what stays behind it needs no finer steps.
+        rival: criterion of the best of the others; what stays behind it needs no finer steps and no long search.
 
     Returns:
         The fit; that of the most steps where none suffice.
@@ -69,6 +69,7 @@ def fit_measured(
             loudest=measured.loudest,
             starts=starts,
             rough=rough,
+            rival=rival,
         )
         if model.splits and not found.is_noise_of_output:
             found = min(

@@ -1,12 +1,17 @@
 """The records of a fit, tabulated for as many integration steps as a model needs."""
 
+import itertools
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ...excitations import Hold
 from ...models import Integrator, Quantity
-from ...records import Record
+from ...records import Record, thin_record
 from ..jacobian import Segment, Tables
+
+_MOST_FOLDS = 4
+"""Parts of the records of which each is left out in turn, at most."""
 
 
 class Measured:
@@ -21,6 +26,7 @@ class Measured:
         quantity: Quantity,
         hold: Hold,
         noise: Float[np.ndarray, " record"],
+        factor: int = 1,
     ):
         """Keep the records; nothing is tabulated yet.
 
@@ -29,8 +35,10 @@ class Measured:
             quantity: what the sensor measures.
             hold: what the drive does between samples.
             noise: rms that the noise of each record cannot exceed [SI unit of the output].
+            factor: samples that become one, see `thin_record`.
         """
-        self.records = records
+        records = tuple(thin_record(record, factor) for record in records)
+        self.records, self._factor = records, factor
         self.quantity: Quantity = quantity
         self.hold: Hold = hold
         ends = [(place, 0, record.output.size, record.settle) for place, record in enumerate(records)]
@@ -40,6 +48,28 @@ class Measured:
         self.segments = tuple(Segment(*each) for each in ends)
         self.loudest = 2.0 * np.log(noise[[one.record for one in self.segments]])
         self._tables: dict[int, Tables] = {}
+
+    @property
+    def folds(self) -> tuple[Bool[np.ndarray, " segment"], ...]:
+        """Segments that are left out together, fold by fold."""
+        places = np.arange(len(self.segments))
+        folds = min(_MOST_FOLDS, places.size)
+        return tuple(places % folds == fold for fold in range(folds))
+
+    def others(self, records: tuple[Record, ...]) -> tuple["Measured", int]:
+        """Give other records of the campaign, prepared alike.
+
+        Args:
+            records: the records.
+
+        Returns:
+            As many as these, some repeated where they are fewer: a filter then needs no other compiled code. And
+            how many of the segments come first and repeat none.
+        """
+        count = max(len(records), len(self.records))
+        repeated = tuple(itertools.islice(itertools.cycle(records), count))
+        other = Measured(repeated, self.quantity, self.hold, np.ones(count), self._factor)
+        return other, len(records) * len(other.segments) // count
 
     def tables(self, steps: int) -> Tables:
         """Give the tables for so many integration steps a sample."""

@@ -164,16 +164,16 @@ class RecordFilter:
             )
 
         found = self._in_parts(one)
-        deviance = self._by_record([each.deviance for each in found], copies)
+        deviance = self.by_record([each.deviance for each in found], copies)
         squares = [
-            self._by_record([each.square[row] for each in found], copies)[0]
+            self.by_record([each.square[row] for each in found], copies)[0]
             for row in range(2, len(found[0].square) - 1)
         ]
         return Way(
             np.where(np.isfinite(deviance), deviance, np.inf),
             np.array(squares).reshape(-1, self.count),
-            self._by_record([each.slope for each in found], 1)[:, 0],
-            self._by_record([each.fisher for each in found], 1)[:, :, 0],
+            self.by_record([each.slope for each in found], 1)[:, 0],
+            self.by_record([each.fisher for each in found], 1)[:, :, 0],
             sizes[0].correlation,
             [each.trace for each in found],
         )
@@ -257,7 +257,7 @@ class RecordFilter:
                 self._tabled,
             )
 
-        return self._by_record(self._in_parts(one), copies)
+        return self.by_record(self._in_parts(one), copies)
 
     def widen(self, squares: Float[np.ndarray, "internal record"]) -> None:
         """Let the internal states begin anywhere in the range that they visit.
@@ -364,8 +364,16 @@ class RecordFilter:
             numbers.append(on_device(np.repeat(column, width)))
         return tuple(numbers)
 
-    def _by_record(self, parts: list[Array], copies: int) -> np.ndarray:
-        """Join what the batches gave: the last axis becomes (copy, record)."""
+    def by_record(self, parts: Sequence[Array | np.ndarray], copies: int) -> np.ndarray:
+        """Join what the batches gave.
+
+        Args:
+            parts: of each batch, lanes last.
+            copies: points at which the lanes run side by side.
+
+        Returns:
+            The same; the last axis has become (copy, record).
+        """
         order, joined = self.prepared.order, []
         for values in map(np.asarray, parts):
             joined.append(values.reshape(*values.shape[:-1], copies, -1))

@@ -38,7 +38,7 @@ from ..words import typeset_with_error as with_error
 from ._identified_response import IdentifiedResponse, identified_response
 from ._or_a_line import or_a_line
 from ._pictures import Picture, draw_pictures
-from ._summary import error_rows, parameter_words
+from ._summary import error_rows, horizon_rows, parameter_words
 
 _VERDICTS = {
     "none": "nothing missing",
@@ -152,6 +152,7 @@ def page_content(loop: Loop, health: CampaignHealth) -> dict[str, Any]:
         "last_ranking": [_candidate(candidate, campaign) for candidate in loop.last.ranking[:_RANKS_ON_PAGE]],
         "unit": typeset_unit(OUTPUT_UNITS[quantity]),
         "errors": error_rows(before, after),
+        "horizons": horizon_rows(before, after),
         "declared": _elements(before),
         "added": " and ".join(effect_words(one.effect) for one in loop.findings),
         "parameters": [

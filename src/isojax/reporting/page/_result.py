@@ -6,7 +6,7 @@ from typing import Any
 from ..._parameters import list_parameters
 from ..._results import is_successful
 from ...health import CampaignHealth
-from ...identification import Errors, Finding, Fit, Loop, plain_unit
+from ...identification import Errors, Finding, Fit, Loop, plain_unit, prediction_errors
 from ..words import (
     alternatives_list,
     check_first_dicts,
@@ -23,7 +23,8 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
     """Give a closed loop as schema 1 of result.json.
 
     "alternatives", other force laws in the place of the findings, is there only where something was found;
-    "remainder" only where the verdict is "unexplained" or "partly_explained"; "integration", beside the
+    "errors", beside the coefficients of a fit, are rms errors of predictions [SI unit of the output] by how long
+    they run [s], the free run last with None for its time; "remainder" only where the verdict is "unexplained" or "partly_explained"; "integration", beside the
     coefficients of a fit, only where a solver of diffrax other than RK4 simulated the records; "tone" and
     "law" only where the last diagnosis found no further effect, but one of these is left.
 
@@ -70,8 +71,17 @@ def _fit_dict(fit: Fit) -> dict[str, Any]:
             for entry in list_parameters(fit.model)
         },
         "error": {role: _error_dict(fit.errors[role]) for role in ("fit", "holdout")},
+        "errors": _horizon_dicts(fit),
         **({} if fit.estimate.problem.integrator.is_locked else {"integration": fit.integration}),
     }
+
+
+def _horizon_dicts(fit: Fit) -> list[dict[str, float | None]]:
+    """Give rms errors by how long the model runs with nothing fed back; None is from start to end."""
+    ahead = prediction_errors(fit)
+    free = (math.nan if one is None else one.rmse for one in (fit.errors["fit"], fit.errors["holdout"]))
+    rows = [*zip(ahead.horizons, ahead.fit, ahead.holdout, strict=True), (math.inf, *free)]
+    return [dict(zip(("horizon", "fit", "holdout"), map(finite_or_none, row), strict=True)) for row in rows]
 
 
 _ERROR_FIELDS = ("rmse", "nrmse", "nrmse_segments", "chi2_per_dof")

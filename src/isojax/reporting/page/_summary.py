@@ -1,5 +1,6 @@
 """Summaries for the terminal: a diagnosis, a closed loop, the catalogue."""
 
+import math
 from collections.abc import Sequence
 from io import StringIO
 from typing import NamedTuple
@@ -11,7 +12,16 @@ from rich.table import Table
 from ..._languages import as_rich
 from ..._parameters import list_parameters, own_parameters
 from ...elements import CATALOGUE
-from ...identification import OUTPUT_UNITS, Candidate, Finding, Fit, Loop, Verdict, plain_unit
+from ...identification import (
+    OUTPUT_UNITS,
+    Candidate,
+    Finding,
+    Fit,
+    Loop,
+    Verdict,
+    plain_unit,
+    prediction_errors,
+)
 from ..plots import ROLES, fits_meant
 from ..words import (
     alternative_words,
@@ -132,6 +142,46 @@ def error_rows(before: Fit, after: Fit | None = None) -> tuple[ErrorRow, ...]:
         for label, fit in _labelled(before, after)
         if (errors := fit.errors[role]) is not None
     )
+
+
+class HorizonRow(NamedTuple):
+    """The errors of one model's predictions on the records of one role, in words.
+
+    Attributes:
+        role: "fitted" or "held out".
+        label: "before", "after", or "" where there is one model.
+        shares: by how long they run, the free run last: rms over that of the measured output.
+    """
+
+    role: str
+    label: str
+    shares: tuple[str, ...]
+
+
+@fits_meant
+def horizon_rows(before: Fit, after: Fit | None = None) -> tuple[tuple[str, ...], tuple[HorizonRow, ...]]:
+    """Give the errors of predictions before and after, by how long they run.
+
+    Args:
+        before: the declared model, fitted.
+        after: the final fit; omitted where there is none.
+
+    Returns:
+        The times in words, and a row for each role that has records, and each fit.
+    """
+    fits = _labelled(before, after)
+    found = [prediction_errors(fit) for _, fit in fits]
+    times = sorted({time for one in found for time in one.horizons})
+    rows = []
+    for role, words in ROLES.items():
+        for (label, fit), ahead in zip(fits, found, strict=True):
+            errors = fit.errors[role]
+            if errors is not None:
+                scale = errors.nrmse / errors.rmse if errors.rmse > 0.0 else math.nan
+                shares = dict(zip(ahead.horizons, scale * getattr(ahead, role), strict=True))
+                cells = [typeset_share(shares[one]) if one in shares else "" for one in times]
+                rows.append(HorizonRow(words, label, (*cells, typeset_share(errors.nrmse))))
+    return (*(f"{one:g} s" for one in times), "free run"), tuple(rows)
 
 
 @fits_meant
