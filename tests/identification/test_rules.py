@@ -47,12 +47,13 @@ ACCURACY = {
     "_fit": {"MOST_EVALUATIONS"},
     "_fit_of_errors": {"LEAST_KEPT", "LOUDEST", "MUCH_LESS", "POWER", "SHORTEST_RECORD"},
     # When what a fit leaves is the noise by which it was weighted.
-    "_effect_search": {"MOST_FOLDS", "SMALLER"},
+    "_effect_search": {"SMALLER"},
     "_by_innovations": {"NEXT"},
     "_segment_scatter": {"SAME_DRIVE_AND_RESPONSE", "SAME_FREQUENCY"},
     "_segments": {"DECAY_TIMES_A_WINDOW", "FEWEST_WINDOWS", "SHORTEST", "SHORTEST_WINDOW"},
     # What is drawn up and shown.
     "_fit_result": {"STRONG", "UNMOVED"},
+    "_prediction_errors": {"FED"},
     "_remaining_error": {"APART"},
     "_free_laws": {"ORDER"},
     "_free_traces": {"SAME_LAW"},
@@ -150,7 +151,7 @@ def test_other_rules_give_another_verdict(rubbing):
     strict = diagnose(found, rules=Rules(smallest_gain=100.0))
     assert strict.finding is None
     assert strict.verdict == "unexplained"
-    rough = dataclasses.replace(rubbing, output=dataclasses.replace(rubbing.output, relative_error=10.0))
+    rough = dataclasses.replace(rubbing, output=dataclasses.replace(rubbing.output, accuracy=10.0))
     lax = fit(start, rough, integrator=Integrator())
     assert diagnose(lax, rules=Rules(smallest_gain=100.0, good=1e3)).verdict == "none"
     assert diagnose(found).finding.effect == "coulomb_friction"

@@ -89,7 +89,7 @@ NUMBERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
     "gain": (INPUT, INPUT + "\ngain = {}", ("1e308", "-1e308", "1e-308", "5e-324", "inf", "-nan", HUGE, "0")),
     "rate": (RATE, "rate = {}", ("1e300", "1e-300", "0.0", "-inf", HUGE)),
     "noise": (OUTPUT, OUTPUT + "\nnoise = {}", ("1e308", "1e-308", "inf")),
-    "relative_error": (OUTPUT, OUTPUT + "\nrelative_error = {}", ("1e9", "1e-300")),
+    "accuracy": (OUTPUT, OUTPUT + "\naccuracy = {}", ("1e9", "1e-300")),
     "order": (MODEL, filtered("{}", 20), ("1000000000", "21", "0", "-3", "2.0", "true", HUGE)),
     "cutoff_hz": (MODEL, filtered(4, "{}"), ("1e300", "1e-300", "nan", HUGE)),
     "level": (RECORD, RECORD + "\nlevel = {}", ("1e308", "inf", HUGE)),

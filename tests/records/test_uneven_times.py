@@ -60,6 +60,7 @@ def test_last_digits_are_those_that_were_written() -> None:
         last_digit(short), 10.0 ** (np.floor(np.log10(np.abs(short))) - 3.0), rtol=1e-9
     )
     assert not np.any(last_digit(values))
+    assert not np.any(last_digit(1e-5 * values))  # far below the last digit that they could end in
 
 
 @pytest.mark.parametrize("lost", [1, 3])

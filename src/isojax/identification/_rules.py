@@ -78,6 +78,9 @@ class Rules:
     clear_gain: float = 0.05
     """Gain of -2 log-likelihood a sample from which an effect that leaves noise alone carries over."""
 
+    as_declared: float = 1.5
+    """Variance of a random force, over that declared for noise of the drive, up to which it is that."""
+
     free_run_tie: float = 0.1
     """Larger error of free runs, relative, up to which two models whose error is not noise are as good."""
 

@@ -19,8 +19,8 @@ from ._record import Record as Record
 from ._thinned_record import thin_record as thin_record
 from ._thinned_record import thinned_place as thinned_place
 from ._thinned_record import thinned_share as thinned_share
-from ._windows import cut_into_windows as cut_into_windows
 from ._windows import check_window as check_window
+from ._windows import cut_into_windows as cut_into_windows
 from ._windows import windows_of as windows_of
 from .inspection import ChannelInspection as ChannelInspection
 from .inspection import FileInspection as FileInspection

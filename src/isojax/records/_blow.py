@@ -1,6 +1,7 @@
 """The samples at which a brief drive acts, and the free motion after a release or a blow."""
 
 import numpy as np
+import scipy
 from jaxtyping import Bool, Float
 
 from ._record import Record
@@ -16,6 +17,15 @@ _LAST_TENTH = 10
 
 _RELEASED = 0.5
 """Share of its largest amplitude below which a motion has surely been released."""
+
+_STRETCH = 32
+"""Samples over which the noise of a reading shows."""
+
+_FIRST = 8
+"""Samples whose median is the level at which a mass is held."""
+
+_MOVED = 1e-3
+"""Share of its range by which a reading must leave that level, however quiet it is."""
 
 _FEWEST_FREE_SAMPLES = 256
 """Samples without which no floor can be estimated from a spectrum."""
@@ -58,6 +68,30 @@ def blow_samples(drive: Float[np.ndarray, " time"]) -> int:
 def rest_position(signal: Float[np.ndarray, " time"]) -> float:
     """Gives the value at which a motion ends: the mean over the last tenth of a record."""
     return float(np.mean(signal[-max(signal.size // _LAST_TENTH, 1) :]))
+
+
+def held_samples(output: Float[np.ndarray, " time"], rate: float) -> int:
+    """Gives the samples for which a mass is held still before it is released.
+
+    The reading leaves its first level by more than its noise: that of the quietest stretch of the record,
+    held or decayed.
+
+    Args:
+        output: Of a free decay, (time,).
+        rate: Samples per second [Hz].
+
+    Returns:
+        The first sample in motion; 0 where that comes within a quarter of a cycle, as if it began there.
+    """
+    stretches = np.array_split(output, max(1, output.size // _STRETCH))
+    noise = min(float(np.std(scipy.signal.detrend(one))) for one in stretches)
+    least = max(2.0 * ABOVE_NOISE * noise, _MOVED * float(np.ptp(output)))
+    away = np.abs(output - np.median(output[:_FIRST])) > least
+    away[:-1] &= away[1:]  # one sample alone is a spike
+    first = int(np.argmax(away))
+    frequency, power = scipy.signal.periodogram(output[first:], rate, detrend="constant")
+    quarter = 0.25 * rate / max(float(frequency[np.argmax(power)]), rate / output.size)
+    return first if first > quarter else 0
 
 
 def ring_down(record: Record) -> Float[np.ndarray, " time"]:

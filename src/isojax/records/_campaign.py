@@ -1,5 +1,6 @@
 """A measurement campaign: its channels, its filter, the model named for it, and its records in test order."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +16,6 @@ Hold = Literal["band_limited", "linear", "zero_order"]
 
 TIME_DERIVATIVES: Mapping[OutputQuantity, int] = {"displacement": 0, "velocity": 1, "acceleration": 2}
 """How often the displacement is differentiated to give each quantity."""
-
-RELATIVE_ERROR = 1e-3
-"""Error of a reading over the response where none is declared: what ordinary sensors keep."""
 
 _RECORDS_SHOWN = 16
 """Records of a campaign that are shown one by one."""
@@ -37,6 +35,8 @@ class InputChannel:
         offset_free: Whether a constant offset of the input is to be identified.
         hold: How the input runs between two samples.
         moving_mass: Mass [kg] of a reaction-mass exciter, else None.
+        noise: Declared rms of white noise in SI, or None.
+        accuracy: Error of the reading, as a share of it, or None.
         remove_spikes: Whether the reader replaces single samples that their neighbours do not explain.
     """
 
@@ -48,6 +48,8 @@ class InputChannel:
     offset_free: bool = False
     hold: Hold = "band_limited"
     moving_mass: float | None = None
+    noise: float | None = None
+    accuracy: float | None = None
     remove_spikes: bool = False
 
 
@@ -62,7 +64,7 @@ class OutputChannel:
         unit: Its unit in the file.
         offset_free: Whether a constant offset of the output is to be identified.
         noise: Declared rms noise in SI, or None to estimate it.
-        relative_error: Error that the reading may have, over the response.
+        accuracy: Error of the reading, as a share of it, or None.
         remove_spikes: Whether the reader replaces single samples that their neighbours do not explain.
     """
 
@@ -71,7 +73,7 @@ class OutputChannel:
     unit: str
     offset_free: bool = False
     noise: float | None = None
-    relative_error: float = RELATIVE_ERROR
+    accuracy: float | None = None
     remove_spikes: bool = False
 
 
@@ -132,6 +134,8 @@ class Campaign:
         elements: Further catalogue names.
         records: The records in the order of the test in time.
         floor: The channel of the floor's motion, or None.
+        random_force: Declared rms of a white force that stands for what the model does not know [SI unit of
+            the input], or None.
     """
 
     title: str
@@ -147,6 +151,12 @@ class Campaign:
     elements: tuple[str, ...]
     records: tuple[Record, ...]
     floor: FloorChannel | None = None
+    random_force: float | None = None
+
+    @property
+    def accuracy(self) -> float:
+        """Declared error of both channels together, as a share of the reading; 0 where none is declared."""
+        return math.hypot(self.input.accuracy or 0.0, self.output.accuracy or 0.0)
 
     @property
     def fit_records(self) -> tuple[Record, ...]:

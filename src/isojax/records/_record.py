@@ -72,6 +72,7 @@ class Record:
             it has none.
         resampled: Whether its channels were brought from such times to the even grid, as campaign.toml asks.
         removed_spikes: Samples of both channels that the reader replaced, as campaign.toml asks for.
+        held: Samples before its start, of those that campaign.toml names, at which the mass was held still.
         pressure: Absolute pressure in the chamber during the record [Pa], or None.
         temperature: Absolute temperature during the record [K], or None.
     """
@@ -98,6 +99,7 @@ class Record:
     time_jitter: float = 0.0
     resampled: bool = False
     removed_spikes: int = 0
+    held: int = 0
     pressure: float | None = None
     temperature: float | None = None
     _kept: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
@@ -130,7 +132,8 @@ class Record:
         kind = self.kind.replace("_", " ")
         length = f"{number(self.output.size / self.rate)} s at {number(self.rate)} Hz"
         role = "to fit" if self.role == "fit" else "held out"
-        return f"{self.name}: {kind}, {self.output.size} samples, {length}, {role}"
+        released = f", released after {number(self.held / self.rate)} s" if self.held else ""
+        return f"{self.name}: {kind}{released}, {self.output.size} samples, {length}, {role}"
 
     def _rows(self) -> list[str | Row]:
         met = [dwell.frequency for dwell in self.dwells]

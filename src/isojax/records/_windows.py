@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from ._blow import held_samples
 from ._campaign import Campaign
 from ._record import Record
 
@@ -95,6 +96,22 @@ def windows_of(record: Record, seconds: float, most: int | None = None) -> list[
     if most is not None and starts.size > most:
         starts = starts[np.linspace(0, starts.size - 1, most).astype(int)]
     return [_window(record, start, start + head + length, head) for start in starts.tolist()]
+
+
+def from_release(record: Record) -> Record:
+    """Gives a free decay from the release on: before it the mass was held still, and no model of it moves so.
+
+    Args:
+        record: The record.
+
+    Returns:
+        The record, without the samples before the release; itself where it begins in motion.
+    """
+    held = held_samples(record.output, record.rate) if record.kind == "free_decay" else 0
+    if not held:
+        return record
+    free = _window(record, held, record.output.size, max(0, record.settle - held))
+    return dataclasses.replace(free, name=record.name, kind=record.kind, clock=record.clock, held=held)
 
 
 def _window(record: Record, start: int, stop: int, settle: int) -> Record:

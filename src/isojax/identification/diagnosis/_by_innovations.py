@@ -81,10 +81,13 @@ def diagnose_innovations(
 
     for refit in usable:
         clear = _gain(found, refit) > rules.clear_gain * found.samples
+        if _takes_off(found, refit) < fit.campaign.accuracy * _rms(found):
+            reason = f"{refit.score.element.name} takes off less than the declared accuracy of the channels"
+            continue
+        by_runs = refit.fit.is_noise or _follows(usable, rules)
         if refit.fit.is_noise_of_output and clear:
             best = Weighed(refit, Transfer(_gain(found, refit), 1.0, True))
             break
-        by_runs = refit.fit.is_noise or _follows(usable, rules)
         needed = 0.0 if refit.fit.is_noise else rules.smallest_share
         if needed and by_runs and not refit.fit.free_error < found.free_error * np.sqrt(1.0 - needed):
             continue  # what does not even help the records that it was fitted to helps no others
@@ -149,9 +152,21 @@ def _by_evidence(
 
 def _follows(refits: list[Refit], rules: Rules) -> bool:
     """Say whether a free run of some model follows the records: none does where the motion is irregular."""
-    records = [record.output for record in refits[0].fit.filter.tables.records]
-    rms = float(np.sqrt(sum(np.sum(one**2) for one in records) / sum(one.size for one in records)))
-    return min(one.fit.free_error for one in refits) < rules.followed * rms
+    return min(one.fit.free_error for one in refits) < rules.followed * _rms(refits[0].fit)
+
+
+def _rms(found: ErrorFit) -> float:
+    """Give the rms of the records [SI unit of the output]."""
+    records = [record.output for record in found.filter.tables.records]
+    return float(np.sqrt(sum(np.sum(one**2) for one in records) / sum(one.size for one in records)))
+
+
+def _takes_off(found: ErrorFit, refit: Refit) -> float:
+    """Give the rms that an effect takes off the error of free runs; infinite where they diverge."""
+    before, after = found.free_error, refit.fit.free_error
+    if not np.isfinite(before + after):
+        return np.inf
+    return float(np.sqrt(max(0.0, before**2 - after**2)))
 
 
 def _candidate(
@@ -217,7 +232,7 @@ def _nothing(
             for one in scores.scores
         }
     verdict: VerdictWord = "none" if good else "unexplained"
-    words = f"{error_words(found, fit)} {reason[0].upper()}{reason[1:]}."
+    words = f"{error_words(found, fit, rules)} {reason[0].upper()}{reason[1:]}."
     if not good:
         words = f"{words} {remaining_words(fit.free_runs)}".strip()
     ranking = _ranking(scores, refits, None, shares)

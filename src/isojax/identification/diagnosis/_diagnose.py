@@ -22,6 +22,7 @@ from ..fitting import (
     on_all_samples,
     plain_unit,
     search_of,
+    still,
     thinned,
     unlocked_tone,
     weighted_by_output,
@@ -176,7 +177,7 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Diagnosis:
     while usable := by_evidence(refits, rules):
         best = usable[0]
         gain = fitted.misfit - best.estimate.misfit
-        needed = max(rules.smallest_gain, _needed_share(case) * fitted.excess / case.dof)
+        needed = max(rules.smallest_gain, _needed_share(case) * fitted.excess / case.dof, _inaccuracy(case))
         clear = bic(fitted, inflation) - bic(best.estimate, inflation) > rules.close_bic
         too_little = _too_little(best, gain, case)
         if gain / case.dof < needed or not clear:
@@ -263,6 +264,12 @@ def _needed_share(case: Case) -> float:
     explain a good part of the excess.
     """
     return 0.0 if case.is_good else case.rules.smallest_share
+
+
+def _inaccuracy(case: Case) -> float:
+    """Give the chi2/dof that the declared error of the readings makes."""
+    problem, accuracy = case.fitted.problem, case.fit.campaign.accuracy
+    return accuracy**2 * still(problem) / case.dof
 
 
 def _twins(best: Refit) -> tuple[AbstractElement, ...]:

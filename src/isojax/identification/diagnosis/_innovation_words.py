@@ -3,17 +3,19 @@
 import numpy as np
 
 from ..._quantities import typeset_share
+from .._rules import Rules
 from ..fitting import Fit
 from ..innovations import ErrorFit
 from ._findings import Candidate
 
 
-def error_words(found: ErrorFit, fit: Fit) -> str:
+def error_words(found: ErrorFit, fit: Fit, rules: Rules) -> str:
     """Say what the error of a model is.
 
     Args:
         found: the model with the sizes of its errors.
         fit: the same, with its campaign.
+        rules: numbers that decide the verdict.
 
     Returns:
         A sentence.
@@ -21,7 +23,9 @@ def error_words(found: ErrorFit, fit: Fit) -> str:
     if found.is_noise_of_output:
         return "What the model leaves is noise of the output."
     unit = "m/s^2" if fit.model.excitation == "base_acceleration" else "N"
-    force = f"{np.sqrt(found.sizes.variance):.3g} {unit} rms"
+    force, declared = f"{np.sqrt(found.sizes.variance):.3g} {unit} rms", found.filter.measured.force[0]
+    if found.is_noise and found.sizes.variance < rules.as_declared * declared**2:
+        return "What the model leaves is noise of the output and, as declared, of the drive."
     if found.is_noise:
         return (
             f"What the model leaves is noise of the output, and {force} of noise of the drive or of a force "

@@ -32,6 +32,7 @@ from ._estimate import estimate as estimate
 from ._estimate import magnitudes as magnitudes
 from ._fit import fit as fit
 from ._fit import fit_by_output as fit_by_output
+from ._fit import still as still
 from ._fit import weighted_by_output as weighted_by_output
 from ._fit import weighted_by_residual as weighted_by_residual
 from ._fit_result import Fit as Fit

@@ -126,8 +126,11 @@ def fit_by_output(
     noise = estimate_noise(campaign)
     whole = integrator is None and search.max_steps >= MOST_EVALUATIONS
     followed = whole and suits_innovations(campaign)
+    declared = campaign.input.noise is not None or campaign.random_force is not None
     # Under base excitation the drive is as noisy as the response: both are readings of accelerometers.
-    if followed and campaign.input.quantity == "base_acceleration":
+    if (followed and campaign.input.quantity == "base_acceleration") or (
+        declared and whole and suits_innovations(campaign, stepped=True)
+    ):
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
         raise ValueError(
@@ -150,7 +153,7 @@ def fit_by_output(
         if is_successful(again.result) or (diverges and again.result != RESULTS.not_finite):
             found = again
     usual = is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof
-    lost = whole and (not is_successful(found.result) or found.chi2 > _of_none(found.problem))
+    lost = whole and (not is_successful(found.result) or found.chi2 > still(found.problem))
     far = followed and not (usual and loudness(noise, campaign) < search.rules.loudest)
     if far or (lost and suits_innovations(campaign, stepped=True)):
         search.progress("the model leaves far more than noise: again, with a random force")
@@ -193,8 +196,12 @@ def weighted_by_output(found: Fit, search: Search) -> Fit:
     return with_less_noise(weighted_by(found, estimate_noise(found.campaign), search), search)
 
 
-def _of_none(problem: Problem) -> float:
-    """Give chi2 of a mass that stands still: a fit that leaves more is none."""
+def still(problem: Problem) -> float:
+    """Give chi2 of a mass that stands still: a fit that leaves more is none.
+
+    Args:
+        problem: the records.
+    """
     pairs = zip(problem.records, problem.noise, strict=True)
     return problem.share * sum(float(np.sum((record.output / noise) ** 2)) for record, noise in pairs)
 

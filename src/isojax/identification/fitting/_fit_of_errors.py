@@ -10,7 +10,7 @@ from ..._parameters import element_names, list_parameters
 from ..._results import RESULTS, is_successful
 from ...excitations import Hold
 from ...models import Integrator, Isolator
-from ...records import Campaign, NoiseEstimate, Record, estimate_noise
+from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thinned_share
 from ..innovations import ErrorFit, Measured, fit_measured
 from ._build_problem import build_problem
 from ._covariance import invert_information
@@ -96,7 +96,25 @@ def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:
     factor = _thinning(campaign.fit_records, campaign.input.hold)
     least = [_SMALL_NOISE * float(np.std(record.output)) for record in campaign.fit_records]
     loudest = np.maximum(_LOUDEST * np.array(noise.whites)[fitted], least)
-    return Measured(campaign.fit_records, campaign.output.quantity, campaign.input.hold, loudest, factor)
+    return Measured(
+        campaign.fit_records,
+        campaign.output.quantity,
+        campaign.input.hold,
+        loudest,
+        factor,
+        _declared_force(campaign, factor),
+    )
+
+
+def _declared_force(campaign: Campaign, factor: int) -> tuple[float, float]:
+    """Give the rms of the random force at least and at most: noise of the drive is one, too."""
+    # Of white noise so much is left where samples become one.
+    left = 1.0 if factor == 1 else math.sqrt(thinned_share(factor) / factor)
+    noise, own = (campaign.input.noise or 0.0) * left, campaign.random_force
+    if own is None:
+        return noise, math.inf
+    both = math.hypot(noise, own * left)
+    return both, both
 
 
 def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, search: Search) -> ErrorFit:

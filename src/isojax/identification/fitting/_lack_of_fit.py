@@ -13,6 +13,9 @@ from ...records import Record
 from ._errors import Run
 from ._fit_result import Fit
 
+USUAL_ACCURACY = 1e-3
+"""Error of the readings, as a share of them, where none is declared."""
+
 HIGHEST_ORDER = 8
 """Highest harmonic of a sine at which a model may be wrong."""
 
@@ -70,7 +73,7 @@ def lack_of_fit(fit: Fit) -> LackOfFit:
     against the noise that periods show); Box & Draper 1987 (lack of fit).
     """
     runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
-    return locked_power(runs, len(fit.free), fit.campaign.output.relative_error)
+    return locked_power(runs, len(fit.free), fit.campaign.accuracy or USUAL_ACCURACY)
 
 
 def shows_noise(record: Record) -> bool:

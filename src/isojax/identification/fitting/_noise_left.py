@@ -11,7 +11,7 @@ from ...records import Campaign, NoiseEstimate, Record, quieter_noise, residual_
 from .._rules import Rules
 from ._errors import Run, restarted_runs
 from ._estimate import Estimate
-from ._lack_of_fit import locked_power, shows_noise
+from ._lack_of_fit import USUAL_ACCURACY, locked_power, shows_noise
 
 
 def less_noise(
@@ -57,7 +57,7 @@ def noise_left(
     if not is_successful(found.result) or found.problem.heads:
         return None
     runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
-    locked = locked_power(runs, len(found.places), campaign.output.relative_error).p_value
+    locked = locked_power(runs, len(found.places), campaign.accuracy or USUAL_ACCURACY).p_value
     if not locked >= rules.significance:
         return None
     left = residual_noise(campaign, noise, _windows(found, campaign, runs, shows_noise))

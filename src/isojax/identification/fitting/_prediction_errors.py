@@ -57,8 +57,8 @@ def prediction_errors(fit: Fit | Fitted, horizons: Sequence[float] | None = None
 
     Args:
         fit: the fit.
-        horizons: times [s]. If omitted 1, 3, 10 and 30 % of the shortest stretch that the filter follows; of a
-            fit without a filter the time of its dwells or windows.
+        horizons: times [s]. If omitted 1, 3, 10 and 30 % of the shortest record, or half of a single one;
+            of a fit without a filter the time of its dwells or windows.
 
     Returns:
         The errors, fitted and held-out records apart.
@@ -87,19 +87,23 @@ def prediction_errors(fit: Fit | Fitted, horizons: Sequence[float] | None = None
 
 def _filtered(fit: Fit, found: ErrorFit, horizons: Sequence[float] | None) -> PredictionErrors:
     """Give the errors of predictions that start where the filter has brought the model."""
-    campaign, measured = fit.campaign, found.filter.measured
-    rate, shortest = measured.records[0].rate, min(one.stop - one.counted for one in measured.segments)
+    measured, segments = found.filter.measured, found.filter.measured.segments
+    unseen, count, rate = None, 0, measured.records[0].rate
+    if fit.campaign.holdout_records:
+        unseen, count = measured.others(fit.campaign.holdout_records)
+        segments += unseen.segments
+    shortest = min(one.stop - one.counted for one in segments)
     if horizons is None:
         usual = [float(f"{share * shortest / rate:.1g}") for share in _SHARES]
         horizons = [one for one in usual if one * rate >= 2.0]
     steps = [round(one * rate) for one in horizons]
 
+    def fed(own: int) -> int:
+        return max(round(_FED * shortest), min(own, shortest - own))
+
     def errors(record_filter: RecordFilter, way: Way, count: int) -> Float[np.ndarray, " horizon"]:
         found_at = [
-            squares_ahead(
-                record_filter, found.places, found.values, way, own, max(own, round(_FED * shortest))
-            )
-            for own in steps
+            squares_ahead(record_filter, found.places, found.values, way, own, fed(own)) for own in steps
         ]
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.array(
@@ -107,11 +111,7 @@ def _filtered(fit: Fit, found: ErrorFit, horizons: Sequence[float] | None) -> Pr
             )
 
     own = errors(found.filter, found.way, found.filter.count)
-    held = np.full(len(steps), np.nan)
-    others = tuple(record for record in campaign.records if record.role == "holdout")
-    if others:
-        unseen, count = measured.others(others)
-        held = errors(*found.followed(unseen), count)
+    held = np.full(len(steps), np.nan) if unseen is None else errors(*found.followed(unseen), count)
     return PredictionErrors(tuple(map(float, horizons)), own, held)
 
 

@@ -2,8 +2,8 @@
 
 Read `_filter` (innovations of records side by side, and their derivatives), `_measured` and `_record_filter`
 (a model's filter over the records of a campaign), `_sizes` (of its errors), `_error_fit` (a fit with these),
-`_ahead` (errors of predictions), `_fit_errors` (the search), `_fit_measured` (as many integration steps as the
-motion needs) and `_effect_products` (what absent effects would add).
+`_ahead` (errors of predictions), `_fit_errors` (the search), `_fit_measured` (as many integration steps as
+the motion needs) and `_effect_products` (what absent effects would add).
 """
 
 from ._ahead import squares_ahead as squares_ahead

@@ -33,8 +33,12 @@ def squares_ahead(
 
     def let_go(trace: Trace) -> Trace:
         counted = np.isfinite(np.asarray(trace.deviation))
-        time = np.arange(len(counted))[:, None]
-        runs = np.full(time.shape, True) if ahead is None else time % (fed + ahead) >= fed
+        runs = np.full((len(counted), 1), True)
+        if ahead is not None:
+            time, both = np.arange(len(counted))[:, None], fed + ahead
+            runs = time % both >= fed
+            ends = len(counted) - np.argmax(counted[::-1], axis=0)
+            counted = counted & ((time // both + 1) * both <= ends)  # of whole predictions
         return trace._replace(
             gains=tuple(on_device(np.where(runs, 0.0, np.asarray(gain))) for gain in trace.gains),
             deviation=on_device(np.where(counted & runs, 1.0, np.inf)),

@@ -25,8 +25,8 @@ _SMALL_CHANGE = 0.01
 a sample may hold a size down to where nothing else asks for it."""
 
 _USUAL_SCORINGS, _ROUGH_DEVIANCE = 16, 0.5
-"""The same of a search whose end is only ranked: far below what tells two laws apart. It goes on beyond its usual
-steps where it may still overtake the best of the others."""
+"""The same of a search whose end is only ranked: far below what tells two laws apart. It goes on beyond its
+usual steps where it may still overtake the best of the others."""
 
 _PACE = 4
 """Steps over which the pace of a search is taken."""
@@ -42,6 +42,9 @@ _FAR = 3.0
 
 _LEAST_FORCE = 1e-5
 """Random force below which there is none [rms of the drive, or of the inertia where nothing drives]."""
+
+_FIRST_FORCE = 0.1
+"""Random force to start from [rms of the drive]."""
 
 _LEAST_NOISE = 1e-6
 """Noise below which the output has none but rounding and the error of the steps [rms of the output]."""
@@ -65,23 +68,30 @@ _LONGEST_MEMORY = 8.0
 """Longest correlation time [log of samples]: nothing in a record tells it from a longer one."""
 
 
-def least_sizes(record_filter: RecordFilter) -> Sizes:
-    """Give the sizes below which an error is none."""
+def _drive_size(record_filter: RecordFilter) -> float:
+    """Give the largest rms of the drive [its SI unit]."""
     records = record_filter.tables.records
     drive = max(float(np.std(record.input)) for record in records)
-    outputs = np.array([float(np.std(record.output)) for record in records])
-    if drive == 0.0:
-        drive = float(record_filter.model.mass) * float(outputs.max())  # nothing drives: a scale will do
+    if drive > 0.0:
+        return drive
+    # Nothing drives: a scale will do.
+    return float(record_filter.model.mass) * max(float(np.std(record.output)) for record in records)
+
+
+def least_sizes(record_filter: RecordFilter) -> Sizes:
+    """Give the sizes below which an error is none, or is declared to be at least."""
+    outputs = np.array([float(np.std(record.output)) for record in record_filter.tables.records])
     lanes = [segment.record for segment in record_filter.prepared.segments]
     least = np.maximum(outputs, 1e-3 * outputs.max())[lanes]
-    return Sizes(2.0 * np.log(_LEAST_FORCE * drive), _WHITE, 2.0 * np.log(_LEAST_NOISE * least))
+    force = max(_LEAST_FORCE * _drive_size(record_filter), record_filter.measured.force[0])
+    return Sizes(2.0 * np.log(force), _WHITE, 2.0 * np.log(_LEAST_NOISE * least))
 
 
 def first_sizes(record_filter: RecordFilter) -> Sizes:
     """Give sizes for a model that is far from the records: much of the drive is not trusted."""
     least = least_sizes(record_filter)
     return Sizes(
-        least.force + 2.0 * np.log(0.1 / _LEAST_FORCE),
+        2.0 * np.log(_FIRST_FORCE * _drive_size(record_filter)),
         np.log(_FIRST_MEMORY) if record_filter.feeds_through else _WHITE,
         least.noise + 2.0 * np.log(0.01 / _LEAST_NOISE),
     )
@@ -146,8 +156,12 @@ def fit_errors(
     ]
     least, size, step = least_sizes(record_filter), len(places), 0
 
-    longest = _LONGEST_MEMORY if record_filter.feeds_through else least.memory
-    bounds = least, Sizes(np.inf, longest, np.maximum(loudest, least.noise))
+    # A force that is declared is white.
+    loudest_force = record_filter.measured.force[1]
+    any_memory = record_filter.feeds_through and np.isinf(loudest_force)
+    longest = _LONGEST_MEMORY if any_memory else least.memory
+    most = max(least.force, 2.0 * float(np.log(loudest_force)))
+    bounds = least, Sizes(most, longest, np.maximum(loudest, least.noise))
     sizes = sizes.within(bounds)
     settled_at = _ROUGH_DEVIANCE if rough else _SETTLED_DEVIANCE
 

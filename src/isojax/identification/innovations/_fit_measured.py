@@ -54,7 +54,8 @@ def fit_measured(
         starts: other values of the coefficients, of which the best is taken.
         steps: integration steps a sample to begin with.
         rough: whether the fit is only ranked among others.
-        rival: criterion of the best of the others; what stays behind it needs no finer steps and no long search.
+        rival: criterion of the best of the others; what stays behind it needs no finer steps and no long
+            search.
 
     Returns:
         The fit; that of the most steps where none suffice.

@@ -27,6 +27,7 @@ class Measured:
         hold: Hold,
         noise: Float[np.ndarray, " record"],
         factor: int = 1,
+        force: tuple[float, float] = (0.0, np.inf),
     ):
         """Keep the records; nothing is tabulated yet.
 
@@ -36,9 +37,10 @@ class Measured:
             hold: what the drive does between samples.
             noise: rms that the noise of each record cannot exceed [SI unit of the output].
             factor: samples that become one, see `thin_record`.
+            force: rms of the random force at least and at most, as declared [SI unit of the drive].
         """
         records = tuple(thin_record(record, factor) for record in records)
-        self.records, self._factor = records, factor
+        self.records, self._factor, self.force = records, factor, force
         self.quantity: Quantity = quantity
         self.hold: Hold = hold
         ends = [(place, 0, record.output.size, record.settle) for place, record in enumerate(records)]
@@ -63,12 +65,12 @@ class Measured:
             records: the records.
 
         Returns:
-            As many as these, some repeated where they are fewer: a filter then needs no other compiled code. And
-            how many of the segments come first and repeat none.
+            As many as these, some repeated where they are fewer: a filter then needs no other compiled code.
+            And how many of the segments come first and repeat none.
         """
         count = max(len(records), len(self.records))
         repeated = tuple(itertools.islice(itertools.cycle(records), count))
-        other = Measured(repeated, self.quantity, self.hold, np.ones(count), self._factor)
+        other = Measured(repeated, self.quantity, self.hold, np.ones(count), self._factor, self.force)
         return other, len(records) * len(other.segments) // count
 
     def tables(self, steps: int) -> Tables:

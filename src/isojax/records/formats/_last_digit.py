@@ -31,6 +31,7 @@ def _ends(numbers: Float[np.ndarray, " time"], unit: Float[np.ndarray, " time"])
     """Whether every number is a whole multiple of its unit."""
     for part in (slice(_FIRST_LOOK), slice(None)):
         multiple = numbers[part] / unit[part]
-        if np.any(np.abs(multiple - np.round(multiple)) > _NEARLY_WHOLE):
+        whole = np.round(multiple)
+        if np.any(np.abs(multiple - whole) > _NEARLY_WHOLE) or np.any((whole == 0.0) & (multiple != 0.0)):
             return False
     return True

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..._quantities import CONDITIONS
 from ..._show import shown
-from .._campaign import RELATIVE_ERROR, Hold, InputQuantity, OutputQuantity
+from .._campaign import Hold, InputQuantity, OutputQuantity
 from .._physical_limits import COUNT, GAIN, MASS, ORDER, RATE, SHARE, SIZE, Limits
 from .._record import Direction, ExcitationKind, Role
 from .._wording import listing, nearest, written
@@ -110,6 +110,8 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "offset_free": _flag(),
         "hold": _choice(*get_args(Hold), default="band_limited"),
         "moving_mass": _positive(MASS),
+        "noise": _positive(),
+        "accuracy": _positive(SHARE),
         "remove_spikes": _flag(),
     },
     "output": {
@@ -118,7 +120,7 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "unit": _text(),
         "offset_free": _flag(),
         "noise": _positive(),
-        "relative_error": _positive(SHARE, default=RELATIVE_ERROR),
+        "accuracy": _positive(SHARE),
         "remove_spikes": _flag(),
     },
     "floor": {
@@ -135,7 +137,12 @@ SECTIONS: Mapping[str, Mapping[str, Field]] = {
         "applied": _flag(default=True),
         "compensate": _flag(),
     },
-    "model": {"stiffness": _names(("linear",)), "damping": _names(("linear",)), "elements": _names(())},
+    "model": {
+        "stiffness": _names(("linear",)),
+        "damping": _names(("linear",)),
+        "elements": _names(()),
+        "random_force": _positive(),
+    },
 }
 RECORD: Mapping[str, Field] = {
     "file": _file(required=True),

@@ -10,6 +10,7 @@ import numpy as np
 from ..._quantities import CONDITIONS
 from .._campaign import TIME_DERIVATIVES, Campaign, Filter, FloorChannel, InputChannel, OutputChannel
 from .._record import Dwell, ExcitationKind, Record
+from .._windows import from_release
 from ..spectrum import ringing_frequency
 from ._channel_factor import check_units
 from ._declaration import Declaration
@@ -73,6 +74,7 @@ def read_measurements(declared: Declaration) -> Campaign:
         elements=tuple(sections["model"]["elements"]),
         records=_clocked(records),
         floor=floor,
+        random_force=sections["model"]["random_force"],
     )
 
 
@@ -142,7 +144,7 @@ def _read_record(
         removed_spikes=channels.removed_spikes,
         **{name: entry[name] for name in CONDITIONS},
     )
-    return record, channels
+    return from_release(record), channels
 
 
 def _excitation(
@@ -184,13 +186,13 @@ def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:
         for j, other in enumerate(records[:i]):
             # Settle samples only set the state, but a fitted record must not have held-out ones for it.
             mine, its = (
-                entry["start"] + (0 if one.role == "fit" and record.role != other.role else one.settle)
-                for entry, one in ((declared.records[i], record), (declared.records[j], other))
+                one.start + (0 if one.role == "fit" and record.role != other.role else one.settle)
+                for one in (record, other)
             )
             first = max(mine, its)
             last = min(
-                declared.records[i]["start"] + record.time.size,
-                declared.records[j]["start"] + other.time.size,
+                record.start + record.time.size,
+                other.start + other.time.size,
             )
             if first >= last or not (files[i] == files[j] or _same_samples(record, other, first, last)):
                 continue
