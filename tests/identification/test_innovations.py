@@ -9,15 +9,27 @@ import scipy
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from isojax import Isolator, read_campaign
+from isojax import Isolator, is_successful, read_campaign
 from isojax.elements import CoulombFriction, CubicStiffness, LinearDamping, LinearStiffness, MaxwellBranch
 from isojax.identification import diagnose, fit
-from isojax.identification.innovations import Measured, RecordFilter, Sizes, fit_errors, fit_measured, refined
+from isojax.identification.innovations import (
+    Measured,
+    RecordFilter,
+    Sizes,
+    _fit_errors,
+    first_sizes,
+    fit_errors,
+    fit_measured,
+    refined,
+    squares_ahead,
+)
 from isojax.records import Record
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 MASS, STIFFNESS, DAMPING, RATE = 3.0, 4000.0, 9.0, 200.0
+FED = 150
+"""Samples over which a filter follows a record between two predictions."""
 
 
 def record(drive, output, name="one"):
@@ -163,6 +175,72 @@ def test_a_search_leaves_the_first_states_of_the_fit_that_it_starts_from():
     found = fit_errors(own, (1, 2), (STIFFNESS, DAMPING), sizes, loudest=np.zeros(2), rough=True)
     np.testing.assert_array_equal((own.starts, own.spread), before)
     assert np.all(found.filter.spread < own.spread)
+
+
+def test_a_ranked_search_goes_on_while_it_may_overtake_the_best(monkeypatch):
+    monkeypatch.setattr(_fit_errors, "_USUAL_SCORINGS", 5)
+    records = tuple(driven_cubic(seed, level, 0.01) for seed, level in enumerate((4.0, 10.0)))
+    measured = Measured(records, "acceleration", "band_limited", np.full(2, 0.1))
+    start = Isolator(MASS, (LinearStiffness(1.5 * STIFFNESS), CubicStiffness(0.0), LinearDamping(DAMPING)))
+
+    def search(rival):
+        own, places = RecordFilter(start, measured, 4), (1, 2, 3)
+        sizes, loudest = first_sizes(own), measured.loudest
+        scales = (STIFFNESS, 1e7, DAMPING)
+        return fit_errors(own, places, scales, sizes, loudest=loudest, rough=True, rival=rival)
+
+    whole = search(np.inf)
+    assert is_successful(whole.result)
+    np.testing.assert_allclose(whole.values, [STIFFNESS, 4e7, DAMPING], rtol=0.02)
+    # What falls by thousands a step goes on beyond the usual ones, unless nothing could bring it so low.
+    for rival in (-np.inf, whole.deviance.sum() - 1e7):
+        assert search(rival).steps == 6
+    assert search(whole.deviance.sum() + 1e3).steps > 6
+
+
+@pytest.mark.parametrize("ahead", [40, 400])
+def test_the_error_of_predictions_is_that_of_the_motion_that_starts_where_the_filter_stands(ahead):
+    rng = np.random.default_rng(6)
+    drive, output = smooth_noise(rng, 1800), 1e-3 * smooth_noise(rng, 1800)
+    records = record(drive, output), record(drive[::-1], output[::-1], "two")
+    own = RecordFilter(linear(), Measured(records, "displacement", "linear", np.full(2, 1.0)), 4)
+    sizes = Sizes(np.log(10.0**2), -30.0, np.log(np.full(2, 2e-5**2)))
+    way = own.follow((), np.zeros((7, 0)), sizes.around())
+    fed = FED
+    squares, counts = squares_ahead(own, (), np.zeros(0), way, ahead, fed)
+    rates = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]])
+    plant = rates, [[0.0], [1.0 / MASS]], [[1.0, 0.0]], [[0.0]]
+    windows = range(fed, 1800 - ahead + 1, fed + ahead)
+    for place, one in enumerate(records):
+        trace = way.traces[place]  # a lane a batch
+        assert counts[place] == len(windows) * ahead
+        expected = 0.0
+        for begin in windows:
+            # The filter's last correction before it is let go is at the sample before.
+            state = _kept_on(one, own, trace, begin, fed + ahead)
+            time = np.arange(ahead) / RATE
+            free = scipy.signal.lsim(plant, one.input[begin : begin + ahead], time, state)[1]
+            expected += np.sum((one.output[begin : begin + ahead] - free) ** 2)
+        assert squares[place] == pytest.approx(expected, rel=1e-4)
+
+
+def _kept_on(one, own, trace, begin, both):
+    """The state at a sample, by the filter's gains where it is fed and by a bare motion elsewhere."""
+    rates = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]])
+    whole = np.zeros((4, 4))
+    whole[:2, :2], whole[1, 2], whole[2, 3] = rates / RATE, 1.0 / MASS / RATE, 1.0
+    whole = expm(whole)
+    place = 0 if one.name == "one" else 1
+    state, gains = own.starts[:, place].copy(), np.array([np.asarray(gain)[:, 0] for gain in trace.gains[:2]])
+    pushes = np.asarray(trace.gains[2])[:, 0]
+    for k in range(begin):
+        fed = k % both < FED
+        error = one.output[k] - state[0]
+        state = state + fed * gains[:, k] * error
+        push = fed * pushes[k] * error
+        slope = one.input[k + 1] - one.input[k]
+        state = whole[:2, :2] @ state + whole[:2, 2] * (one.input[k] + push) + whole[:2, 3] * slope
+    return state
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..._quantities import typeset_share
+from ..._quantities import typeset_share, typeset_unit
 from .._rules import Rules
 from ..fitting import Fit
 from ..innovations import ErrorFit
@@ -22,7 +22,7 @@ def error_words(found: ErrorFit, fit: Fit, rules: Rules) -> str:
     """
     if found.is_noise_of_output:
         return "What the model leaves is noise of the output."
-    unit = "m/s^2" if fit.model.excitation == "base_acceleration" else "N"
+    unit = typeset_unit("m/s^2" if fit.model.excitation == "base_acceleration" else "N")
     force, declared = f"{np.sqrt(found.sizes.variance):.3g} {unit} rms", found.filter.measured.force[0]
     if found.is_noise and found.sizes.variance < rules.as_declared * declared**2:
         return "What the model leaves is noise of the output and, as declared, of the drive."
