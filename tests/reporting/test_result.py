@@ -38,6 +38,7 @@ def check_schema(result):
         "after",
         "bounds",
         "seconds",
+        "errors",
     ]
     assert list(result) == keys
     assert result["schema"] == 1
@@ -62,6 +63,11 @@ def check_schema(result):
             assert isinstance(entry["admissible"], bool)
     for bound in result["bounds"].values():
         assert set(bound) == {"upper", "unit"}
+    for side, rows in result["errors"].items():
+        assert set(rows[0]) == {"horizon", "fit", "holdout"}
+        assert rows[-1]["horizon"] is None
+        assert rows[-1]["fit"] == result[side]["error"]["fit"]["rmse"]
+        assert [row["horizon"] for row in rows[:-1]] == sorted(row["horizon"] for row in rows[:-1])
 
 
 def test_result_follows_schema_one(found, plain):

@@ -22,8 +22,8 @@ SCHEMA = 1
 def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, Any]:
     """Give a closed loop as schema 1 of result.json.
 
-    "errors", beside the coefficients of a fit, are rms errors of predictions [SI unit of the output] by how
-    long they run [s], the free run last with None for its time. "alternatives", other force laws in the place
+    "errors" are rms errors of predictions [SI unit of the output] by how long they run [s], the free run last
+    with None for its time. "alternatives", other force laws in the place
     of the findings, is there only where something was found; "remainder" only where the verdict is
     "unexplained" or "partly_explained"; "integration", beside the coefficients of a fit, only where a solver
     of diffrax other than RK4 simulated the records; "tone" and "law" only where the last diagnosis found no
@@ -51,6 +51,7 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
             for effect, (upper, unit) in loop.bounds.items()
         },
         "seconds": finite_or_none(loop.seconds),
+        "errors": {"before": _horizon_dicts(loop.before), "after": _horizon_dicts(loop.after)},
         **({"alternatives": alternatives_list(loop)} if loop.alternatives else {}),
         **({} if health is None else {"health": health_dict(health)}),
         **({} if remainder is None else {"remainder": remainder_dict(remainder)}),
@@ -72,7 +73,6 @@ def _fit_dict(fit: Fit) -> dict[str, Any]:
             for entry in list_parameters(fit.model)
         },
         "error": {role: _error_dict(fit.errors[role]) for role in ("fit", "holdout")},
-        "errors": _horizon_dicts(fit),
         **({} if fit.estimate.problem.integrator.is_locked else {"integration": fit.integration}),
     }
 
