@@ -9,7 +9,7 @@ from jaxtyping import Float
 from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ...models import Isolator
-from ._ahead import squares_ahead
+from ._ahead import free_squares
 from ._measured import Measured
 from ._record_filter import COPIES, RecordFilter
 from ._sizes import Sizes, Way
@@ -164,7 +164,7 @@ class ErrorFit:
     @cached_property
     def free_squares(self) -> Float[np.ndarray, " record"]:
         """Squared error of each record, simulated with nothing fed back [squared SI unit of the output]."""
-        return squares_ahead(self.filter, self.places, self.values, self.way)[0]
+        return free_squares(self.filter, self.places, self.values, self.way)
 
     def followed(self, measured: Measured) -> tuple[RecordFilter, Way]:
         """Filter other records of the campaign, their noise as loud as that of the fitted ones.
