@@ -20,6 +20,7 @@ from isojax.identification.innovations import (
     first_sizes,
     fit_errors,
     fit_measured,
+    free_squares,
     refined,
     squares_ahead,
 )
@@ -222,6 +223,27 @@ def test_the_error_of_predictions_is_that_of_the_motion_that_starts_where_the_fi
             free = scipy.signal.lsim(plant, one.input[begin : begin + ahead], time, state)[1]
             expected += np.sum((one.output[begin : begin + ahead] - free) ** 2)
         assert squares[place] == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_free_run_begins_at_the_state_from_which_it_is_best():
+    rng = np.random.default_rng(8)
+    drive = smooth_noise(rng, 900)
+    rates = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]])
+    plant, time = (rates, [[0.0], [1.0 / MASS]], [[1.0, 0.0]], [[0.0]]), np.arange(900) / RATE
+    begun = [np.array([2e-3, -0.05]), np.array([-1e-3, 0.08])]
+    outputs = [scipy.signal.lsim(plant, drive, time, own)[1] + 1e-4 * smooth_noise(rng, 900) for own in begun]
+    records = tuple(record(drive, one, name) for one, name in zip(outputs, ("one", "two"), strict=True))
+    own = RecordFilter(linear(), Measured(records, "displacement", "linear", np.full(2, 1.0)), 4)
+    own.starts[:] = 0.0  # far from where the motions began
+    sizes = Sizes(np.log(10.0**2), -30.0, np.log(np.full(2, 2e-5**2)))
+    way = own.follow((), np.zeros((7, 0)), sizes.around())
+    squares = free_squares(own, (), np.zeros(0), way)
+    driven = scipy.signal.lsim(plant, drive, time)[1]
+    decays = np.stack([scipy.signal.lsim(plant, 0.0 * drive, time, unit)[1] for unit in np.eye(2)], axis=1)
+    for place, output in enumerate(outputs):
+        best = np.linalg.lstsq(decays, output - driven, rcond=None)[1][0]
+        assert squares[place] == pytest.approx(best, rel=0.02)
+    np.testing.assert_array_equal(own.starts, 0.0)
 
 
 def _kept_on(one, own, trace, begin, both):

@@ -6,6 +6,7 @@ Read `_filter` (innovations of records side by side, and their derivatives), `_m
 the motion needs) and `_effect_products` (what absent effects would add).
 """
 
+from ._ahead import free_squares as free_squares
 from ._ahead import squares_ahead as squares_ahead
 from ._effect_products import EffectProducts as EffectProducts
 from ._effect_products import effect_products as effect_products
