@@ -84,16 +84,15 @@ def diagnose_innovations(
         if _takes_off(found, refit) < fit.campaign.accuracy * _rms(found):
             reason = f"{refit.score.element.name} takes off less than the declared accuracy of the channels"
             continue
-        # Of noise the likelihood knows all; a free run over unseen levels errs by what the others leave open.
-        by_runs = not refit.fit.is_noise and _follows(usable, rules)
+        by_runs = refit.fit.is_noise or _follows(usable, rules)
         if refit.fit.is_noise_of_output and clear:
             best = Weighed(refit, Transfer(_gain(found, refit), 1.0, True))
             break
-        needed = rules.smallest_share
-        if by_runs and not refit.fit.free_error < found.free_error * np.sqrt(1.0 - needed):
+        needed = 0.0 if refit.fit.is_noise else rules.smallest_share
+        if needed and by_runs and not refit.fit.free_error < found.free_error * np.sqrt(1.0 - needed):
             continue  # what does not even help the records that it was fitted to helps no others
         one = weigh(refit)
-        least = 0.0 if by_runs or refit.fit.is_noise else rules.clear_gain * found.samples
+        least = 0.0 if by_runs else rules.clear_gain * found.samples
         if one.transfer.deviance > least and (one.transfer.share >= needed or not by_runs):
             best = one
             break

@@ -28,7 +28,7 @@ _USUAL_SCORINGS, _ROUGH_DEVIANCE = 16, 0.5
 """The same of a search whose end is only ranked: far below what tells two laws apart. It goes on beyond its
 usual steps where it may still overtake the best of the others."""
 
-_PACE = 4
+_STEPS_BACK = 4
 """Steps over which the pace of a search is taken."""
 
 _TRIED = np.array([1e-3, 0.03, 1.0, 30.0])
@@ -183,7 +183,7 @@ def fit_errors(
     fallen: list[float] = []
     for step in range(1, _MOST_SCORINGS + 1):
         if rough and step > _USUAL_SCORINGS:
-            pace = (fallen[-1 - _PACE] - fallen[-1]) / _PACE
+            pace = (fallen[-1 - _STEPS_BACK] - fallen[-1]) / _STEPS_BACK
             if fallen[-1] - (_MOST_SCORINGS + 1 - step) * pace > rival:
                 break
         way = followed([free] * COPIES, sizes.around())
