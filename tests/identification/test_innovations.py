@@ -47,6 +47,12 @@ def smooth_noise(rng, size):
     return scipy.signal.sosfiltfilt(scipy.signal.butter(4, 0.2, output="sos"), rng.standard_normal(size))
 
 
+def there_and_back(rng, size):
+    """Two records of unrelated drive and displacement: one, and the same from its end to its start."""
+    drive, output = smooth_noise(rng, size), 1e-3 * smooth_noise(rng, size)
+    return record(drive, output), record(drive[::-1], output[::-1], "two")
+
+
 def kalman_deviance(drive, output, start, spread, force, noise, branch=None):
     """-2 log-likelihood but for a constant: the drive is straight between samples, its random force held.
 
@@ -80,8 +86,7 @@ def kalman_deviance(drive, output, start, spread, force, noise, branch=None):
 @pytest.mark.parametrize("force", [1.0, 10.0])
 def test_the_likelihood_is_that_of_a_kalman_filter(force):
     rng = np.random.default_rng(3)
-    drive, output = smooth_noise(rng, 900), 1e-3 * smooth_noise(rng, 900)
-    records = record(drive, output), record(drive[::-1], output[::-1], "two")
+    records = there_and_back(rng, 900)
     own = RecordFilter(linear(), Measured(records, "displacement", "linear", np.full(2, 1.0)), 4)
     force, noise = force**2, 2e-5**2
     way = own.follow((), np.zeros((7, 0)), Sizes(np.log(force), -30.0, np.log(np.full(2, noise))).around())
@@ -95,8 +100,7 @@ def test_the_likelihood_is_that_of_a_kalman_filter(force):
 
 def test_the_likelihood_holds_for_a_state_that_follows_within_a_sample():
     rng = np.random.default_rng(5)
-    drive, output = smooth_noise(rng, 900), 1e-3 * smooth_noise(rng, 900)
-    records = record(drive, output), record(drive[::-1], output[::-1], "two")
+    records = there_and_back(rng, 900)
     branch = 800.0, 0.12 / RATE
     model = linear().with_elements(MaxwellBranch(*branch))
     own = RecordFilter(model, Measured(records, "displacement", "linear", np.full(2, 1.0)), 16)
@@ -202,23 +206,21 @@ def test_a_ranked_search_goes_on_while_it_may_overtake_the_best(monkeypatch):
 @pytest.mark.parametrize("ahead", [40, 400])
 def test_the_error_of_predictions_is_that_of_the_motion_that_starts_where_the_filter_stands(ahead):
     rng = np.random.default_rng(6)
-    drive, output = smooth_noise(rng, 1800), 1e-3 * smooth_noise(rng, 1800)
-    records = record(drive, output), record(drive[::-1], output[::-1], "two")
+    records = there_and_back(rng, 1800)
     own = RecordFilter(linear(), Measured(records, "displacement", "linear", np.full(2, 1.0)), 4)
     sizes = Sizes(np.log(10.0**2), -30.0, np.log(np.full(2, 2e-5**2)))
     way = own.follow((), np.zeros((7, 0)), sizes.around())
-    fed = FED
-    squares, counts = squares_ahead(own, (), np.zeros(0), way, ahead, fed)
+    squares, counts = squares_ahead(own, (), np.zeros(0), way, ahead, FED)
     rates = np.array([[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]])
     plant = rates, [[0.0], [1.0 / MASS]], [[1.0, 0.0]], [[0.0]]
-    windows = range(fed, 1800 - ahead + 1, fed + ahead)
+    windows = range(FED, 1800 - ahead + 1, FED + ahead)
     for place, one in enumerate(records):
         trace = way.traces[place]  # a lane a batch
         assert counts[place] == len(windows) * ahead
         expected = 0.0
         for begin in windows:
             # The filter's last correction before it is let go is at the sample before.
-            state = _kept_on(one, own, trace, begin, fed + ahead)
+            state = _kept_on(one, own, trace, begin, FED + ahead)
             time = np.arange(ahead) / RATE
             free = scipy.signal.lsim(plant, one.input[begin : begin + ahead], time, state)[1]
             expected += np.sum((one.output[begin : begin + ahead] - free) ** 2)

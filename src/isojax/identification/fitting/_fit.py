@@ -125,12 +125,10 @@ def fit_by_output(
     places = free_places(model, (), None, campaign.mass_free) if places is None else places
     noise = estimate_noise(campaign)
     whole = integrator is None and search.max_steps >= MOST_EVALUATIONS
-    followed = whole and suits_innovations(campaign)
     declared = campaign.input.noise is not None or campaign.random_force is not None
+    followed = whole and suits_innovations(campaign, stepped=declared)
     # Under base excitation the drive is as noisy as the response: both are readings of accelerometers.
-    if (followed and campaign.input.quantity == "base_acceleration") or (
-        declared and whole and suits_innovations(campaign, stepped=True)
-    ):
+    if followed and (declared or campaign.input.quantity == "base_acceleration"):
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
         raise ValueError(

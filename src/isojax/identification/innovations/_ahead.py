@@ -68,7 +68,8 @@ def free_squares(
     own, free = record_filter.with_own_starts(), _let_go(way)
     squares, counts = squares_ahead(own, places, values, way)
     for _ in range(_MOST_STARTS):
-        products = own.slopes(places, values, free) / np.maximum(squares / np.maximum(counts, 1.0), 1e-300)
+        variance = np.where(np.isfinite(squares), squares, 1.0) / np.maximum(counts, 1.0)
+        products = own.slopes(places, values, free) / np.maximum(variance, 1e-300)
         first = own.eliminate(products, np.full(own.count, _START_DAMPING))
         begins = own.starts + first.settled
         tried = own.squares(places, values[None], free, begins[None])[0]

@@ -131,8 +131,8 @@ def fit_errors(
         rough: whether the fit is only ranked among others.
         starts: other values of the coefficients, of which the best is taken.
         judged: 1 for the records that are fitted, 0 for those that take no part; all if omitted.
-        rival: deviance of the best of the others; a rough search that falls fast enough to overtake it takes
-            more than the usual steps.
+        rival: a rough search takes more than the usual steps where its deviance falls fast enough to come
+            below this.
 
     Returns:
         The fit.

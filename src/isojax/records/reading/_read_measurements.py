@@ -184,16 +184,14 @@ def _check_apart(declared: Declaration, records: tuple[Record, ...]) -> None:
     files = [record.file.resolve() for record in records]
     for i, record in enumerate(records):
         for j, other in enumerate(records[:i]):
+            starts = [declared.records[place]["start"] + records[place].held for place in (i, j)]
             # Settle samples only set the state, but a fitted record must not have held-out ones for it.
             mine, its = (
-                one.start + (0 if one.role == "fit" and record.role != other.role else one.settle)
-                for one in (record, other)
+                start + (0 if one.role == "fit" and record.role != other.role else one.settle)
+                for start, one in zip(starts, (record, other), strict=True)
             )
             first = max(mine, its)
-            last = min(
-                record.start + record.time.size,
-                other.start + other.time.size,
-            )
+            last = min(starts[0] + record.time.size, starts[1] + other.time.size)
             if first >= last or not (files[i] == files[j] or _same_samples(record, other, first, last)):
                 continue
             shared = (

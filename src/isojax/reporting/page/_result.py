@@ -23,11 +23,11 @@ def result_dict(loop: Loop, health: CampaignHealth | None = None) -> dict[str, A
     """Give a closed loop as schema 1 of result.json.
 
     "errors" are rms errors of predictions [SI unit of the output] by how long they run [s], the free run last
-    with None for its time. "alternatives", other force laws in the place
-    of the findings, is there only where something was found; "remainder" only where the verdict is
-    "unexplained" or "partly_explained"; "integration", beside the coefficients of a fit, only where a solver
-    of diffrax other than RK4 simulated the records; "tone" and "law" only where the last diagnosis found no
-    further effect, but one of these is left.
+    with None for its time. "alternatives", other force laws in the place of the findings, is there only where
+    something was found; "remainder" only where the verdict is "unexplained" or "partly_explained";
+    "integration", beside the coefficients of a fit, only where a solver of diffrax other than RK4 simulated
+    the records; "tone" and "law" only where the last diagnosis found no further effect, but one of these is
+    left.
 
     Args:
         loop: the closed loop.
