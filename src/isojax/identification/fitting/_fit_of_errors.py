@@ -6,11 +6,13 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from ..._parameters import element_names, list_parameters
+from ..._parameters import list_parameters, replace_parameters
 from ..._results import RESULTS, is_successful
+from ..._types import on_device
 from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thinned_share
+from ..guess import linear_starts, wells_start
 from ..innovations import ErrorFit, Measured, fit_measured
 from ._build_problem import build_problem
 from ._covariance import invert_information
@@ -131,24 +133,16 @@ def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, 
     """
     measured = measured_of(campaign, estimate_noise(campaign))
     sizes = magnitudes(model, places, search.scales)
-    values = np.array([float(list_parameters(model)[place].value) for place in places])
-    starts = [values * factor for factor in _starts(model, places)]
-    return fit_measured(model, places, sizes, measured, starts=starts)
-
-
-def _starts(model: Isolator, places: tuple[int, ...]) -> list[Float[np.ndarray, " coefficient"]]:
-    """Give factors on a start: its linear part, stiffer and softer, and with more damping."""
-    kinds = {
-        f"{name}.{element.strength}": element.proportional_to or "nonlinear"
-        for name, element in zip(element_names(model), model.elements, strict=True)
-    }
-    listed = list_parameters(model)
-    starts = []
-    for stiffer, more in ((1.0, 1.0), (1.0, 3.0), (0.7, 1.0), (1.4, 1.0)):
-        factors = {"displacement": stiffer, "velocity": more, "nonlinear": 0.0}
-        # Shapes of effects and the mass are no strengths, and stay.
-        starts.append(np.array([factors.get(kinds.get(listed[place].name, ""), 1.0) for place in places]))
-    return starts
+    found = fit_measured(model, places, sizes, measured, starts=linear_starts(model, places))
+    wells = None if found.is_noise else wells_start(model, places, search.scales)
+    if wells is None:
+        return found
+    search.progress("the model leaves more than noise: again, from a start with two wells")
+    numbers = [entry.value for entry in list_parameters(model)]
+    for place, value in zip(places, wells, strict=True):
+        numbers[place] = on_device(np.asarray(value))
+    again = fit_measured(replace_parameters(model, numbers), places, sizes, measured)
+    return again if again.criterion < found.criterion or not np.isfinite(found.criterion) else found
 
 
 def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fit:

@@ -27,6 +27,8 @@ from ._measured_receptance import measured_receptance as measured_receptance
 from ._motion import Motion as Motion
 from ._motion import is_absolute as is_absolute
 from ._motion import measured_motion as measured_motion
+from ._other_starts import linear_starts as linear_starts
+from ._other_starts import wells_start as wells_start
 from ._paper_table import PaperTable as PaperTable
 from ._paper_table import paper_table as paper_table
 from ._scales import scales as scales

@@ -52,9 +52,17 @@ def eliminate(
         inner = whole[columns:-1, columns:-1] * np.outer(own, own)
         outer = whole[columns:-1][:, rows] * own[:, None]
         outer[:, -1] += (starts - centers)[:, record] / own
-        known = inner + np.eye(size)
-        back = own[:, None] * np.linalg.solve(known + damping[record] * np.diag(np.diag(inner)), outer)
+        unit = np.sqrt(1.0 + np.diag(inner))  # of an unstable motion it is huge
+        known = (inner + np.eye(size)) / np.outer(unit, unit)
+        damped = _inverse(known + damping[record] * np.diag(np.diag(inner) / unit**2))
+        back = (own / unit)[:, None] * (damped @ (outer / unit[:, None]))
         reduced[:, :, record] -= (outer / own[:, None]).T @ back
         settled[:, record], along[:, :, record] = -back[:, -1], -back[:, :-1]
-        spread[:, record] = own**2 * np.diag(np.linalg.inv(known))
+        spread[:, record] = (own / unit) ** 2 * np.diag(_inverse(known))
     return FirstStates(reduced, settled, along, spread)
+
+
+def _inverse(matrix: Float[np.ndarray, "state state"]) -> Float[np.ndarray, "state state"]:
+    """Invert a symmetric matrix of ones on its diagonal, whose rounding may have made it indefinite."""
+    values, vectors = np.linalg.eigh(matrix)
+    return (vectors / np.maximum(values, np.finfo(float).eps * values.size)) @ vectors.T

@@ -178,7 +178,7 @@ def fit_errors(
     if len(frees) > 1:
         deviances = over(followed(frees, [sizes] * len(frees)).deviance)
         free = frees[int(np.argmin(deviances[: len(frees)]))]
-    last, before, trust, alone = np.inf, sizes, FURTHEST, False
+    last, before, trust, alone, sought = np.inf, sizes, FURTHEST, False, rough
     result: Any = RESULTS.not_converged
     fallen: list[float] = []
     for step in range(1, _MOST_SCORINGS + 1):
@@ -236,7 +236,13 @@ def fit_errors(
         aim = sizes.moved(way, part, bounds, FURTHEST)
         still = abs(last - deviance) < settled_at or aim.distance(sizes) < _SMALL_CHANGE
         settled = step > 2 and still and gain < settled_at
-        if settled and (promised < settled_at or damping >= 1e6):
+        ended = settled and (promised < settled_at or damping >= 1e6)
+        if (ended or step > _USUAL_SCORINGS) and not sought and sizes.force > least.force:
+            sought = True  # a record may have begun in another well
+            record_filter.seek_starts(places, points([free])[0], sizes)
+            last = np.inf
+            continue
+        if ended:
             if record_filter.feeds_through and not alone and sizes.force > least.force:
                 alone = True
                 only = bounds[0], bounds[1]._replace(force=least.force, memory=least.memory)

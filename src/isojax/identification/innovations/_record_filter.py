@@ -78,6 +78,8 @@ class RecordFilter:
             on_device(np.asarray(model.shift(), dtype=float)),
             on_device(np.asarray(model.skew(), dtype=float)),
         )
+        # An array, so that records of other rates share compiled code.
+        self._time = on_device(np.asarray(prepared.sampling.time))
         self._numbers = [np.asarray(entry.value, dtype=float) for entry in list_parameters(model)]
         self._copied: dict[tuple[int, int], Batch] = {}
 
@@ -157,7 +159,7 @@ class RecordFilter:
                 lanes,
                 batch,
                 sampling.quantity,
-                sampling.time,
+                self._time,
                 self._tabled,
                 width,
                 SPACING,
@@ -253,7 +255,7 @@ class RecordFilter:
                 trace,
                 batch,
                 sampling.quantity,
-                sampling.time,
+                self._time,
                 self._tabled,
             )
 
