@@ -13,7 +13,7 @@ from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thinned_share
 from ..guess import linear_starts, wells_start
-from ..innovations import ErrorFit, Measured, fit_measured
+from ..innovations import ErrorFit, Measured, fit_measured, refined
 from ._build_problem import build_problem
 from ._covariance import invert_information
 from ._elimination import Spread
@@ -142,7 +142,8 @@ def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, 
     for place, value in zip(places, wells, strict=True):
         numbers[place] = on_device(np.asarray(value))
     again = fit_measured(replace_parameters(model, numbers), places, sizes, measured)
-    return again if again.criterion < found.criterion or not np.isfinite(found.criterion) else found
+    better = again.criterion < found.criterion or not np.isfinite(found.criterion)
+    return refined(again, sizes) if better else found
 
 
 def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fit:
