@@ -56,7 +56,8 @@ def campaign_of(folder: Path, seed: int, quantity: str) -> tuple[Path, dict[str,
         reading = {"displacement": x, "velocity": v, "acceleration": -2.0 * ratio * v + x - x**3}[quantity]
         reading = reading + 0.005 * reading.std() * draw.standard_normal(time.size)
         reading *= rest * rate ** list(UNITS).index(quantity)
-        np.savez(folder / f"r{place}.npz", time=time / rate, base=base[::FINER] * rest * rate**2, reading=reading)
+        base = base[::FINER] * rest * rate**2
+        np.savez(folder / f"r{place}.npz", time=time / rate, base=base, reading=reading)
         written += RECORD.format(name=f"r{place}.npz", role="holdout" if place == 2 else "fit")
     (folder / "campaign.toml").write_text(written, encoding="utf-8")
     stiffness = mass * rate**2

@@ -190,8 +190,8 @@ def fit_errors(
         lost = not way.surprise < _ASTRAY * record_filter.samples
         if step == 1 and (lost or np.all(np.isinf(loudest))):
             if lost:  # it trusts a model that is too far off, by little in a motion that is irregular
-                begun = max(sizes.force, first_sizes(record_filter).force)
-                sizes = sizes._replace(force=begun).within(bounds)
+                force = max(sizes.force, first_sizes(record_filter).force)
+                sizes = sizes._replace(force=force).within(bounds)
             record_filter.seek_starts(places, points([free])[0], sizes)
             way = followed([free] * COPIES, sizes.around())
         if step in (1, 3):  # internal states start anywhere in the range that they visit
