@@ -13,7 +13,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ._show import brief, shown
-from ._types import Scalar, as_float64
+from ._types import Scalar, as_float64, on_device
 
 _Model = TypeVar("_Model", bound=eqx.Module)
 
@@ -209,6 +209,23 @@ def replace_parameters(model: _Model, values: Sequence[Any] | Float[Array, " par
     if len(values) != count:
         raise ValueError(f"Argument `values` must hold {count} numbers, but holds {len(values)}.")
     return eqx.tree_at(_leaves, model, [as_float64(values[index]) for index in range(count)])
+
+
+def replace_at(model: _Model, places: Sequence[int], values: Iterable[Any]) -> _Model:
+    """Give the same model with some numbers replaced, as they are.
+
+    Args:
+        model: an isolator or a single element.
+        places: places of the numbers in `list_parameters`.
+        values: the new value of each; no number that is traced.
+
+    Returns:
+        The model.
+    """
+    numbers = [entry.value for entry in list_parameters(model)]
+    for place, value in zip(places, values, strict=True):
+        numbers[place] = on_device(np.asarray(value, dtype=float))
+    return replace_parameters(model, numbers)
 
 
 def replace_named(model: _Model, names: Sequence[str], values: Iterable[Any]) -> _Model:

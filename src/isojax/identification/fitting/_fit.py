@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..._cores import in_own_threads
-from ..._parameters import element_names, list_parameters, replace_parameters
+from ..._parameters import replace_at
 from ..._progress import silent
 from ..._results import RESULTS, is_successful
 from ..._types import check_float64
 from ...models import Integrator, Isolator, Modelled, as_isolator, check_integrator
 from ...records import Campaign, estimate_noise, refuse_contradictions
 from .._rules import Rules
-from ..guess import as_campaign, classical_guess
+from ..guess import as_campaign, classical_guess, linear_starts
 from ._estimate import Estimate, estimate, free_places
 from ._fit_of_errors import fit_errors_of, suits_innovations
 from ._fit_result import Fit
@@ -140,7 +140,7 @@ def fit_by_output(
         return estimate(simulator_for(start, campaign, noise, integrator), start, places, search)
 
     found = fit_from(model)
-    linear = _linear_part(model, places)
+    linear = replace_at(model, places, linear_starts(model, places)[0])
     if not is_successful(found.result) and linear.parameters != model.parameters:
         diverges = found.result == RESULTS.not_finite
         why = (
@@ -202,20 +202,6 @@ def still(problem: Problem) -> float:
     """
     pairs = zip(problem.records, problem.noise, strict=True)
     return problem.share * sum(float(np.sum((record.output / noise) ** 2)) for record, noise in pairs)
-
-
-def _linear_part(model: Isolator, places: tuple[int, ...]) -> Isolator:
-    """Give the model with every effect absent that is free and not linear: its motion stays within bounds."""
-    strengths = {
-        f"{name}.{element.strength}"
-        for name, element in zip(element_names(model), model.elements, strict=True)
-        if not element.proportional_to
-    }
-    numbers = [
-        0.0 * entry.value if place in places and entry.name in strengths else entry.value
-        for place, entry in enumerate(list_parameters(model))
-    ]
-    return replace_parameters(model, numbers)
 
 
 def _check_excitation(model: Isolator, campaign: Campaign) -> None:

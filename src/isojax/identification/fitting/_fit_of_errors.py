@@ -6,9 +6,8 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from ..._parameters import list_parameters, replace_parameters
+from ..._parameters import replace_at
 from ..._results import RESULTS, is_successful
-from ..._types import on_device
 from ...excitations import Hold
 from ...models import Integrator, Isolator
 from ...records import Campaign, NoiseEstimate, Record, estimate_noise, thinned_share
@@ -138,10 +137,7 @@ def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, 
     if wells is None:
         return found
     search.progress("the model leaves more than noise: again, from a start with two wells")
-    numbers = [entry.value for entry in list_parameters(model)]
-    for place, value in zip(places, wells, strict=True):
-        numbers[place] = on_device(np.asarray(value))
-    again = fit_measured(replace_parameters(model, numbers), places, sizes, measured)
+    again = fit_measured(replace_at(model, places, wells), places, sizes, measured)
     better = again.criterion < found.criterion or not np.isfinite(found.criterion)
     return refined(again, sizes) if better else found
 

@@ -20,7 +20,6 @@ from jaxtyping import Array, Float
 from ..._kernel_scan import kernel_scan
 from ..._parameters import replace_parameters
 from ..._quick_jit import quick_jit
-from ..._types import Scalar
 from ...models import RK4, Instant, Isolator, Quantity, State, advance_record, read_record, split_stages
 from ..jacobian import Batch
 
@@ -94,12 +93,7 @@ def _read(model: Isolator, quantity: Quantity, state: State, at: Instant) -> Arr
 
 
 def _predict(
-    model: Isolator,
-    quantity: Quantity,
-    step: Scalar,
-    memory: Array,
-    state: State,
-    stages: tuple[Instant, ...],
+    model: Isolator, quantity: Quantity, step: Array, memory: Array, state: State, stages: tuple[Instant, ...]
 ) -> State:
     """Give the state one sample later, the random force constant on the way."""
     pushed = tuple(at._replace(drive=at.drive + state[-1]) for at in stages)
@@ -130,7 +124,7 @@ def _trust(error: Array, variance: Array) -> Array:
 def _update(
     model: Isolator,
     quantity: Quantity,
-    step: Scalar,
+    step: Array,
     lanes: Lanes,
     state: State,
     covariance: tuple[State, ...],
@@ -173,12 +167,7 @@ def _update(
 
 
 def _split_transition(
-    model: Isolator,
-    quantity: Quantity,
-    step: Scalar,
-    memory: Array,
-    state: State,
-    stages: tuple[Instant, ...],
+    model: Isolator, quantity: Quantity, step: Array, memory: Array, state: State, stages: tuple[Instant, ...]
 ) -> tuple[State, list[State]]:
     """Give the state a sample later, and what a unit of each becomes, the step split at jumps and bends."""
     size = len(state)
@@ -193,12 +182,7 @@ def _split_transition(
 
 
 def _smooth_transition(
-    model: Isolator,
-    quantity: Quantity,
-    step: Scalar,
-    memory: Array,
-    state: State,
-    stages: tuple[Instant, ...],
+    model: Isolator, quantity: Quantity, step: Array, memory: Array, state: State, stages: tuple[Instant, ...]
 ) -> tuple[State, list[State]]:
     """Give the state a sample later, and what a unit of each becomes, by derivatives in the middle.
 
@@ -250,7 +234,7 @@ def follow_records(
     lanes: Lanes,
     batch: Batch,
     quantity: Quantity,
-    step: Scalar,
+    step: Array,
     tabled: tuple[Array, Array],
     kept: int,
     spacing: float,
@@ -326,7 +310,7 @@ def innovation_products(
     trace: Trace,
     batch: Batch,
     quantity: Quantity,
-    step: Scalar,
+    step: Array,
     tabled: tuple[Array, Array],
 ) -> Float[Array, "row row lanes"]:
     """Differentiate the innovations with the gains and their deviations held.

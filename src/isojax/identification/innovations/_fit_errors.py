@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from ..._parameters import list_parameters, replace_parameters, to_free
+from ..._parameters import list_parameters, replace_at, to_free
 from ..._results import RESULTS
-from ..._types import on_device
 from ._error_fit import ErrorFit
 from ._record_filter import COPIES, RecordFilter, physical
 from ._sizes import FURTHEST, Sizes, Way
@@ -257,11 +256,9 @@ def fit_errors(
             break
         sizes, last = new, deviance
     way = followed([free] * COPIES, sizes.around())
-    numbers, rows = [entry.value for entry in listed], np.r_[:size, -1]
-    for place, value in zip(places, physical(free, specs, scales)[0], strict=True):
-        numbers[place] = on_device(np.asarray(value))
+    rows = np.r_[:size, -1]
     return ErrorFit(
-        replace_parameters(record_filter.model, numbers),
+        replace_at(record_filter.model, places, physical(free, specs, scales)[0]),
         places,
         sizes,
         way.deviance[0],
