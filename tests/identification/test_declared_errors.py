@@ -73,7 +73,7 @@ def test_declared_noise_of_the_drive_is_no_missing_effect(campaign_of, noisy):
     assert found.innovations.sizes.variance == pytest.approx(0.25, rel=0.2)
     verdict = diagnose(found)
     assert verdict.verdict == "none"
-    assert "as declared, of the drive" in verdict.reason
+    assert "noise of the drive, 0.5 N rms" in verdict.reason
 
 
 def test_a_declared_random_force_is_not_estimated(campaign_of, noisy):

@@ -25,7 +25,11 @@ def error_words(found: ErrorFit, fit: Fit, rules: Rules) -> str:
     unit = typeset_unit("m/s^2" if fit.model.excitation == "base_acceleration" else "N")
     force, declared = f"{np.sqrt(found.sizes.variance):.3g} {unit} rms", found.filter.measured.force[0]
     if found.is_noise and found.sizes.variance < rules.as_declared * declared**2:
-        return "What the model leaves is noise of the output and, as declared, of the drive."
+        drive = fit.campaign.input.noise
+        other = (
+            "the declared random force" if drive is None else f"noise of the drive, {drive:.3g} {unit} rms"
+        )
+        return f"What the model leaves is noise of the output and {other}."
     if found.is_noise:
         return (
             f"What the model leaves is noise of the output, and {force} of noise of the drive or of a force "

@@ -8,6 +8,7 @@ import numpy as np
 from ..._show import number, shown
 from ...records import NoiseEstimate, Record, estimate_noise
 from .._rules import Rules
+from ._errors import restarted_runs
 from ._fit_result import Fit
 
 
@@ -49,7 +50,8 @@ def drive_noise(fit: Fit, rules: Rules = Rules()) -> DriveNoise | None:
     ratio = fit.estimate.chi2 / fit.estimate.dof
     if fit.noise.method not in ("cycle_scatter", "periods") or ratio <= rules.good:
         return None
-    runs = [run for run in fit.restarts.runs if run.record.role == "fit"]
+    found = fit.estimate
+    runs = restarted_runs(found.simulator, found.model, found.point.nuisances)
     if not all(np.all(np.isfinite(run.residual)) for run in runs):
         return None
     seen = _noise_of(fit, tuple(dataclasses.replace(run.record, output=run.residual) for run in runs))

@@ -16,6 +16,7 @@ from ...models import Integrator, Isolator, Modelled, as_isolator, check_integra
 from ...records import Campaign, estimate_noise, refuse_contradictions
 from .._rules import Rules
 from ..guess import as_campaign, classical_guess, linear_starts
+from ._drive_noise import drive_noise
 from ._estimate import Estimate, estimate, free_places
 from ._fit_of_errors import fit_errors_of, suits_innovations
 from ._fit_result import Fit
@@ -156,7 +157,26 @@ def fit_by_output(
     if far or (lost and suits_innovations(campaign, stepped=True)):
         search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
-    return with_less_noise(complete(found, model, campaign, noise), search)
+    fitted = with_less_noise(complete(found, model, campaign, noise), search)
+    return _beside_noise_of_the_drive(fitted, search) if whole else fitted
+
+
+def _beside_noise_of_the_drive(found: Fit, search: Search) -> Fit:
+    """Fit again beside the noise of the drive channel, where dwells or periods show that it is what is left.
+
+    The fit stays where a filter needs more than that noise: it has no stiffness of each record.
+    """
+    campaign, rules = found.campaign, search.rules
+    seen = drive_noise(found, rules) if suits_innovations(campaign, stepped=True) else None
+    if seen is None:
+        return found
+    search.progress(f"the drive channel carries noise of {seen.drive:.3g} rms: again, beside it")
+    noisy = dataclasses.replace(campaign, input=dataclasses.replace(campaign.input, noise=seen.drive))
+    errors = fit_errors_of(found.model, found.estimate.places, noisy, search)
+    alone = errors.is_noise and errors.sizes.variance < rules.as_declared * seen.drive**2
+    if not (alone and is_successful(errors.result)):
+        return found
+    return fit_with_errors(errors, found.start, noisy, search)
 
 
 def weighted_by_residual(found: Fit, search: Search) -> Fit:
