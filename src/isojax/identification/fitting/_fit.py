@@ -164,7 +164,7 @@ def fit_by_output(
 def _beside_noise_of_the_drive(found: Fit, search: Search) -> Fit:
     """Fit again beside the noise of the drive channel, where dwells or periods show that it is what is left.
 
-    The fit stays where a filter needs more than that noise: it has no stiffness of each record.
+    The fit stays where a filter needs more than that noise.
     """
     campaign, rules = found.campaign, search.rules
     seen = drive_noise(found, rules) if suits_innovations(campaign, stepped=True) else None
@@ -172,7 +172,8 @@ def _beside_noise_of_the_drive(found: Fit, search: Search) -> Fit:
         return found
     search.progress(f"the drive channel carries noise of {seen.drive:.3g} rms: again, beside it")
     noisy = dataclasses.replace(campaign, input=dataclasses.replace(campaign.input, noise=seen.drive))
-    errors = fit_errors_of(found.model, found.estimate.places, noisy, search)
+    scatter = found.stats.stiffness_scatter
+    errors = fit_errors_of(found.model, found.estimate.places, noisy, search, scatter)
     alone = errors.is_noise and errors.sizes.variance < rules.as_declared * seen.drive**2
     if not (alone and is_successful(errors.result)):
         return found

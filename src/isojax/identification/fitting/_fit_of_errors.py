@@ -83,12 +83,13 @@ def _thinning(records: tuple[Record, ...], hold: Hold) -> int:
     return max(1, int(min(factor, samples / _LEAST_KEPT)))
 
 
-def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:
+def measured_of(campaign: Campaign, noise: NoiseEstimate, scatter: float = 0.0) -> Measured:
     """Give the records to fit, as a filter takes them.
 
     Args:
         campaign: the measurements.
         noise: of their output.
+        scatter: see `Measured`.
 
     Returns:
         The records, thinned where the output is slow.
@@ -104,6 +105,7 @@ def measured_of(campaign: Campaign, noise: NoiseEstimate) -> Measured:
         loudest,
         factor,
         _declared_force(campaign, factor),
+        scatter,
     )
 
 
@@ -118,19 +120,22 @@ def _declared_force(campaign: Campaign, factor: int) -> tuple[float, float]:
     return both, both
 
 
-def fit_errors_of(model: Isolator, places: tuple[int, ...], campaign: Campaign, search: Search) -> ErrorFit:
-    """Fit a model and the sizes of its errors to a campaign without dwells.
+def fit_errors_of(
+    model: Isolator, places: tuple[int, ...], campaign: Campaign, search: Search, scatter: float = 0.0
+) -> ErrorFit:
+    """Fit a model and the sizes of its errors to a campaign.
 
     Args:
         model: start.
         places: coefficients to fit.
         campaign: the measurements.
         search: the scales of the campaign.
+        scatter: see `Measured`.
 
     Returns:
         The fit.
     """
-    measured = measured_of(campaign, estimate_noise(campaign))
+    measured = measured_of(campaign, estimate_noise(campaign), scatter)
     sizes = magnitudes(model, places, search.scales)
     found = fit_measured(model, places, sizes, measured, starts=linear_starts(model, places))
     wells = None if found.is_noise else wells_start(model, places, search.scales)
@@ -182,7 +187,7 @@ def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fi
         deviance + 2.0 * count,
         found.criterion,
         found.steps,
-        0.0,
+        found.filter.scatter,
         0.0,
         math.nan,
         math.nan,

@@ -12,6 +12,7 @@ from ...elements import AbstractElement
 from ...models import Isolator
 from ..jacobian import (
     SCORE_PIECES,
+    STIFFNESS_SCALE_UNIT,
     Followed,
     Unknowns,
     has_stiffness_scale,
@@ -62,7 +63,9 @@ def effect_products(
     lanes, states = prepared.record.size, 2 + whole.internal_states
     starts = np.zeros((states, lanes))
     starts[2:] = internal_starts(whole, tables.records, prepared, carried)[0]
-    unknowns = Unknowns(whole, directions, np.ones(lanes), starts, np.ones((states, lanes)))
+    factors = np.ones(lanes)
+    factors[: fit.filter.count] = fit.filter.stiffness
+    unknowns = Unknowns(whole, directions, factors, starts, np.ones((states, lanes)))
     followed = [
         Followed(
             trace.states[:-1],
@@ -77,6 +80,13 @@ def effect_products(
     products = score_information(unknowns, carried, prepared, followed)
     columns, last = directions.shape[1], products.shape[1] - 1
     assert last == columns + int(has_stiffness_scale(whole)) + 2 + fitted.internal_states
+    if fit.filter.scatter > 0.0:  # the stiffness of each record is unknown
+        row, prior = products[:, columns].copy(), (STIFFNESS_SCALE_UNIT / fit.filter.scatter) ** 2
+        pull = prior * (factors - 1.0) / STIFFNESS_SCALE_UNIT
+        row[:, last] -= pull
+        row[:, last + 1 :] -= pull[:, None] / (products.shape[2] - last - 1)
+        known = row[:, columns] + prior
+        products = products - products[:, :, columns, None] * row[:, None] / known[:, None, None]
     # Between coefficients and residual stand the stiffness scale and the initial states of a simulation.
     keep = np.r_[0:columns, last]
     unit = np.r_[1.0 / own, np.ones(len(absent)), 1.0]

@@ -66,3 +66,9 @@ def _inverse(matrix: Float[np.ndarray, "state state"]) -> Float[np.ndarray, "sta
     """Invert a symmetric matrix of ones on its diagonal, whose rounding may have made it indefinite."""
     values, vectors = np.linalg.eigh(matrix)
     return (vectors / np.maximum(values, np.finfo(float).eps * values.size)) @ vectors.T
+
+
+def inverse(information: Float[np.ndarray, "column column"]) -> Float[np.ndarray, "column column"]:
+    """Give the covariance that belongs to an information, whatever the units of its columns."""
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    return _inverse(information * np.outer(unit, unit)) * np.outer(unit, unit)

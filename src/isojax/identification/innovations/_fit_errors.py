@@ -203,6 +203,7 @@ def fit_errors(
             break
         unit = np.r_[physical(free, specs, scales)[1], np.ones(len(products) - size)]
         first = record_filter.eliminate(products * np.outer(unit, unit)[..., None], slack)
+        record_filter.scatter_as(first, part > 0.0)
         tried, promised = _damped_steps(
             over(first.reduced), damping * _TRIED, np.where(bounded, _FAR + np.abs(free), np.inf)
         )
@@ -256,13 +257,13 @@ def fit_errors(
             break
         sizes, last = new, deviance
     way = followed([free] * COPIES, sizes.around())
-    rows = np.r_[:size, -1]
+    products, beside = record_filter.of_coefficients(record_filter.slopes(places, points([free])[0], way))
     return ErrorFit(
         replace_at(record_filter.model, places, physical(free, specs, scales)[0]),
         places,
         sizes,
-        way.deviance[0],
-        record_filter.slopes(places, points([free])[0], way)[np.ix_(rows, rows)],
+        way.deviance[0] + beside,
+        products,
         record_filter.samples,
         result,
         step,

@@ -171,9 +171,8 @@ def steps_are_fine(found: ErrorFit, share: float = SMALL_SHARE, rival: float = n
         Whether that is so.
     """
     finer = found.filter.with_steps(2 * found.filter.steps, found.model)
-    size = len(found.places)
-    change = finer.slopes(found.places, found.values, found.way).sum(axis=-1)[:, -1]
-    change = np.append(change[:size], change[-1]) - found.products.sum(axis=-1)[:, -1]
+    products, _ = finer.of_coefficients(finer.slopes(found.places, found.values, found.way))
+    change = (products - found.products).sum(axis=-1)[:, -1]
     moved = float(change[:-1] @ found.covariance @ change[:-1])
     risen = abs(float(change[-1]))
     if found.criterion - risen > rival:

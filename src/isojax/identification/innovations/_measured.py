@@ -28,6 +28,7 @@ class Measured:
         noise: Float[np.ndarray, " record"],
         factor: int = 1,
         force: tuple[float, float] = (0.0, np.inf),
+        scatter: float = 0.0,
     ):
         """Keep the records; nothing is tabulated yet.
 
@@ -38,9 +39,11 @@ class Measured:
             noise: rms that the noise of each record cannot exceed [SI unit of the output].
             factor: samples that become one, see `thin_record`.
             force: rms of the random force at least and at most, as declared [SI unit of the drive].
+            scatter: standard deviation of the linear stiffness from record to record, to start from
+                [relative]; 0 where all records have one stiffness.
         """
         records = tuple(thin_record(record, factor) for record in records)
-        self.records, self._factor, self.force = records, factor, force
+        self.records, self._factor, self.force, self.scatter = records, factor, force, scatter
         self.quantity: Quantity = quantity
         self.hold: Hold = hold
         ends = [(place, 0, record.output.size, record.settle) for place, record in enumerate(records)]

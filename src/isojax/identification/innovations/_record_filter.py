@@ -13,14 +13,17 @@ from jaxtyping import Array, Bool, Float, Int
 from ..._parameters import ParameterSpec, list_parameters
 from ..._types import on_device
 from ...models import Isolator, State
-from ..jacobian import FIRST_STATES, Batch, workers
+from ..jacobian import FIRST_STATES, Batch, stiffness_place, workers
 from ._filter import Followed, Lanes, follow_records, innovation_products
-from ._first_states import FirstStates, eliminate
+from ._first_states import FirstStates, eliminate, inverse
 from ._measured import Measured
 from ._sizes import SPACING, Sizes, Way
 
 COPIES = 7
 """Points at which a filter runs side by side: one, and six with other sizes."""
+
+_LEAST_SCATTER = 1e-5
+"""Least scatter of the linear stiffness from record to record [relative]."""
 
 _FINER = (1.0, 0.3, 0.1)
 """Spacing of the first states that are tried in turn, over that of `FIRST_STATES`."""
@@ -56,7 +59,15 @@ def physical(
 
 
 class RecordFilter:
-    """The filter of one model structure over records, each a lane from its first sample to its last."""
+    """The filter of one model structure over records, each a lane from its first sample to its last.
+
+    Where the linear stiffness scatters from record to record its relative deviation is a last row of the
+    first states: it follows the coefficients as these do.
+
+    Attributes:
+        starts: means of the first states of each record.
+        spread: their variances.
+    """
 
     def __init__(self, model: Isolator, measured: Measured, steps: int):
         """Keep what does not change; nothing is computed yet.
@@ -69,10 +80,13 @@ class RecordFilter:
         self.model, self.measured, self.tables = model, measured, measured.tables(steps)
         self.prepared = prepared = self.tables.prepared(model, len(model.elements))
         self.count = len(prepared.segments)
-        states = 2 + model.internal_states
-        self.starts, self.spread = np.zeros((states, self.count)), np.zeros((states, self.count))
+        self._states = 2 + model.internal_states
+        self._stiffness = stiffness_place(model) if measured.scatter > 0.0 else None
+        rows = self._states + (self._stiffness is not None)
+        self.starts, self.spread = np.zeros((rows, self.count)), np.zeros((rows, self.count))
         self.starts[:2] = prepared.starts[:, : self.count]
         self.spread[:2] = prepared.spread[:, : self.count] ** 2
+        self.spread[self._states :] = measured.scatter**2
         self._centers, self._prior = self.starts.copy(), self.spread.copy()
         self._tabled = (
             on_device(np.asarray(model.shift(), dtype=float)),
@@ -87,6 +101,16 @@ class RecordFilter:
     def feeds_through(self) -> bool:
         """Whether the random force acts straight on the reading, where a white one has no finite variance."""
         return self.measured.quantity == "acceleration" and self.model.excitation == "force"
+
+    @property
+    def scatter(self) -> float:
+        """Standard deviation of the linear stiffness from record to record [relative]; 0 where it is one."""
+        return 0.0 if self._stiffness is None else float(np.sqrt(self._prior[-1, 0]))
+
+    @property
+    def stiffness(self) -> Float[np.ndarray, " record"]:
+        """Factor on the linear stiffness of each record."""
+        return np.ones(self.count) if self._stiffness is None else 1.0 + self.starts[-1]
 
     @property
     def samples(self) -> float:
@@ -149,9 +173,12 @@ class RecordFilter:
                 on_device(np.repeat([one.correlation for one in sizes], width)),
                 on_device(np.exp([one.noise[known] for one in sizes]).ravel()),
                 self._start(part, copies, starts),
-                (*(on_device(np.tile(row[known], copies)) for row in self.spread), repeated),
+                (
+                    *(on_device(np.tile(row[known], copies)) for row in self.spread[: self._states]),
+                    repeated,
+                ),
             )
-            sampling, values = self.prepared.sampling, self._values(part, places, points)
+            sampling, values = self.prepared.sampling, self._values(part, places, points, starts)
             batch = self._batch(part, copies)
             return follow_records(
                 self.model,
@@ -195,12 +222,58 @@ class RecordFilter:
             motion diverged.
         """
         unit = np.eye(len(places) + len(self.starts))
-        directions = tuple(
-            on_device(unit[places.index(place)] if place in places else np.zeros(0))
+        columns = [
+            unit[places.index(place)] if place in places else np.zeros(0)
             for place in range(len(self._numbers))
-        )
-        first = np.vstack([unit[len(places) :], np.zeros(len(unit))])
+        ]
+        if self._stiffness is not None:
+            free = self._stiffness in places
+            number = point[places.index(self._stiffness)] if free else self._numbers[self._stiffness]
+            columns[self._stiffness] = (columns[self._stiffness] if free else 0.0) + number * unit[-1]
+        directions = tuple(map(on_device, columns))
+        first = np.vstack([unit[len(places) :][: self._states], np.zeros(len(unit))])
         return self._products(places, point[None], way, directions, first)[:, :, 0]
+
+    def of_coefficients(
+        self, products: Float[np.ndarray, "row row record"]
+    ) -> tuple[Float[np.ndarray, "kept kept record"], Float[np.ndarray, " record"]]:
+        """Take the first states out, the stiffness of each record as unknown.
+
+        Args:
+            products: of `slopes`.
+
+        Returns:
+            `A^T A` of coefficients and innovations; what the unknown stiffness adds to the deviance.
+        """
+        size = len(products) - len(self.starts) - 1
+        rows = np.r_[:size, len(products) - 1]
+        kept = products[np.ix_(rows, rows)]
+        if self._stiffness is None:
+            return kept, np.zeros(self.count)
+        row, variance, off = products[-2][rows], self._prior[-1], self.starts[-1]
+        row[-1] += off / variance
+        known = products[-2, -2] + 1.0 / variance
+        added = off**2 / variance + np.log(known * variance)
+        return kept - row[:, None] * row[None] / known, added
+
+    def scatter_as(self, first: FirstStates, judged: Bool[np.ndarray, " record"]) -> None:
+        """Let the stiffness scatter as that of the records does: a step of expectation and maximisation.
+
+        Args:
+            first: of `eliminate`, at the coefficients.
+            judged: the records that are fitted.
+
+        Source: Dempster, Laird & Rubin 1977, J. R. Stat. Soc. B 39:1; with the coefficients' own error, by
+        restricted likelihood.
+        """
+        if self._stiffness is None:
+            return
+        information = first.reduced[:-1, :-1, judged].sum(axis=-1)
+        along = first.along[-1][:, judged]
+        error = np.einsum("cr,cd,dr->r", along, inverse(information), along)
+        squares = self.starts[-1, judged] ** 2 + first.spread[-1, judged] + error
+        if np.all(np.isfinite(squares)):
+            self._prior[-1] = max(float(np.mean(squares)), _LEAST_SCATTER**2)
 
     def squares(
         self,
@@ -222,7 +295,7 @@ class RecordFilter:
         """
         # Always as many points, so that they share compiled code.
         chosen = np.minimum(np.arange(COPIES), len(points) - 1)
-        still = np.zeros((len(self.starts) + 1, 0))
+        still = np.zeros((self._states + 1, 0))
         begun = np.repeat(self.starts[None], len(points), axis=0) if starts is None else starts
         none = (on_device(np.zeros(0)),) * len(self._numbers)
         products = self._products(places, points[chosen], way, none, still, begun[chosen])
@@ -243,7 +316,7 @@ class RecordFilter:
             trace = way.traces[part]
             if copies > 1:
                 trace = jax.tree.map(lambda own: jnp.tile(own, copies), trace)
-            sampling, values = self.prepared.sampling, self._values(part, places, points)
+            sampling, values = self.prepared.sampling, self._values(part, places, points, starts)
             batch, memory = self._batch(part, copies), jnp.asarray(way.correlation)
             return innovation_products(
                 self.model,
@@ -267,7 +340,8 @@ class RecordFilter:
         Args:
             squares: mean square of each.
         """
-        self.spread[2:] = self._prior[2:] = np.where(np.isfinite(squares), squares, 0.0)
+        inner = slice(2, self._states)
+        self.spread[inner] = self._prior[inner] = np.where(np.isfinite(squares), squares, 0.0)
 
     def eliminate(
         self, products: Float[np.ndarray, "row row record"], damping: Float[np.ndarray, " record"]
@@ -341,29 +415,37 @@ class RecordFilter:
             best = np.argmin(found, axis=0)
             self.starts[:2] = center = tried[best, :, np.arange(self.count)].T
             self.spread[:2] = (finer * scale) ** 2
-        self._centers, self._prior = self.starts.copy(), self.spread.copy()
+        motion = slice(0, self._states)
+        self._centers[motion], self._prior[motion] = self.starts[motion], self.spread[motion]
 
     def _start(
         self, part: int, copies: int, starts: Float[np.ndarray, "copy state record"] | None = None
     ) -> State:
-        known, width = self._known(part)
-        rows = (
-            np.tile(self.starts[:, known], copies)
-            if starts is None
-            else np.concatenate(list(starts[:, :, known]), axis=1)
-        )
-        return (
-            *(on_device(row) for row in rows),
-            on_device(np.zeros(copies * width)),
-        )
+        rows = self._rows(part, copies, starts)[: self._states]
+        return (*(on_device(row) for row in rows), on_device(np.zeros(rows.shape[1])))
+
+    def _rows(
+        self, part: int, copies: int, starts: Float[np.ndarray, "copy state record"] | None
+    ) -> Float[np.ndarray, "state lane"]:
+        known = self._known(part)[0]
+        if starts is None:
+            return np.tile(self.starts[:, known], copies)
+        return np.concatenate(list(starts[:, :, known]), axis=1)
 
     def _values(
-        self, part: int, places: tuple[int, ...], points: Float[np.ndarray, "copy column"]
+        self,
+        part: int,
+        places: tuple[int, ...],
+        points: Float[np.ndarray, "copy column"],
+        starts: Float[np.ndarray, "copy state record"] | None = None,
     ) -> tuple[Array, ...]:
         width, numbers = self._known(part)[1], []
         for place, number in enumerate(self._numbers):
             column = points[:, places.index(place)] if place in places else np.full(len(points), number)
-            numbers.append(on_device(np.repeat(column, width)))
+            lanes = np.repeat(column, width)
+            if place == self._stiffness:
+                lanes = lanes * (1.0 + self._rows(part, len(points), starts)[-1])
+            numbers.append(on_device(lanes))
         return tuple(numbers)
 
     def by_record(self, parts: Sequence[Array | np.ndarray], copies: int) -> np.ndarray:
