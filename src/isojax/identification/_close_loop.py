@@ -38,13 +38,13 @@ from .fitting import (
     Fitted,
     Search,
     as_fit,
+    beside_own_noise,
     complete,
     fit_by_output,
     on_all_samples,
     search_of,
     thinned,
     unlocked_tone,
-    weighted_by_residual,
 )
 from .guess import ClassicalGuess, as_campaign, classical_guess
 from .remainder import Alternatives, Remainder, explain_remainder, find_alternatives
@@ -250,7 +250,7 @@ def _loop(
     judged = overall_verdict(before, after, len(names), verdict, rules, alternatives)
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.
-        before = after = weighted_by_residual(before, search)
+        before = after = beside_own_noise(before, search)
     # Asked for here, so that the time of the loop counts it.
     progress(Stage("free runs of every record", _RUNS))
     if is_successful(before.result) and is_successful(after.result):

@@ -97,7 +97,8 @@ def fit(
         named = tuple(element.name for element in model.elements)
         refuse_contradictions(dataclasses.replace(campaign, elements=named))
     search = search_of(campaign, rules, solver, progress, max_steps)
-    return weighted_by_residual(fit_by_output(model, campaign, search, places, integrator), search)
+    found = fit_by_output(model, campaign, search, places, integrator)
+    return beside_own_noise(found, search, integrator is None)
 
 
 def fit_by_output(
@@ -157,27 +158,36 @@ def fit_by_output(
     if far or (lost and suits_innovations(campaign, stepped=True)):
         search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
-    fitted = with_less_noise(complete(found, model, campaign, noise), search)
-    return _beside_noise_of_the_drive(fitted, search) if whole else fitted
+    return with_less_noise(complete(found, model, campaign, noise), search)
 
 
-def _beside_noise_of_the_drive(found: Fit, search: Search) -> Fit:
-    """Fit again beside the noise of the drive channel, where dwells or periods show that it is what is left.
+def beside_own_noise(found: Fit, search: Search, any_steps: bool = True) -> Fit:
+    """Fit again beside the noise of the drive, or by the noise that a good fit leaves.
 
-    The fit stays where a filter needs more than that noise.
+    Dwells and periods show whether noise of the drive channel is what the fit leaves. A filter then follows
+    the records, as under a random force; where it needs more than that noise, it does not stand.
+
+    Args:
+        found: a fit weighted by the noise that the output shows.
+        search: how to search.
+        any_steps: whether the integration steps are free.
+
+    Returns:
+        The fit.
     """
     campaign, rules = found.campaign, search.rules
-    seen = drive_noise(found, rules) if suits_innovations(campaign, stepped=True) else None
+    whole = any_steps and search.max_steps >= MOST_EVALUATIONS and found.innovations is None
+    seen = drive_noise(found, rules) if whole and suits_innovations(campaign, stepped=True) else None
     if seen is None:
-        return found
+        return weighted_by_residual(found, search)
     search.progress(f"the drive channel carries noise of {seen.drive:.3g} rms: again, beside it")
     noisy = dataclasses.replace(campaign, input=dataclasses.replace(campaign.input, noise=seen.drive))
     scatter = found.stats.stiffness_scatter
     errors = fit_errors_of(found.model, found.estimate.places, noisy, search, scatter)
     alone = errors.is_noise and errors.sizes.variance < rules.as_declared * seen.drive**2
     if not (alone and is_successful(errors.result)):
-        return found
-    return fit_with_errors(errors, found.start, noisy, search)
+        return weighted_by_residual(found, search)
+    return fit_with_errors(errors, found.start, campaign, search)
 
 
 def weighted_by_residual(found: Fit, search: Search) -> Fit:
@@ -209,6 +219,11 @@ def weighted_by_output(found: Fit, search: Search) -> Fit:
     Returns:
         The fit, as `fit_by_output` weighs it.
     """
+    if found.innovations is not None and found.innovations.filter.measured.force[0] > 0.0:
+        declared = found.campaign.input.noise is not None or found.campaign.random_force is not None
+        return (
+            found if declared else fit_by_output(found.model, found.campaign, search, found.estimate.places)
+        )
     jumps = found.model.splits and found.estimate.problem.is_uncut  # in the output they look like noise
     if found.noise.method != "residual" or found.innovations is not None or jumps:
         return found

@@ -70,5 +70,5 @@ def _inverse(matrix: Float[np.ndarray, "state state"]) -> Float[np.ndarray, "sta
 
 def inverse(information: Float[np.ndarray, "column column"]) -> Float[np.ndarray, "column column"]:
     """Give the covariance that belongs to an information, whatever the units of its columns."""
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    return _inverse(information * np.outer(unit, unit)) * np.outer(unit, unit)
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-150))
+    return _inverse(information * unit * unit[:, None]) * unit * unit[:, None]
