@@ -129,7 +129,7 @@ def test_noise_of_the_force_channel_is_named_as_the_cause(campaign_of, period):
     assert seen.output == pytest.approx(SENSOR, rel=0.05)
     if period is None:
         verdict = diagnose(weighted)
-        assert verdict.verdict == "unexplained"
+        assert verdict.verdict == "none"
         assert "The drive channel carries noise of" in verdict.reason
 
 

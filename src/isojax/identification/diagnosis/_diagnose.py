@@ -12,6 +12,7 @@ from .._rules import Rules
 from ..fitting import (
     DEFAULT_SOLVER,
     MOST_EVALUATIONS,
+    DriveNoise,
     Fit,
     Fitted,
     Search,
@@ -206,14 +207,16 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Diagnosis:
     # large. A free law like it does not.
     beside = trace_free_laws(case.seen, case.search) if good and tone is None else None
     law = None if beside is None else _clear_law(beside, rules)
-    verdict = "none" if good and tone is None and law is None else "unexplained"
+    noise = None if good or not leaves_noise(case.fit, rules) else drive_noise(case.fit, rules)
+    only_noise = good or noise is not None
+    verdict = "none" if only_noise and tone is None and law is None else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if tone is not None:
         words = tone.words(plain_unit("SI unit of the output", case.fit.campaign)) + "; "
     elif law is not None:
         words = f"The fit is good, but {law.force_words} stands out of what it leaves, z = {law.z:.3g}; "
     elif not good and leaves_noise(case.fit, rules):
-        words = _words_of_noise(case.fit, rules)
+        words = _words_of_noise(case.fit, noise)
     words = f"{words}{reason}."
     said = Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words, tone, law)
     return Diagnosis(said, beside if case.seen is case.fitted else None)
@@ -228,9 +231,8 @@ def _clear_law(beside: FreeTraces, rules: Rules) -> SelectedLaw | None:
     return laws[0] if gained > rules.close_bic else None
 
 
-def _words_of_noise(fit: Fit, rules: Rules) -> str:
-    """Word what exceeds the noise without coming back with the drive."""
-    seen = drive_noise(fit, rules)
+def _words_of_noise(fit: Fit, seen: DriveNoise | None) -> str:
+    """Word what exceeds the noise of the output without coming back with the drive."""
     if seen is None:
         return (
             "What exceeds the noise is not locked to the drive: the noise is larger than it was measured, or "
