@@ -168,6 +168,7 @@ def test_under_noise_of_the_force_channel_each_record_has_its_stiffness(simulate
     )
     assert found.innovations is not None
     assert np.sqrt(found.innovations.sizes.variance) == pytest.approx(3.0, rel=0.1)
+    assert found.stats.next_stiffness_scatter > found.stats.stiffness_scatter
     assert found.stats.stiffness_scatter == pytest.approx(scatter, rel=0.6, abs=5e-4)
     stiffness, error = (
         float(one["linear_stiffness.coefficient"]) for one in (found.model, found.standard_errors)

@@ -187,7 +187,9 @@ def beside_own_noise(found: Fit, search: Search, any_steps: bool = True) -> Fit:
     alone = errors.is_noise and errors.sizes.variance < rules.as_declared * seen.drive**2
     if not (alone and is_successful(errors.result)):
         return weighted_by_residual(found, search)
-    return fit_with_errors(errors, found.start, campaign, search)
+    again = fit_with_errors(errors, found.start, campaign, search)
+    further = found.stats.next_stiffness_scatter
+    return again._replace(stats=again.stats._replace(next_stiffness_scatter=further))
 
 
 def weighted_by_residual(found: Fit, search: Search) -> Fit:
