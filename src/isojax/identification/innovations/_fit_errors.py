@@ -10,7 +10,8 @@ from jaxtyping import Float
 from ..._parameters import list_parameters, replace_at, to_free
 from ..._results import RESULTS
 from ._error_fit import ErrorFit
-from ._record_filter import COPIES, RecordFilter, physical
+from ._physical import physical
+from ._record_filter import COPIES, RecordFilter
 from ._sizes import FURTHEST, Sizes, Way
 
 _MOST_SCORINGS = 40

@@ -1,6 +1,5 @@
 """A model's filter over the records of a campaign: many points at once, side by side."""
 
-import copy
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -8,57 +7,25 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
-from ..._parameters import ParameterSpec, list_parameters
+from ..._parameters import list_parameters
 from ..._types import on_device
 from ...models import Isolator, State
 from ..jacobian import FIRST_STATES, Batch, stiffness_place, workers
 from ._filter import Followed, Lanes, follow_records, innovation_products
-from ._first_states import FirstStates, eliminate, inverse
 from ._measured import Measured
+from ._record_starts import RecordStarts
 from ._sizes import SPACING, Sizes, Way
 
 COPIES = 7
 """Points at which a filter runs side by side: one, and six with other sizes."""
 
-_LEAST_SCATTER = 1e-5
-"""Least scatter of the linear stiffness from record to record [relative]."""
-
 _FINER = (1.0, 0.3, 0.1)
 """Spacing of the first states that are tried in turn, over that of `FIRST_STATES`."""
 
 
-def physical(
-    free: Float[np.ndarray, " column"], specs: tuple[ParameterSpec, ...], scales: tuple[float, ...]
-) -> tuple[Float[np.ndarray, " column"], Float[np.ndarray, " column"]]:
-    """Give the physical numbers of unbounded variables, and their slopes: `to_physical`, by NumPy.
-
-    Args:
-        free: the unbounded variables.
-        specs: declarations with the bounds.
-        scales: magnitudes of the numbers.
-
-    Returns:
-        Both.
-    """
-    numbers, slopes = np.empty(len(specs)), np.empty(len(specs))
-    for place, (value, spec, scale) in enumerate(zip(free, specs, scales, strict=True)):
-        low, high = np.isfinite(spec.lower), np.isfinite(spec.upper)
-        rising = np.exp(-np.logaddexp(0.0, -value))
-        if low and high:
-            numbers[place] = spec.lower + (spec.upper - spec.lower) * rising
-            slopes[place] = (spec.upper - spec.lower) * rising * (1.0 - rising)
-        elif low or high:
-            sign = 1.0 if low else -1.0
-            numbers[place] = (spec.lower if low else spec.upper) + sign * scale * np.logaddexp(0.0, value)
-            slopes[place] = sign * scale * rising
-        else:
-            numbers[place], slopes[place] = scale * value, scale
-    return numbers, slopes
-
-
-class RecordFilter:
+class RecordFilter(RecordStarts):
     """The filter of one model structure over records, each a lane from its first sample to its last.
 
     Where the linear stiffness scatters from record to record its relative deviation is a last row of the
@@ -79,15 +46,11 @@ class RecordFilter:
         """
         self.model, self.measured, self.tables = model, measured, measured.tables(steps)
         self.prepared = prepared = self.tables.prepared(model, len(model.elements))
-        self.count = len(prepared.segments)
-        self._states = 2 + model.internal_states
         self._stiffness = stiffness_place(model) if measured.scatter > 0.0 else None
-        rows = self._states + (self._stiffness is not None)
-        self.starts, self.spread = np.zeros((rows, self.count)), np.zeros((rows, self.count))
-        self.starts[:2] = prepared.starts[:, : self.count]
-        self.spread[:2] = prepared.spread[:, : self.count] ** 2
-        self.spread[self._states :] = measured.scatter**2
-        self._centers, self._prior = self.starts.copy(), self.spread.copy()
+        lanes = len(prepared.segments)
+        starts, spread = np.zeros((2, 2 + model.internal_states, lanes))
+        starts[:2], spread[:2] = prepared.starts[:, :lanes], prepared.spread[:, :lanes] ** 2
+        super().__init__(starts, spread, 0.0 if self._stiffness is None else measured.scatter)
         self._tabled = (
             on_device(np.asarray(model.shift(), dtype=float)),
             on_device(np.asarray(model.skew(), dtype=float)),
@@ -101,16 +64,6 @@ class RecordFilter:
     def feeds_through(self) -> bool:
         """Whether the random force acts straight on the reading, where a white one has no finite variance."""
         return self.measured.quantity == "acceleration" and self.model.excitation == "force"
-
-    @property
-    def scatter(self) -> float:
-        """Standard deviation of the linear stiffness from record to record [relative]; 0 where it is one."""
-        return 0.0 if self._stiffness is None else float(np.sqrt(self._prior[-1, 0]))
-
-    @property
-    def stiffness(self) -> Float[np.ndarray, " record"]:
-        """Factor on the linear stiffness of each record."""
-        return np.ones(self.count) if self._stiffness is None else 1.0 + self.starts[-1]
 
     @property
     def samples(self) -> float:
@@ -135,13 +88,6 @@ class RecordFilter:
         other = RecordFilter(model, self.measured, steps)
         other.starts, other.spread = self.starts.copy(), self.spread.copy()
         other._centers, other._prior = self._centers.copy(), self._prior.copy()
-        return other
-
-    def with_own_starts(self) -> "RecordFilter":
-        """Give the same filter, whose first states may move while those of this one stay."""
-        other = copy.copy(self)
-        for name in ("starts", "spread", "_centers", "_prior"):
-            setattr(other, name, getattr(self, name).copy())
         return other
 
     def follow(
@@ -234,47 +180,6 @@ class RecordFilter:
         first = np.vstack([unit[len(places) :][: self._states], np.zeros(len(unit))])
         return self._products(places, point[None], way, directions, first)[:, :, 0]
 
-    def of_coefficients(
-        self, products: Float[np.ndarray, "row row record"]
-    ) -> tuple[Float[np.ndarray, "kept kept record"], Float[np.ndarray, " record"]]:
-        """Take the first states out, the stiffness of each record as unknown.
-
-        Args:
-            products: of `slopes`.
-
-        Returns:
-            `A^T A` of coefficients and innovations; what the unknown stiffness adds to the deviance.
-        """
-        size = len(products) - len(self.starts) - 1
-        rows = np.r_[:size, len(products) - 1]
-        kept = products[np.ix_(rows, rows)]
-        if self._stiffness is None:
-            return kept, np.zeros(self.count)
-        row, variance, off = products[-2][rows], self._prior[-1], self.starts[-1]
-        row[-1] += off / variance
-        known = products[-2, -2] + 1.0 / variance
-        added = off**2 / variance + np.log(known * variance)
-        return kept - row[:, None] * row[None] / known, added
-
-    def scatter_as(self, first: FirstStates, judged: Bool[np.ndarray, " record"]) -> None:
-        """Let the stiffness scatter as that of the records does: a step of expectation and maximisation.
-
-        Args:
-            first: of `eliminate`, at the coefficients.
-            judged: the records that are fitted.
-
-        Source: Dempster, Laird & Rubin 1977, J. R. Stat. Soc. B 39:1; with the coefficients' own error, by
-        restricted likelihood.
-        """
-        if self._stiffness is None:
-            return
-        information = first.reduced[:-1, :-1, judged].sum(axis=-1)
-        along = first.along[-1][:, judged]
-        error = np.einsum("cr,cd,dr->r", along, inverse(information), along)
-        squares = self.starts[-1, judged] ** 2 + first.spread[-1, judged] + error
-        if np.all(np.isfinite(squares)):
-            self._prior[-1] = max(float(np.mean(squares)), _LEAST_SCATTER**2)
-
     def squares(
         self,
         places: tuple[int, ...],
@@ -333,51 +238,6 @@ class RecordFilter:
             )
 
         return self.by_record(self._in_parts(one), copies)
-
-    def widen(self, squares: Float[np.ndarray, "internal record"]) -> None:
-        """Let the internal states begin anywhere in the range that they visit.
-
-        Args:
-            squares: mean square of each.
-        """
-        inner = slice(2, self._states)
-        self.spread[inner] = self._prior[inner] = np.where(np.isfinite(squares), squares, 0.0)
-
-    def eliminate(
-        self, products: Float[np.ndarray, "row row record"], damping: Float[np.ndarray, " record"]
-    ) -> FirstStates:
-        """Give how the first states of each record follow the coefficients.
-
-        A filter corrects its start by the first samples. Where its spread was too small, or a law jumps, that
-        does not do: the position at which dry friction holds a mass shows much later.
-
-        Args:
-            products: of `slopes`.
-            damping: Marquardt's, of the first states of each record.
-
-        Returns:
-            The steps of Gauss and Newton.
-        """
-        return eliminate(products, self.starts, self._centers, self._prior, damping)
-
-    def penalties(self, starts: Float[np.ndarray, "copy state record"]) -> Float[np.ndarray, "copy record"]:
-        """Give what first states cost that lie off their centres."""
-        return np.sum((starts - self._centers) ** 2 / np.maximum(self._prior, 1e-300), axis=1)
-
-    def begin(
-        self,
-        starts: Float[np.ndarray, "state record"],
-        spread: Float[np.ndarray, "state record"],
-        where: Bool[np.ndarray, " record"],
-    ) -> None:
-        """Begin some records elsewhere.
-
-        Args:
-            starts: means of the first states.
-            spread: their variances.
-            where: the records.
-        """
-        self.starts, self.spread = np.where(where, starts, self.starts), np.where(where, spread, self.spread)
 
     def _in_parts(self, work: Callable[[int], Any]) -> list[Any]:
         """Work on each batch in a thread of its own."""
