@@ -1,18 +1,19 @@
 """Noise of the drive channel, which the output does not show: an oscillator that SciPy solves exactly."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import lsim
+from scipy.signal import freqz, lsim, welch
 
 from isojax import rig
 from isojax._progress import silent
 from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness
 from isojax.identification import Rules, diagnose, fit
 from isojax.identification.fitting import DEFAULT_SOLVER, drive_noise, search_of, weighted_by_output
-from isojax.models import Isolator
+from isojax.models import Integrator, Isolator
 from isojax.records import Dwell, Record, estimate_noise, quieter_noise
 
 RATE, SENSOR, FORCE = 250.0, 0.003, 4.0
@@ -66,9 +67,10 @@ def noisy_record(seed, measured, acting, period=None):
     )
 
 
-def fitted(campaign_of, records):
+def fitted(campaign_of, records, integrator=None):
     campaign = campaign_of(records, stiffness=("linear",), damping=("linear",), input={"hold": "linear"})
-    return fit(Isolator(MASS, (LinearStiffness(0.97e6), LinearDamping(5e3))), campaign)
+    start = Isolator(MASS, (LinearStiffness(0.97e6), LinearDamping(5e3)))
+    return fit(start, campaign, integrator=integrator)
 
 
 @pytest.mark.parametrize(
@@ -115,6 +117,29 @@ def test_noise_of_the_force_channel_is_a_random_force(campaign_of, period):
     assert np.sqrt(found.innovations.sizes.variance) == pytest.approx(FORCE, rel=0.1)
     assert np.exp(0.5 * found.innovations.sizes.noise) == pytest.approx(SENSOR, rel=0.1)
     assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("period", [None, 1250])
+def test_noise_of_the_force_channel_weighs_the_residual_where_steps_are_given(campaign_of, period):
+    records = tuple(noisy_record(place, FORCE, 0.0, period) for place in range(2))
+    found = fitted(campaign_of, records, Integrator(substeps=2))
+    # What the oscillator makes of white noise that is straight between samples.
+    heard = response(FORCE * np.random.default_rng(99).standard_normal(200_000))
+    assert found.noise.method == "residual"
+    assert found.noise.sigma == pytest.approx(np.hypot(SENSOR, np.std(heard)), rel=0.1)
+    assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.03)
+    assert re.search(r"drive channel, whose own noise is (3\.[89]|4\.[01])", found.noise.note)
+    # Its density is that of both noises together, as Welch sees it.
+    frequencies, density = welch(heard, RATE, nperseg=1024)
+    density += 2.0 * SENSOR**2 / RATE
+    own = found.noise.colour
+    seen = (
+        2.0 / RATE * own.innovation**2 / np.abs(freqz([1.0], [1.0, *own.law], frequencies, fs=RATE)[1]) ** -2
+    )
+    near = (frequencies > 4.0) & (frequencies < 7.0)
+    assert np.mean(density[near]) > 3.0 * np.median(density)
+    assert np.mean(seen[near]) == pytest.approx(np.mean(density[near]), rel=0.2)
+    assert np.median(seen) == pytest.approx(np.median(density), rel=0.1)
 
 
 @pytest.mark.parametrize("period", [None, 1250])

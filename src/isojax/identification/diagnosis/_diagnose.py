@@ -207,15 +207,15 @@ def weigh_refits(case: Case, refits: list[Refit]) -> Diagnosis:
     # large. A free law like it does not.
     beside = trace_free_laws(case.seen, case.search) if good and tone is None else None
     law = None if beside is None else _clear_law(beside, rules)
-    noise = None if good or not leaves_noise(case.fit, rules) else drive_noise(case.fit, rules)
-    only_noise = good or noise is not None
-    verdict = "none" if only_noise and tone is None and law is None else "unexplained"
+    repeats_nothing = not good and leaves_noise(case.fit, rules)
+    noise = drive_noise(case.fit, rules) if repeats_nothing else None
+    verdict = "none" if (good or noise is not None) and tone is None and law is None else "unexplained"
     words = "The fit is good and " if good else "The fit is not good, but "
     if tone is not None:
         words = tone.words(plain_unit("SI unit of the output", case.fit.campaign)) + "; "
     elif law is not None:
         words = f"The fit is good, but {law.force_words} stands out of what it leaves, z = {law.z:.3g}; "
-    elif not good and leaves_noise(case.fit, rules):
+    elif repeats_nothing:
         words = _words_of_noise(case.fit, noise)
     words = f"{words}{reason}."
     said = Verdict(verdict, None, ranking, (), 1.0, test.hidden, bounds, None, words, tone, law)

@@ -10,6 +10,7 @@ from ..._parameters import list_parameters
 from ..._results import RESULTS
 from ...models import Isolator
 from ._ahead import free_squares
+from ._first_states import covariance_of
 from ._measured import Measured
 from ._record_filter import COPIES, RecordFilter
 from ._sizes import Sizes, Way
@@ -80,11 +81,7 @@ class ErrorFit:
     @property
     def covariance(self) -> Float[np.ndarray, "column column"]:
         """Of the coefficients [product of their units]; zero where the records determine nothing."""
-        information = self.information
-        # Stiffness in N/m and in N/m^3 would spoil each other.
-        size = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-        scales = np.outer(size, size)
-        return np.linalg.pinv(information * scales, rcond=1e-12, hermitian=True) * scales
+        return covariance_of(self.information)
 
     @property
     def chi2(self) -> float:

@@ -68,7 +68,16 @@ def _inverse(matrix: Float[np.ndarray, "state state"]) -> Float[np.ndarray, "sta
     return (vectors / np.maximum(values, np.finfo(float).eps * values.size)) @ vectors.T
 
 
-def inverse(information: Float[np.ndarray, "column column"]) -> Float[np.ndarray, "column column"]:
-    """Give the covariance that belongs to an information, whatever the units of its columns."""
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-150))
-    return _inverse(information * unit * unit[:, None]) * unit * unit[:, None]
+def covariance_of(information: Float[np.ndarray, "column column"]) -> Float[np.ndarray, "column column"]:
+    """Give the covariance of coefficients from their information; zero where nothing is determined.
+
+    Args:
+        information: of the coefficients [inverse product of their units].
+
+    Returns:
+        Their covariance [product of their units].
+    """
+    # Stiffness in N/m and in N/m^3 would spoil each other.
+    size = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scales = np.outer(size, size)
+    return np.linalg.pinv(information * scales, rcond=1e-12, hermitian=True) * scales

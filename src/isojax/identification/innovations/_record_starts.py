@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ._first_states import FirstStates, eliminate, inverse
+from ._first_states import FirstStates, covariance_of, eliminate
 
 _LEAST_SCATTER = 1e-5
 """Least scatter of the linear stiffness from record to record [relative]."""
@@ -64,7 +64,7 @@ class RecordStarts:
     def of_coefficients(
         self, products: Float[np.ndarray, "row row record"]
     ) -> tuple[Float[np.ndarray, "kept kept record"], Float[np.ndarray, " record"]]:
-        """Take the first states out, the stiffness of each record as unknown.
+        """Leave out the first states, and eliminate the stiffness of each record.
 
         Args:
             products: of `slopes`.
@@ -97,7 +97,7 @@ class RecordStarts:
             return
         information = first.reduced[:-1, :-1, judged].sum(axis=-1)
         along = first.along[-1][:, judged]
-        error = np.einsum("cr,cd,dr->r", along, inverse(information), along)
+        error = np.einsum("cr,cd,dr->r", along, covariance_of(information), along)
         squares = self.starts[-1, judged] ** 2 + first.spread[-1, judged] + error
         if np.all(np.isfinite(squares)):
             self._prior[-1] = max(float(np.mean(squares)), _LEAST_SCATTER**2)
