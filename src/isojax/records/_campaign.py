@@ -164,6 +164,12 @@ class Campaign:
         return tuple(record for record in self.records if record.role == "fit")
 
     @property
+    def lacks_mean(self) -> bool:
+        """Whether the mean of a displacement to fit was removed: each record then has a zero of its own."""
+        shifted = self.output.quantity == "displacement"  # other quantities have no mean of their own
+        return shifted and any(record.mean_removed for record in self.fit_records)
+
+    @property
     def holdout_records(self) -> tuple[Record, ...]:
         """Records that only evaluate a fit."""
         return tuple(record for record in self.records if record.role == "holdout")

@@ -41,6 +41,10 @@ class Dwell:
         )
 
 
+_NO_MEAN = 1e-6
+"""Mean of an output over its standard deviation below which it was subtracted."""
+
+
 @shown
 @dataclass(frozen=True, eq=False)
 class Record:
@@ -115,6 +119,11 @@ class Record:
         """Operating conditions that are stated, by name [SI]; repeats have equal ones."""
         stated = ((name, getattr(self, name)) for name in CONDITIONS)
         return tuple((name, value) for name, value in stated if value is not None)
+
+    @property
+    def mean_removed(self) -> bool:
+        """Whether the output has no mean at all: it was subtracted, and a mean of the motion with it."""
+        return bool(abs(self.output.mean()) < _NO_MEAN * self.output.std())
 
     @property
     def rings_down(self) -> bool:

@@ -112,7 +112,9 @@ def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ())
     probes = tuple(
         probe
         for probe in absent_effects(fit.model, search.scales, excluded)
-        if probe.name not in pointless and not probe.phased
+        if probe.name not in pointless
+        and not probe.phased
+        and not (fit.filter.zeros is not None and probe.starts_at_mean)  # known of no record
     )
     units = np.array([1e-3 * probe.typical_strength(search.scales) for probe in probes])
     products, count = effect_products(fit, probes, units), len(fit.places)

@@ -1,5 +1,6 @@
 """How far a model is from records: free runs from start to end, and restarts at every segment."""
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -153,7 +154,8 @@ def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
     """Simulate each record from its start to its end with nothing fed back.
 
     The initial state comes from the samples that the campaign gives for it (`settle`), else from the first
-    second; internal states start at rest, and no stiffness scale is applied.
+    second; internal states start at rest, and no stiffness scale is applied. Where the mean of a record was
+    removed that of its run is, too.
 
     Args:
         problem: the records.
@@ -162,6 +164,28 @@ def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
     Returns:
         One run a record.
     """
+    runs, records = _run_once(problem, model), problem.records
+    means = [_removed_mean(run) for run in runs]
+    if not np.any(means):
+        return runs
+    # Initial states are sought with the mean that a record had.
+    whole = [
+        dataclasses.replace(record, output=record.output + mean)
+        for record, mean in zip(records, means, strict=True)
+    ]
+    runs = _run_once(problem._replace(records=tuple(whole)), model)
+    runs = tuple(run._replace(record=record) for run, record in zip(runs, records, strict=True))
+    return tuple(run._replace(simulated=run.simulated - _removed_mean(run)) for run in runs)
+
+
+def _removed_mean(run: Run) -> float:
+    """Give the mean that was removed from a record, as its simulation has it; 0 where it diverged."""
+    mean = float(np.mean(run.simulated)) if run.record.mean_removed else 0.0
+    return mean if np.isfinite(mean) else 0.0
+
+
+def _run_once(problem: Problem, model: Isolator) -> tuple[Run, ...]:
+    """Simulate each record, its output as it stands."""
     records = problem.records
     initial = find_initial_states(problem, model)
     whole = problem._replace(

@@ -130,7 +130,9 @@ def fit_by_output(
     declared = campaign.input.noise is not None or campaign.random_force is not None
     followed = whole and suits_innovations(campaign, stepped=declared)
     # Under base excitation the drive is as noisy as the response: both are readings of accelerometers.
-    if followed and (declared or campaign.input.quantity == "base_acceleration"):
+    noisy = declared or campaign.input.quantity == "base_acceleration"
+    any_followed = whole and suits_innovations(campaign, stepped=True)
+    if (followed and noisy) or (any_followed and campaign.lacks_mean):
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     if not (np.isfinite(noise.sigma) and noise.sigma > 0.0):
         raise ValueError(
@@ -155,7 +157,7 @@ def fit_by_output(
     usual = is_successful(found.result) and found.chi2 < search.rules.contradicted * found.dof
     lost = whole and (not is_successful(found.result) or found.chi2 > still(found.problem))
     far = followed and not (usual and loudness(noise, campaign) < search.rules.loudest)
-    if far or (lost and suits_innovations(campaign, stepped=True)):
+    if far or (lost and any_followed):
         search.progress("the model leaves far more than noise: again, with a random force")
         return fit_with_errors(fit_errors_of(model, places, campaign, search), model, campaign, search)
     return with_less_noise(complete(found, model, campaign, noise), search)

@@ -39,7 +39,8 @@ def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search
     """Make a fit of a model that was fitted together with the sizes of its errors.
 
     Where noise of the output is the only error, a search without a random force ends it: initial states are
-    then exact. Of a law that jumps the filter has them, and sees jumps that are misplaced as such.
+    then exact. Of a law that jumps the filter has them, and sees jumps that are misplaced as such; of records
+    whose mean was removed it has the zeros.
 
     Args:
         found: the model with the sizes of its errors.
@@ -50,7 +51,7 @@ def fit_with_errors(found: ErrorFit, start: Isolator, campaign: Campaign, search
     Returns:
         The fit.
     """
-    if found.is_noise_of_output and not found.model.splits:
+    if found.is_noise_of_output and not found.model.splits and found.filter.zeros is None:
         noise = noise_of_errors(found, campaign, alone=True)
         simulator = simulator_for(found.model, campaign, noise, None, uncut=True)
         near = search._replace(max_steps=_FEW_STEPS)

@@ -109,6 +109,11 @@ def _cautions(
         notes.append("Mass and input gain cannot be separated: the mass stays as declared.")
     if campaign.mass_free and found.model.excitation == "base_acceleration":
         notes.append("Base excitation determines ratios to the mass only: the mass stays as declared.")
+    if campaign.lacks_mean:
+        notes.append(
+            "The mean of the displacement was removed, and the rest of the mass with it: each record is "
+            "fitted with a zero of its own."
+        )
     if found.unexplained > _HARDLY_BALANCED:
         notes.append(
             f"The start leaves {found.unexplained:.0%} of the force unbalanced: check sign, unit and timing "

@@ -18,6 +18,7 @@ from ..jacobian import (
     has_stiffness_scale,
     internal_starts,
     score_information,
+    with_zero,
 )
 from ._error_fit import ErrorFit
 
@@ -49,7 +50,8 @@ def effect_products(
     Returns:
         The products.
     """
-    tables, fitted = fit.filter.tables, fit.model
+    tables, own_zeros = fit.filter.tables, fit.filter.zeros
+    fitted, zero = (fit.model, None) if own_zeros is None else with_zero(fit.model)
     whole = Isolator(fitted.mass, (*fitted.elements, *absent), fitted.excitation)
     carried = len(fitted.elements)
     listed, prepared = list_parameters(whole), tables.prepared(whole, carried)
@@ -58,13 +60,23 @@ def effect_products(
     strengths = [place_of[f"{name}.{one.strength}"] for name, one in zip(names, absent, strict=True)]
     # Products of columns of the same size keep their digits.
     own = 1.0 / np.sqrt(np.maximum(np.diag(fit.information), 1e-300))
-    directions = np.zeros((len(listed), len(fit.places) + len(absent)))
-    directions[[*fit.places, *strengths], range(directions.shape[1])] = [*own, *units]
+    places = [*fit.places, *strengths]
+    directions = np.zeros((len(listed), len(places) + (zero is not None)))
+    directions[places, range(len(places))] = [*own, *units]
     lanes, states = prepared.record.size, 2 + whole.internal_states
     starts = np.zeros((states, lanes))
     starts[2:] = internal_starts(whole, tables.records, prepared, carried)[0]
     factors = np.ones(lanes)
     factors[: fit.filter.count] = fit.filter.stiffness
+    unknown = []  # of each record: its column, and its deviation and prior variance in units of that
+    if zero is not None and own_zeros is not None:
+        zeros, variance = own_zeros
+        directions[zero, -1] = unit = float(np.sqrt(variance.max()))
+        unknown.append((len(places), zeros / unit, variance / unit**2))
+    if fit.filter.scatter > 0.0:
+        variance = np.full(fit.filter.count, (fit.filter.scatter / STIFFNESS_SCALE_UNIT) ** 2)
+        deviation = (fit.filter.stiffness - 1.0) / STIFFNESS_SCALE_UNIT
+        unknown.append((directions.shape[1], deviation, variance))
     unknowns = Unknowns(whole, directions, factors, starts, np.ones((states, lanes)))
     followed = [
         Followed(
@@ -80,15 +92,17 @@ def effect_products(
     products = score_information(unknowns, carried, prepared, followed)
     columns, last = directions.shape[1], products.shape[1] - 1
     assert last == columns + int(has_stiffness_scale(whole)) + 2 + fitted.internal_states
-    if fit.filter.scatter > 0.0:  # the stiffness of each record is unknown
-        row, prior = products[:, columns].copy(), (STIFFNESS_SCALE_UNIT / fit.filter.scatter) ** 2
-        pull = prior * (factors - 1.0) / STIFFNESS_SCALE_UNIT
-        row[:, last] -= pull
-        row[:, last + 1 :] -= pull[:, None] / (products.shape[2] - last - 1)
-        known = row[:, columns] + prior
-        products = products - products[:, :, columns, None] * row[:, None] / known[:, None, None]
+    for column, deviation, variance in unknown:
+        row, used = products[:, column].copy(), slice(fit.filter.count)
+        pull = deviation / variance
+        row[used, last] -= pull
+        row[used, last + 1 :] -= pull[:, None] / (products.shape[2] - last - 1)
+        known = row[:, column].copy()
+        known[used] += 1.0 / variance
+        known = np.where(known > 0.0, known, np.inf)  # of a lane without a record
+        products = products - products[:, :, column, None] * row[:, None] / known[:, None, None]
     # Between coefficients and residual stand the stiffness scale and the initial states of a simulation.
-    keep = np.r_[0:columns, last]
+    keep = np.r_[0 : len(places), last]
     unit = np.r_[1.0 / own, np.ones(len(absent)), 1.0]
     pieces = np.moveaxis(products[:, keep, last + 1 :], 0, 1).reshape(keep.size, -1)
     whole = products[:, keep[:, None], keep].sum(axis=0)

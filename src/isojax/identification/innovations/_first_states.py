@@ -5,6 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+_FURTHEST_DOWN = 1e-3
+"""Share of the variance of a first state that a step leaves at least."""
+
 
 class FirstStates(NamedTuple):
     """Normal equations of the coefficients, without the first states of each record, and what these do.
@@ -28,6 +31,7 @@ def eliminate(
     centers: Float[np.ndarray, "state record"],
     prior: Float[np.ndarray, "state record"],
     damping: Float[np.ndarray, " record"],
+    given: Float[np.ndarray, "state record"],
 ) -> FirstStates:
     """Solve for the first states of each record.
 
@@ -37,6 +41,7 @@ def eliminate(
         centers: their means before the record was seen.
         prior: their variances before.
         damping: Marquardt's, of each record.
+        given: variances with which a filter of these products began; 0 of what it does not estimate.
 
     Returns:
         The equations that are left. Where the products are not finite the first states stay.
@@ -58,8 +63,25 @@ def eliminate(
         back = (own / unit)[:, None] * (damped @ (outer / unit[:, None]))
         reduced[:, :, record] -= (outer / own[:, None]).T @ back
         settled[:, record], along[:, :, record] = -back[:, -1], -back[:, :-1]
-        spread[:, record] = (own / unit) ** 2 * np.diag(_inverse(known))
+        whole_known = _without(inner, given[:, record] / own**2) + np.eye(size)
+        unit = np.sqrt(np.diag(whole_known))
+        spread[:, record] = (own / unit) ** 2 * np.diag(_inverse(whole_known / np.outer(unit, unit)))
     return FirstStates(reduced, settled, along, spread)
+
+
+def _without(
+    information: Float[np.ndarray, "state state"], given: Float[np.ndarray, " state"]
+) -> Float[np.ndarray, "state state"]:
+    """Give what a record tells of its first state where a filter began with a variance of its own.
+
+    The innovations hold that variance: the inverse of their information is the sum of both.
+    """
+    root = np.sqrt(given)
+    shares, vectors = np.linalg.eigh(information * np.outer(root, root))
+    # Where all but nothing is left a step takes a variance down by as much as it may.
+    lost = np.clip(shares, 0.0, 1.0 - _FURTHEST_DOWN)
+    across = (information * root) @ vectors
+    return information + (across / (1.0 - lost)) @ across.T
 
 
 def _inverse(matrix: Float[np.ndarray, "state state"]) -> Float[np.ndarray, "state state"]:

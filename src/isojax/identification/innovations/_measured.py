@@ -18,6 +18,10 @@ class Measured:
     """Records to fit, each from its first sample to its last.
 
     A single record is cut in the middle, so that one half can predict the other.
+
+    Attributes:
+        zeros: standard deviation of the zero of each segment's displacement [m]: its rms where the mean of
+            its record was removed, else 0.
     """
 
     def __init__(
@@ -42,7 +46,7 @@ class Measured:
             scatter: standard deviation of the linear stiffness from record to record, to start from
                 [relative]; 0 where all records have one stiffness.
         """
-        records = tuple(thin_record(record, factor) for record in records)
+        recorded, records = records, tuple(thin_record(record, factor) for record in records)
         self.records, self._factor, self.force, self.scatter = records, factor, force, scatter
         self.quantity: Quantity = quantity
         self.hold: Hold = hold
@@ -51,6 +55,9 @@ class Measured:
             (place, start, stop, settle), middle = ends[0], records[0].output.size // 2
             ends = [(place, start, middle, settle), (place, middle, stop, middle)]
         self.segments = tuple(Segment(*each) for each in ends)
+        shifted = quantity == "displacement"
+        zeros = [one.output.std() if shifted and one.mean_removed else 0.0 for one in recorded]
+        self.zeros = np.array([zeros[one.record] for one in self.segments])
         self.loudest = 2.0 * np.log(noise[[one.record for one in self.segments]])
         self._tables: dict[int, Tables] = {}
 

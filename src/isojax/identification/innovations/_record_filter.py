@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 from ..._parameters import list_parameters
 from ..._types import on_device
 from ...models import Isolator, State
-from ..jacobian import FIRST_STATES, Batch, stiffness_place, workers
+from ..jacobian import FIRST_STATES, Batch, stiffness_place, with_zero, workers
 from ._filter import Followed, Lanes, follow_records, innovation_products
 from ._measured import Measured
 from ._record_starts import RecordStarts
@@ -28,12 +28,10 @@ _FINER = (1.0, 0.3, 0.1)
 class RecordFilter(RecordStarts):
     """The filter of one model structure over records, each a lane from its first sample to its last.
 
-    Where the linear stiffness scatters from record to record its relative deviation is a last row of the
-    first states: it follows the coefficients as these do.
-
     Attributes:
         starts: means of the first states of each record.
         spread: their variances.
+        followed: the model, and the zero error of its sensor where that differs from record to record.
     """
 
     def __init__(self, model: Isolator, measured: Measured, steps: int):
@@ -45,19 +43,22 @@ class RecordFilter(RecordStarts):
             steps: integration steps a sample, at least.
         """
         self.model, self.measured, self.tables = model, measured, measured.tables(steps)
-        self.prepared = prepared = self.tables.prepared(model, len(model.elements))
+        shifts = bool(np.any(measured.zeros > 0.0))
+        self.followed, self._zero = with_zero(model) if shifts else (model, None)
+        self.prepared = prepared = self.tables.prepared(self.followed, len(self.followed.elements))
         self._stiffness = stiffness_place(model) if measured.scatter > 0.0 else None
         lanes = len(prepared.segments)
         starts, spread = np.zeros((2, 2 + model.internal_states, lanes))
         starts[:2], spread[:2] = prepared.starts[:, :lanes], prepared.spread[:, :lanes] ** 2
-        super().__init__(starts, spread, 0.0 if self._stiffness is None else measured.scatter)
+        scatter = 0.0 if self._stiffness is None else measured.scatter
+        super().__init__(starts, spread, scatter, measured.zeros)
         self._tabled = (
             on_device(np.asarray(model.shift(), dtype=float)),
             on_device(np.asarray(model.skew(), dtype=float)),
         )
         # An array, so that records of other rates share compiled code.
         self._time = on_device(np.asarray(prepared.sampling.time))
-        self._numbers = [np.asarray(entry.value, dtype=float) for entry in list_parameters(model)]
+        self._numbers = [np.asarray(entry.value, dtype=float) for entry in list_parameters(self.followed)]
         self._copied: dict[tuple[int, int], Batch] = {}
 
     @property
@@ -127,7 +128,7 @@ class RecordFilter(RecordStarts):
             sampling, values = self.prepared.sampling, self._values(part, places, points, starts)
             batch = self._batch(part, copies)
             return follow_records(
-                self.model,
+                self.followed,
                 values,
                 lanes,
                 batch,
@@ -175,7 +176,10 @@ class RecordFilter(RecordStarts):
         if self._stiffness is not None:
             free = self._stiffness in places
             number = point[places.index(self._stiffness)] if free else self._numbers[self._stiffness]
-            columns[self._stiffness] = (columns[self._stiffness] if free else 0.0) + number * unit[-1]
+            own = number * unit[len(places) + self._states]
+            columns[self._stiffness] = (columns[self._stiffness] if free else 0.0) + own
+        if self._zero is not None:
+            columns[self._zero] = (columns[self._zero] if self._zero in places else 0.0) + unit[-1]
         directions = tuple(map(on_device, columns))
         first = np.vstack([unit[len(places) :][: self._states], np.zeros(len(unit))])
         return self._products(places, point[None], way, directions, first)[:, :, 0]
@@ -224,7 +228,7 @@ class RecordFilter(RecordStarts):
             sampling, values = self.prepared.sampling, self._values(part, places, points, starts)
             batch, memory = self._batch(part, copies), jnp.asarray(way.correlation)
             return innovation_products(
-                self.model,
+                self.followed,
                 values,
                 directions,
                 self._start(part, copies, starts),
@@ -304,7 +308,9 @@ class RecordFilter(RecordStarts):
             column = points[:, places.index(place)] if place in places else np.full(len(points), number)
             lanes = np.repeat(column, width)
             if place == self._stiffness:
-                lanes = lanes * (1.0 + self._rows(part, len(points), starts)[-1])
+                lanes = lanes * (1.0 + self._rows(part, len(points), starts)[self._states])
+            if place == self._zero:
+                lanes = lanes + self._rows(part, len(points), starts)[-1]
             numbers.append(on_device(lanes))
         return tuple(numbers)
 
@@ -327,9 +333,9 @@ class RecordFilter(RecordStarts):
     def _batch(self, part: int, copies: int) -> Batch:
         """Give the records of a batch, as often as there are points."""
         if copies == 1:
-            return self.prepared.batches[part].following(self.model)
+            return self.prepared.batches[part].following(self.followed)
         if (part, copies) not in self._copied:
-            batch = self.prepared.batches[part].following(self.model)
+            batch = self.prepared.batches[part].following(self.followed)
             self._copied[part, copies] = jax.tree.map(
                 lambda one: on_device(np.tile(np.asarray(one), copies)) if np.ndim(one) else one, batch
             )

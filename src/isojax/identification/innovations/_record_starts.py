@@ -1,4 +1,4 @@
-"""The first states of records, and their linear stiffness, which follow the coefficients of a model."""
+"""What each record has of its own and follows the coefficients of a model: first states, stiffness, zero."""
 
 import copy
 from typing import Self
@@ -12,9 +12,13 @@ _LEAST_SCATTER = 1e-5
 """Least scatter of the linear stiffness from record to record [relative]."""
 
 
+_KNOWN = 1e-200
+"""Variance of what is known."""
+
+
 class RecordStarts:
-    """First states of each record. Where the linear stiffness scatters from record to record, its relative
-    deviation is a last row of them.
+    """First states of each record, and after them what else is its own: the relative deviation of its linear
+    stiffness where that scatters from record to record, and the zero of its sensor where a mean was removed.
 
     Attributes:
         starts: means of the first states of each record.
@@ -26,6 +30,7 @@ class RecordStarts:
         starts: Float[np.ndarray, "state record"],
         spread: Float[np.ndarray, "state record"],
         scatter: float,
+        zeros: Float[np.ndarray, " record"],
     ):
         """Keep what is known before the records are seen.
 
@@ -34,25 +39,33 @@ class RecordStarts:
             spread: their variances.
             scatter: standard deviation of the linear stiffness from record to record [relative]; 0 where all
                 records have one.
+            zeros: standard deviation of the zero of each record's sensor [SI unit of the output]; 0 where it
+                is known.
         """
         self._states, self.count = starts.shape
-        more = np.zeros((int(scatter > 0.0), self.count))
-        self.starts, self.spread = np.vstack([starts, more]), np.vstack([spread, more + scatter**2])
+        self._scatters, self._shifts = scatter > 0.0, bool(np.any(zeros > 0.0))
+        own = [np.full(self.count, scatter**2)] * self._scatters
+        own += [np.maximum(zeros**2, _KNOWN)] * self._shifts
+        more = np.reshape(own, (-1, self.count))
+        self.starts, self.spread = np.vstack([starts, 0.0 * more]), np.vstack([spread, more])
         self._centers, self._prior = self.starts.copy(), self.spread.copy()
-
-    @property
-    def _scatters(self) -> bool:
-        return len(self.starts) > self._states
 
     @property
     def scatter(self) -> float:
         """Standard deviation of the linear stiffness from record to record [relative]; 0 where it is one."""
-        return 0.0 if not self._scatters else float(np.sqrt(self._prior[-1, 0]))
+        return 0.0 if not self._scatters else float(np.sqrt(self._prior[self._states, 0]))
 
     @property
     def stiffness(self) -> Float[np.ndarray, " record"]:
         """Factor on the linear stiffness of each record."""
-        return np.ones(self.count) if not self._scatters else 1.0 + self.starts[-1]
+        return np.ones(self.count) if not self._scatters else 1.0 + self.starts[self._states]
+
+    @property
+    def zeros(self) -> tuple[Float[np.ndarray, " record"], Float[np.ndarray, " record"]] | None:
+        """Zero of each record's sensor, and its variance beforehand [SI unit of the output]; None where all
+        are known.
+        """
+        return (self.starts[-1], self._prior[-1]) if self._shifts else None
 
     def with_own_starts(self) -> Self:
         """Give the same filter, whose first states may move while those of this one stay."""
@@ -64,24 +77,24 @@ class RecordStarts:
     def of_coefficients(
         self, products: Float[np.ndarray, "row row record"]
     ) -> tuple[Float[np.ndarray, "kept kept record"], Float[np.ndarray, " record"]]:
-        """Leave out the first states, and eliminate the stiffness of each record.
+        """Leave out the first states, and eliminate what else each record has of its own.
 
         Args:
             products: of `slopes`.
 
         Returns:
-            `A^T A` of coefficients and innovations; what the unknown stiffness adds to the deviance.
+            `A^T A` of coefficients and innovations; what is unknown of each record adds to the deviance.
         """
         size = len(products) - len(self.starts) - 1
-        rows = np.r_[:size, len(products) - 1]
-        kept = products[np.ix_(rows, rows)]
-        if not self._scatters:
-            return kept, np.zeros(self.count)
-        row, variance, off = products[-2][rows], self._prior[-1], self.starts[-1]
-        row[-1] += off / variance
-        known = products[-2, -2] + 1.0 / variance
-        added = off**2 / variance + np.log(known * variance)
-        return kept - row[:, None] * row[None] / known, added
+        rows = np.r_[:size, size + self._states : len(products)]
+        kept, added = products[np.ix_(rows, rows)].copy(), np.zeros(self.count)
+        for place in reversed(range(self._states, len(self.starts))):
+            variance, off, row = self._prior[place], self.starts[place], kept[-2].copy()
+            row[-1] += off / variance
+            known = row[-2] + 1.0 / variance
+            added += off**2 / variance + np.log(known * variance)
+            kept = np.delete(np.delete(kept - row[:, None] * row[None] / known, -2, 0), -2, 1)
+        return kept, added
 
     def scatter_as(self, first: FirstStates, judged: Bool[np.ndarray, " record"]) -> None:
         """Let the stiffness scatter as that of the records does: a step of expectation and maximisation.
@@ -96,11 +109,11 @@ class RecordStarts:
         if not self._scatters:
             return
         information = first.reduced[:-1, :-1, judged].sum(axis=-1)
-        along = first.along[-1][:, judged]
+        along = first.along[self._states][:, judged]
         error = np.einsum("cr,cd,dr->r", along, covariance_of(information), along)
-        squares = self.starts[-1, judged] ** 2 + first.spread[-1, judged] + error
+        squares = self.starts[self._states, judged] ** 2 + first.spread[self._states, judged] + error
         if np.all(np.isfinite(squares)):
-            self._prior[-1] = max(float(np.mean(squares)), _LEAST_SCATTER**2)
+            self._prior[self._states] = max(float(np.mean(squares)), _LEAST_SCATTER**2)
 
     def widen(self, squares: Float[np.ndarray, "internal record"]) -> None:
         """Let the internal states begin anywhere in the range that they visit.
@@ -126,7 +139,8 @@ class RecordStarts:
         Returns:
             The steps of Gauss and Newton.
         """
-        return eliminate(products, self.starts, self._centers, self._prior, damping)
+        given = np.where(np.arange(len(self.starts))[:, None] < self._states, self.spread, 0.0)
+        return eliminate(products, self.starts, self._centers, self._prior, damping, given)
 
     def penalties(self, starts: Float[np.ndarray, "copy state record"]) -> Float[np.ndarray, "copy record"]:
         """Give what first states cost that lie off their centres."""

@@ -38,6 +38,7 @@ from ._unknowns import Unknowns as Unknowns
 from ._unknowns import has_stiffness_scale as has_stiffness_scale
 from ._unknowns import scaled_model as scaled_model
 from ._unknowns import stiffness_place as stiffness_place
+from ._unknowns import with_zero as with_zero
 from ._whitening import Whitening as Whitening
 from ._whitening import find_whitening as find_whitening
 from ._whitening import whiten as whiten

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..._parameters import find_parameter, list_parameters, replace_parameters
+from ...elements import CATALOGUE
 from ...models import Isolator, State
 
 
@@ -63,6 +64,22 @@ def stiffness_place(model: Isolator) -> int | None:
     """
     spring = next((one for one in model.elements if one.proportional_to == "displacement"), None)
     return None if spring is None else find_parameter(model, f"{spring.name}.{spring.strength}")
+
+
+def with_zero(model: Isolator) -> tuple[Isolator, int]:
+    """Give a model whose sensor has a zero error, and its place in `list_parameters`.
+
+    Args:
+        model: the isolator.
+
+    Returns:
+        The isolator, with the zero error last where it had none.
+    """
+    zero = next((one for one in model.elements if one.starts_at_mean), None)
+    if zero is None:
+        zero = next(kind(0.0) for kind in CATALOGUE.values() if kind.starts_at_mean)
+        model = Isolator(model.mass, (*model.elements, zero), model.excitation)
+    return model, find_parameter(model, f"{zero.name}.{zero.strength}")
 
 
 def scaled_model(model: Isolator, values: Sequence[Array], scale: Array) -> Isolator:
