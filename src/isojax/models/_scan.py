@@ -136,7 +136,7 @@ def scan_records(
     model: Isolator,
     solver: diffrax.AbstractSolver,
     quantity: Quantity,
-    sample_time: float,
+    sample_time: Lanes | float,
     state: State,
     record: Instant,
     observe: Callable[[State, Instant], Any],

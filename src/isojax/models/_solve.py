@@ -63,7 +63,7 @@ def solve_record(
     model: Isolator,
     integrator: Integrator,
     quantity: Quantity,
-    sample_time: float,
+    sample_time: Lanes | float,
     state: State,
     record: Instant,
     observed: int,

@@ -205,6 +205,6 @@ def _matrices(
         return (score_information(unknowns, carried, prepared),)
 
     (matrices,) = recall(
-        "information", compute, unknowns, carried, sampling.time, sampling.integrator.band_limited
+        "information", compute, unknowns, carried, float(sampling.time), sampling.integrator.band_limited
     )
     return np.where(np.abs(matrices) < HUGE, matrices, np.nan)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..._cores import usable_cores
-from ..._types import on_device
+from ..._types import Scalar, on_device
 from ...excitations import Hold
 from ...models import Instant, Integrator, Isolator, Quantity
 from ...records import Record, measured_state
@@ -71,14 +71,14 @@ class Sampling(NamedTuple):
 
     Attributes:
         quantity: what the sensor measures.
-        time: between samples [s].
+        time: between samples [s]; an array, so that other rates share compiled code.
         integrator: what simulates the segments.
         jumps: whether the drive jumps at the samples.
         whitening: what makes the noise in the rows of a lane white, or None where it is.
     """
 
     quantity: Quantity
-    time: float
+    time: Scalar
     integrator: Integrator
     jumps: bool
     whitening: Whitening | None = None
@@ -257,5 +257,7 @@ def prepare(
     # One after the other: the tables are the largest arrays that there are.
     batches = tuple(batch(first) for first in range(0, lanes, width))
     jumps = hold == "zero_order"
-    sampling = Sampling(quantity, 1.0 / records[0].rate, how, jumps, find_whitening(whitening))
+    sampling = Sampling(
+        quantity, on_device(np.asarray(1.0 / records[0].rate)), how, jumps, find_whitening(whitening)
+    )
     return Prepared(batches, order, segments, owner, starts, spread, count, sampling)

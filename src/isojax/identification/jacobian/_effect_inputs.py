@@ -122,7 +122,7 @@ def inputs_of(kind: type[AbstractElement]) -> tuple[str, ...]:
 
 
 def input_columns(
-    family: ElementFamily, motion: PathMotion, start: State, step: float
+    family: ElementFamily, motion: PathMotion, start: State, step: Scalar
 ) -> dict[str, Float[Array, "member time lanes"]]:
     """Give what a unit of strength adds at each effect input, along a motion.
 
@@ -143,7 +143,7 @@ def input_columns(
 
 @quick_jit
 def internal_state_path(
-    members: AbstractElement, stages: tuple[Float[Array, "time 3 lanes"], ...], start: State, step: float
+    members: AbstractElement, stages: tuple[Float[Array, "time 3 lanes"], ...], start: State, step: Scalar
 ) -> tuple[State, State]:
     """Integrate the internal states of effects of one kind along a motion.
 

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from ..._kernel_scan import kernel_scan
 from ..._quick_jit import quick_jit
+from ..._types import Scalar
 from ._slopes import Change, cubic_middle
 
 Matrix = list[list[Array]]
@@ -43,7 +44,7 @@ def product(left: Matrix, right: Matrix) -> Matrix:
     return [[entry(row, column) for column in columns] for row in left]
 
 
-def weighted_sum(*terms: tuple[float, Matrix]) -> Matrix:
+def weighted_sum(*terms: tuple[Array | float, Matrix]) -> Matrix:
     """Add small matrices, the first number of each term times its matrix."""
     size = range(len(terms[0][1]))
     return [[sum((f * m[row][column] for f, m in terms), jnp.zeros(())) for column in size] for row in size]
@@ -58,7 +59,7 @@ def around(values: Array) -> tuple[Array, Array, Array, Array]:
 
 
 @quick_jit
-def propagate(by_state: tuple[Change, ...], step: float) -> Propagation:
+def propagate(by_state: tuple[Change, ...], step: Scalar) -> Propagation:
     """Give what a Runge-Kutta step of the linear equation `d' = A(t) d + b(t)` does; it is linear itself.
 
     Args:

@@ -22,7 +22,7 @@ from jaxtyping import Array, Float
 
 from ..._cores import give_memory_back
 from ..._parameters import list_parameters, own_parameters
-from ..._types import on_device
+from ..._types import Scalar, on_device
 from ...models import Isolator, State
 from ._batch import Batch, Prepared, workers
 from ._effect_inputs import input_columns
@@ -235,7 +235,7 @@ def _block(
 
 def _sources(
     layout: _Layout,
-    step: float,
+    step: Scalar,
     batch: Batch,
     slopes: Slopes,
     exact: Transitions | None,

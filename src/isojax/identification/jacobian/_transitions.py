@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from ..._parameters import list_parameters
 from ..._quick_jit import quick_jit
+from ..._types import Scalar
 from ...models import Instant, Isolator, Quantity, State, Step, find_ringing, split_step
 from ._propagation import Matrix, Propagation, product
 from ._slopes import steps_of
@@ -44,7 +45,7 @@ def transitions_along(
     path: State,
     acting: Instant,
     quantity: Quantity,
-    sample_time: float,
+    sample_time: Scalar,
     ringing: Float[Array, ""],
 ) -> Transitions:
     """Differentiate each split step along a path.
