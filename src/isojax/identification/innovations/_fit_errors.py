@@ -227,7 +227,8 @@ def fit_errors(
             for begin, own in zip(begins[len(tried) :], standing[1:], strict=True):
                 record_filter.begin(begin, first.spread, (own == lowest) & (own < here))
             damping = min(1e9, 1e3 * damping)
-        if deviance > last + settled_at:  # the last step of the sizes went too far
+        still = abs(last - deviance) < settled_at
+        if deviance > last + settled_at and trust > _SMALL_CHANGE:  # the last step of the sizes went too far
             trust *= 0.25
             new = Sizes(
                 before.force + 0.25 * (sizes.force - before.force),
@@ -235,10 +236,9 @@ def fit_errors(
                 before.noise + 0.25 * (sizes.noise - before.noise),
             )
         else:
-            trust, before, new = min(2.0 * trust, FURTHEST), sizes, sizes.moved(way, part, bounds, trust)
-
-        aim = sizes.moved(way, part, bounds, FURTHEST)
-        still = abs(last - deviance) < settled_at or aim.distance(sizes) < _SMALL_CHANGE
+            trust = min(2.0 * trust, FURTHEST)
+            last, before, new = deviance, sizes, sizes.moved(way, part, bounds, trust)
+        still = still or sizes.moved(way, part, bounds, FURTHEST).distance(sizes) < _SMALL_CHANGE
         settled = step > 2 and still and gain < settled_at
         ended = settled and (promised < settled_at or damping >= 1e6)
         if (ended or step > _USUAL_SCORINGS) and not sought and sizes.force > least.force:
@@ -256,7 +256,7 @@ def fit_errors(
                     continue
             result = RESULTS.successful if promised < 1.0 else RESULTS.not_converged
             break
-        sizes, last = new, deviance
+        sizes = new
     way = followed([free] * COPIES, sizes.around())
     products, beside = record_filter.of_coefficients(record_filter.slopes(places, points([free])[0], way))
     return ErrorFit(

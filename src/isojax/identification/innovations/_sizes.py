@@ -76,9 +76,16 @@ class Sizes(NamedTuple):
         held = ((here <= lower) & (slope >= 0.0)) | ((here >= upper) & (slope <= 0.0))
         free, step = np.flatnonzero(~held), np.zeros(2 + count)
         step[free] = -np.linalg.solve(fisher[np.ix_(free, free)], slope[free])
-        step = np.clip(np.log(np.maximum(1.0 + step, np.exp(-furthest))), -furthest, furthest)
-        moved = here + step
-        return Sizes(float(moved[0]), float(moved[1]), moved[2:]).within(bounds)
+        # Records show the density below the force's bandwidth; its new part and its memory move along that.
+        left, fade = _unlike(self.memory)
+        step[0] -= 2.0 * fade * step[1]
+        # Shortened as a whole: sizes that depend on each other keep the direction.
+        longest = np.where(step < 0.0, -np.expm1(-furthest), np.expm1(furthest))
+        step = step * min(1.0, float(np.min(longest / np.maximum(np.abs(step), 1e-300))))
+        moved = here + np.log1p(step)
+        memory = float(np.clip(moved[1], lower[1], upper[1]))
+        force = float(moved[0]) + 2.0 * (_unlike(memory)[0] - left)
+        return Sizes(force, memory, moved[2:]).within(bounds)
 
     def within(self, bounds: tuple["Sizes", "Sizes"]) -> "Sizes":
         """Give the sizes that lie nearest, between the smallest and the largest."""
@@ -99,6 +106,12 @@ class Sizes(NamedTuple):
     def variance(self) -> float:
         """Variance of the random force [squared SI unit of the drive]."""
         return float(np.exp(self.force) / (1.0 - self.correlation**2))
+
+
+def _unlike(memory: float) -> tuple[float, float]:
+    """Give the logarithm of one less the correlation from sample to sample, and its slope with the memory."""
+    rate = np.exp(-memory)
+    return float(np.log(-np.expm1(-rate))), float(-rate / np.expm1(rate))
 
 
 class Way(NamedTuple):
