@@ -39,6 +39,7 @@ from .fitting import (
     Search,
     as_fit,
     beside_own_noise,
+    beside_random_force,
     complete,
     fit_by_output,
     on_all_samples,
@@ -228,7 +229,8 @@ def _loop(
     guess = classical_guess(campaign)
     progress(Stage("fit of the declared model", _FIT, LOOP_SHARES[2:]))
     search = search_of(campaign, rules, solver, progress)
-    before = fit_by_output(as_isolator(guess.model, recorded=True), campaign, search)
+    first = fit_by_output(as_isolator(guess.model, recorded=True), campaign, search)
+    before = beside_random_force(first, search)
     progress(KeyFigure(f"chi2/dof {before.stats.chi2 / before.stats.dof:.4g}"))
     extensions, (verdict, beside) = search_effects(before, search, max_iterations, excluded)
     if extensions:
@@ -240,7 +242,7 @@ def _loop(
     elif verdict.after is not None:
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
-    names = tuple(finding.effect for finding in findings_in(after.model, extensions))
+    names = tuple(one.effect for one in findings_in(after.model, extensions))
     alternatives: tuple[Alternatives, ...] = ()
     if names and is_successful(after.result) and after.innovations is None:
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))

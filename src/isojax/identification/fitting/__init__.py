@@ -31,6 +31,7 @@ from ._estimate import Estimate as Estimate
 from ._estimate import estimate as estimate
 from ._estimate import magnitudes as magnitudes
 from ._fit import beside_own_noise as beside_own_noise
+from ._fit import beside_random_force as beside_random_force
 from ._fit import fit as fit
 from ._fit import fit_by_output as fit_by_output
 from ._fit import still as still

@@ -18,7 +18,7 @@ from .._rules import Rules
 from ..guess import as_campaign, classical_guess, linear_starts
 from ._drive_noise import drive_noise
 from ._estimate import Estimate, estimate, free_places
-from ._fit_of_errors import fit_errors_of, suits_innovations
+from ._fit_of_errors import as_fit_of_errors, fit_errors_of, suits_innovations
 from ._fit_result import Fit
 from ._noise_left import noise_left
 from ._problem import Problem
@@ -98,6 +98,7 @@ def fit(
         refuse_contradictions(dataclasses.replace(campaign, elements=named))
     search = search_of(campaign, rules, solver, progress, max_steps)
     found = fit_by_output(model, campaign, search, places, integrator)
+    found = beside_random_force(found, search, integrator is None)
     return beside_own_noise(found, search, integrator is None)
 
 
@@ -163,6 +164,45 @@ def fit_by_output(
     return with_less_noise(complete(found, model, campaign, noise), search)
 
 
+def beside_random_force(found: Fit, search: Search, any_steps: bool = True) -> Fit:
+    """Fit again beside a random force on the mass, where the noise of a good fit has the colour of its answer.
+
+    A floor that shakes, or air that moves, adds most near the resonance. Dwells and periods show that as
+    coloured noise of the output. A filter knows where it comes from.
+
+    Args:
+        found: a fit weighted by the noise that the output shows.
+        search: how to search.
+        any_steps: whether the integration steps are free.
+
+    Returns:
+        The fit; `found` itself where its noise is white, or is no answer to a random force.
+    """
+    campaign, rules = found.campaign, search.rules
+    if not (any_steps and search.max_steps >= MOST_EVALUATIONS and found.innovations is None):
+        return found
+    good = is_successful(found.result) and found.stats.chi2 <= rules.good * found.stats.dof
+    if not (good and found.noise.method in ("cycle_scatter", "periods")):
+        return found
+    if not suits_innovations(campaign, stepped=True) or drive_noise(found, rules) is not None:
+        return found
+    if not found.noise.whitening and weighted_by_residual(found, search) is found:
+        return found
+    search.progress("the noise is coloured: again, beside a random force on the mass")
+    errors = fit_errors_of(
+        found.model, found.estimate.places, campaign, search, found.stats.stiffness_scatter
+    )
+    if not (errors.is_noise and errors.has_force and is_successful(errors.result)):
+        return found
+    return _with_further(as_fit_of_errors(errors, found.start, campaign), found)
+
+
+def _with_further(again: Fit, found: Fit) -> Fit:
+    """Keep what a fit says of a further record's stiffness."""
+    further = found.stats.next_stiffness_scatter
+    return again._replace(stats=again.stats._replace(next_stiffness_scatter=further))
+
+
 def beside_own_noise(found: Fit, search: Search, any_steps: bool = True) -> Fit:
     """Fit again beside the noise of the drive, or by the noise that a good fit leaves.
 
@@ -189,9 +229,7 @@ def beside_own_noise(found: Fit, search: Search, any_steps: bool = True) -> Fit:
     alone = errors.is_noise and errors.sizes.variance < rules.as_declared * seen.drive**2
     if not (alone and is_successful(errors.result)):
         return weighted_by_residual(found, search)
-    again = fit_with_errors(errors, found.start, campaign, search)
-    further = found.stats.next_stiffness_scatter
-    return again._replace(stats=again.stats._replace(next_stiffness_scatter=further))
+    return _with_further(fit_with_errors(errors, found.start, campaign, search), found)
 
 
 def weighted_by_residual(found: Fit, search: Search) -> Fit:
