@@ -165,7 +165,7 @@ def fit_by_output(
 
 
 def beside_random_force(found: Fit, search: Search, any_steps: bool = True) -> Fit:
-    """Fit again beside a random force on the mass, where the noise of a good fit has the colour of its answer.
+    """Fit again beside a random force on the mass, where a good fit leaves noise of the colour of its answer.
 
     A floor that shakes, or air that moves, adds most near the resonance. Dwells and periods show that as
     coloured noise of the output. A filter knows where it comes from.
