@@ -6,13 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import freqz, lsim, welch
+from scipy.signal import butter, freqz, lfilter, lsim, welch
 
 from isojax import rig
 from isojax._progress import silent
 from isojax.elements import CubicStiffness, LinearDamping, LinearStiffness
 from isojax.identification import Rules, diagnose, fit
-from isojax.identification.fitting import DEFAULT_SOLVER, drive_noise, search_of, weighted_by_output
+from isojax.identification.fitting import (
+    DEFAULT_SOLVER,
+    as_fit_of_errors,
+    drive_noise,
+    search_of,
+    weighted_by_output,
+)
 from isojax.models import Integrator, Isolator
 from isojax.records import Dwell, Record, estimate_noise, quieter_noise
 
@@ -65,6 +71,14 @@ def noisy_record(seed, measured, acting, period=None):
         settle=0 if period is None else period,
         kind="stepped_sine" if period is None else "periodic",
     )
+
+
+def shaken_record(seed):
+    """A stepped sine over a floor that shakes up to 30 Hz, which no channel measures."""
+    clean, draw = noisy_record(seed, 0.0, 0.0), np.random.default_rng(100 + seed)
+    shaking = lfilter(*butter(2, 30.0, fs=RATE), FORCE * draw.standard_normal(clean.input.size))
+    output = clean.output + response(shaking)
+    return dataclasses.replace(clean, output=output, raw_output=output)
 
 
 def fitted(campaign_of, records, integrator=None):
@@ -178,6 +192,22 @@ def test_noise_that_acts_and_is_measured_is_no_noise_of_the_residual(campaign_of
     assert found.noise.colour is None
     assert found.stats.chi2 / found.stats.dof == pytest.approx(1.0, abs=0.03)
     assert "most of which the model explains" in found.noise.note
+
+
+def test_a_floor_that_shakes_is_a_random_force_on_the_mass(campaign_of):
+    """Its noise has the colour of the isolator's own answer, and its size is found by the likelihood."""
+    found = fitted(campaign_of, tuple(shaken_record(place) for place in range(2)))
+    errors = found.innovations
+    assert errors is not None
+    assert errors.is_noise
+    assert errors.has_force
+    for name, true in (("linear_stiffness.coefficient", STIFFNESS), ("linear_damping.coefficient", DAMPING)):
+        assert abs(float(found.model[name]) - true) < 4.0 * found.standard_errors[name]
+    near = errors.way.deviance.sum(axis=1)
+    assert near[0] < near.min() + 0.1  # no size a little larger or smaller makes the records more probable
+    wider = as_fit_of_errors(dataclasses.replace(errors, unkept=9.0), found.start, found.campaign)
+    for name, error in wider.standard_errors.items():
+        assert error == pytest.approx(3.0 * found.standard_errors[name])
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.003])

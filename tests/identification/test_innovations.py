@@ -17,6 +17,7 @@ from isojax.identification.innovations import (
     RecordFilter,
     Sizes,
     _fit_errors,
+    eliminate,
     first_sizes,
     fit_errors,
     fit_measured,
@@ -348,3 +349,15 @@ def test_a_measured_building_on_rubber_bearings_has_hysteresis(shared_data, tmp_
     assert len(shares) >= 3  # the finding and the next two
     assert shares[0] == verdict.finding.transfer > 0.0
     assert "Hz" in verdict.reason
+
+
+def test_what_a_record_tells_of_its_first_state_is_counted_once():
+    """A filter's innovations hold the variance with which it began: again and again the same comes out."""
+    told, prior, given = 50.0, 4.0, 3.0  # information of the record alone, variance before, of the filter
+    for _ in range(30):
+        seen = 1.0 / (given + 1.0 / told)
+        products = np.array([[1.0, 0.0, 0.0], [0.0, seen, 0.0], [0.0, 0.0, 1.0]])[:, :, None]
+        one = np.zeros((1, 1))
+        first = eliminate(products, one, one, one + prior, np.zeros(1), one + given)
+        given = float(first.spread[0, 0])
+        assert given == pytest.approx(1.0 / (told + 1.0 / prior), rel=1e-6)

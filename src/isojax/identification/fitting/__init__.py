@@ -37,6 +37,7 @@ from ._fit import fit_by_output as fit_by_output
 from ._fit import still as still
 from ._fit import weighted_by_output as weighted_by_output
 from ._fit import weighted_by_residual as weighted_by_residual
+from ._fit_of_errors import as_fit_of_errors as as_fit_of_errors
 from ._fit_result import Fit as Fit
 from ._fit_result import bent_words as bent_words
 from ._fit_result import fit_report as fit_report

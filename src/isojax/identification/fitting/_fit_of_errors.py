@@ -173,7 +173,8 @@ def as_fit_of_errors(found: ErrorFit, start: Isolator, campaign: Campaign) -> Fi
     count, samples = len(found.places), found.samples
     result = found.result if np.isfinite(found.deviance.sum()) else RESULTS.not_finite
     point = simulator.evaluate(found.model, one_hot(found.model, found.places, [1.0] * count), nuisances)
-    inflation = 1.0 if found.is_noise else found.inflation
+    # Coefficients are no better known than where slopes and values of the likelihood disagree.
+    inflation = max(1.0 if found.is_noise else found.inflation, found.unkept)
     uncertainty = invert_information(found.information, inflation)
     estimate = Estimate(found.model, found.places, simulator, point, uncertainty, result, found.steps)
     deviance, owners = float(found.deviance.sum()), [one.record for one in found.filter.measured.segments]

@@ -11,6 +11,7 @@ from ._ahead import squares_ahead as squares_ahead
 from ._effect_products import EffectProducts as EffectProducts
 from ._effect_products import effect_products as effect_products
 from ._error_fit import ErrorFit as ErrorFit
+from ._first_states import eliminate as eliminate
 from ._fit_errors import first_sizes as first_sizes
 from ._fit_errors import fit_errors as fit_errors
 from ._fit_measured import fit_measured as fit_measured

@@ -48,6 +48,7 @@ class ErrorFit:
         steps: steps that it took.
         filter: of the model over the records.
         way: of the filter at the solution.
+        unkept: decrease of the deviance that its slopes promise at the solution, and that no step keeps.
     """
 
     model: Isolator
@@ -60,6 +61,7 @@ class ErrorFit:
     steps: int
     filter: RecordFilter
     way: Way
+    unkept: float = 0.0
 
     @property
     def values(self) -> Float[np.ndarray, " column"]:

@@ -1,5 +1,6 @@
 """The search for coefficients and the sizes of the errors, by the likelihood of the innovations."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -180,6 +181,7 @@ def fit_errors(
         free = frees[int(np.argmin(deviances[: len(frees)]))]
     last, before, trust, alone, sought = np.inf, sizes, FURTHEST, False, rough
     result: Any = RESULTS.not_converged
+    stands, promised = False, 0.0  # no step gains
     fallen: list[float] = []
     for step in range(1, _MOST_SCORINGS + 1):
         if rough and step > _USUAL_SCORINGS:
@@ -254,12 +256,13 @@ def fit_errors(
                 if noise is not None and noise[1] < deviance + _NO_WORSE:
                     sizes, bounds, last = noise[0], only, np.inf
                     continue
+            stands = True
             result = RESULTS.successful if promised < 1.0 else RESULTS.not_converged
             break
         sizes = new
     way = followed([free] * COPIES, sizes.around())
     products, beside = record_filter.of_coefficients(record_filter.slopes(places, points([free])[0], way))
-    return ErrorFit(
+    found = ErrorFit(
         replace_at(record_filter.model, places, physical(free, specs, scales)[0]),
         places,
         sizes,
@@ -271,6 +274,10 @@ def fit_errors(
         record_filter,
         way,
     )
+    if stands and found.is_noise_of_output:
+        # Beside the jumps of a law slopes promise what no step of any length keeps.
+        return dataclasses.replace(found, result=RESULTS.successful, unkept=promised)
+    return found
 
 
 def _noise_alone(
