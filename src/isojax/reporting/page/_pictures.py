@@ -144,7 +144,7 @@ def _lead_pictures(before: Fit, after: Fit | None, telling: Slice) -> tuple[Pict
     else:
         caption = "Measured minus model, where the error before is largest."
         residuals = _draw("largest residual", caption, _plot_worst, plot_residual, before, after)
-    caption = "Inside the band, the residual is uncorrelated with the drive."
+    caption = "A residual that is uncorrelated with the drive stays inside the band at 99 % of the lags."
     return (
         *residuals,
         *_restoring_force(before, after, telling),
