@@ -253,7 +253,6 @@ def _loop(
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.
         before = after = beside_own_noise(before, search)
-    # Asked for here, so that the time of the loop counts it.
     progress(Stage("free runs of every record", _RUNS))
     if is_successful(before.result) and is_successful(after.result):
         progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
