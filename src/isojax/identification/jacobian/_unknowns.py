@@ -1,7 +1,7 @@
 """Where a simulation stands, and along which directions it is differentiated."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -77,7 +77,8 @@ def with_zero(model: Isolator) -> tuple[Isolator, int]:
     """
     zero = next((one for one in model.elements if one.starts_at_mean), None)
     if zero is None:
-        zero = next(kind(0.0) for kind in CATALOGUE.values() if kind.starts_at_mean)
+        kind: Any = next(one for one in CATALOGUE.values() if one.starts_at_mean)
+        zero = kind(0.0)
         model = Isolator(model.mass, (*model.elements, zero), model.excitation)
     return model, find_parameter(model, f"{zero.name}.{zero.strength}")
 
