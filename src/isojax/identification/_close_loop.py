@@ -242,7 +242,7 @@ def _loop(
     elif verdict.after is not None:
         reason = f"{verdict.reason} It is not added, since max_iterations = {max_iterations}."
         verdict = verdict._replace(verdict="unexplained", reason=reason)
-    names = tuple(one.effect for one in findings_in(after.model, extensions))
+    names = tuple(finding.effect for finding in findings_in(after.model, extensions))
     alternatives: tuple[Alternatives, ...] = ()
     if names and is_successful(after.result) and after.innovations is None:
         progress(Stage("other force laws in the place of the findings", _LAWS, (_RUNS,)))
@@ -253,7 +253,7 @@ def _loop(
     if after is before:
         # Where nothing was added there are no two fits whose errors must be comparable.
         before = after = beside_own_noise(before, search)
-    progress(Stage("free runs of every record", _RUNS))
+    progress(Stage("free runs of every record", _RUNS))  # here, so that the time of the loop counts them
     if is_successful(before.result) and is_successful(after.result):
         progress(KeyFigure(f"error {before.nrmse:.2%} of the measured rms before, {after.nrmse:.2%} after"))
     for step in (before, after):

@@ -166,8 +166,7 @@ class Campaign:
     @property
     def lacks_mean(self) -> bool:
         """Whether the mean of a displacement to fit was removed: each record then has a zero of its own."""
-        shifted = self.output.quantity == "displacement"  # other quantities have no mean of their own
-        return shifted and any(record.mean_removed for record in self.fit_records)
+        return any(record.lacks_mean(self.output.quantity) for record in self.fit_records)
 
     @property
     def holdout_records(self) -> tuple[Record, ...]:

@@ -120,10 +120,9 @@ class Record:
         stated = ((name, getattr(self, name)) for name in CONDITIONS)
         return tuple((name, value) for name, value in stated if value is not None)
 
-    @property
-    def mean_removed(self) -> bool:
-        """Whether the output has no mean at all: it was subtracted, and a mean of the motion with it."""
-        return bool(abs(self.output.mean()) < _NO_MEAN * self.output.std())
+    def lacks_mean(self, quantity: str) -> bool:
+        """Says whether a mean of the motion was subtracted; of all quantities a displacement has one."""
+        return quantity == "displacement" and bool(abs(self.output.mean()) < _NO_MEAN * self.output.std())
 
     @property
     def rings_down(self) -> bool:

@@ -112,10 +112,11 @@ def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ())
     probes = tuple(
         probe
         for probe in absent_effects(fit.model, search.scales, excluded)
-        if probe.name not in pointless
-        and not probe.phased
-        and not (fit.filter.zeros is not None and probe.starts_at_mean)  # known of no record
+        if probe.name not in pointless and not probe.phased
     )
+    # Where each record has a zero of its own, none common to all can be seen.
+    zeros = {probe.name for probe in probes if probe.starts_at_mean and fit.filter.zeros is not None}
+    probes = tuple(probe for probe in probes if probe.name not in zeros)
     units = np.array([1e-3 * probe.typical_strength(search.scales) for probe in probes])
     products, count = effect_products(fit, probes, units), len(fit.places)
     own = 1.0 / np.sqrt(np.maximum(np.diag(fit.information), 1e-300))
@@ -160,7 +161,8 @@ def score_effects(fit: ErrorFit, search: Search, excluded: tuple[str, ...] = ())
         )
         for place, column in enumerate(order)
     )
-    return Scores(scores, tuple(sorted({probe.name for probe in probes} - set(best))), dispersion, probes)
+    hidden = zeros | {probe.name for probe in probes} - set(best)
+    return Scores(scores, tuple(sorted(hidden)), dispersion, probes)
 
 
 def coefficients(fit: ErrorFit, score: Score) -> int:

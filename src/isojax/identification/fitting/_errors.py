@@ -165,23 +165,23 @@ def run_freely(problem: Problem, model: Isolator) -> tuple[Run, ...]:
         One run a record.
     """
     runs, records = _run_once(problem, model), problem.records
-    means = [_removed_mean(run) for run in runs]
-    if not np.any(means):
+    removed = [record.lacks_mean(problem.quantity) for record in records]
+    if not any(removed):
         return runs
-    # Initial states are sought with the mean that a record had.
+    # Initial states are sought with the mean that a record had; a run that diverged has none.
+    means = [
+        float(np.nan_to_num(own * run.simulated.mean(), posinf=0.0, neginf=0.0))
+        for run, own in zip(runs, removed, strict=True)
+    ]
     whole = [
         dataclasses.replace(record, output=record.output + mean)
         for record, mean in zip(records, means, strict=True)
     ]
     runs = _run_once(problem._replace(records=tuple(whole)), model)
-    runs = tuple(run._replace(record=record) for run, record in zip(runs, records, strict=True))
-    return tuple(run._replace(simulated=run.simulated - _removed_mean(run)) for run in runs)
-
-
-def _removed_mean(run: Run) -> float:
-    """Give the mean that was removed from a record, as its simulation has it; 0 where it diverged."""
-    mean = float(np.mean(run.simulated)) if run.record.mean_removed else 0.0
-    return mean if np.isfinite(mean) else 0.0
+    return tuple(
+        Run(record, run.simulated - own * run.simulated.mean(), run.counted)
+        for record, run, own in zip(records, runs, removed, strict=True)
+    )
 
 
 def _run_once(problem: Problem, model: Isolator) -> tuple[Run, ...]:

@@ -194,10 +194,10 @@ def beside_random_force(found: Fit, search: Search, any_steps: bool = True) -> F
     )
     if not (errors.is_noise and errors.has_force and is_successful(errors.result)):
         return found
-    return _with_further(as_fit_of_errors(errors, found.start, campaign), found)
+    return _with_next_scatter(as_fit_of_errors(errors, found.start, campaign), found)
 
 
-def _with_further(again: Fit, found: Fit) -> Fit:
+def _with_next_scatter(again: Fit, found: Fit) -> Fit:
     """Keep what a fit says of a further record's stiffness."""
     further = found.stats.next_stiffness_scatter
     return again._replace(stats=again.stats._replace(next_stiffness_scatter=further))
@@ -229,7 +229,7 @@ def beside_own_noise(found: Fit, search: Search, any_steps: bool = True) -> Fit:
     alone = errors.is_noise and errors.sizes.variance < rules.as_declared * seen.drive**2
     if not (alone and is_successful(errors.result)):
         return weighted_by_residual(found, search)
-    return _with_further(fit_with_errors(errors, found.start, campaign, search), found)
+    return _with_next_scatter(fit_with_errors(errors, found.start, campaign, search), found)
 
 
 def weighted_by_residual(found: Fit, search: Search) -> Fit:

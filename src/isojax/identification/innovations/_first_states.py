@@ -63,9 +63,9 @@ def eliminate(
         back = (own / unit)[:, None] * (damped @ (outer / unit[:, None]))
         reduced[:, :, record] -= (outer / own[:, None]).T @ back
         settled[:, record], along[:, :, record] = -back[:, -1], -back[:, :-1]
-        whole_known = _without(inner, given[:, record] / own**2) + np.eye(size)
-        unit = np.sqrt(np.diag(whole_known))
-        spread[:, record] = (own / unit) ** 2 * np.diag(_inverse(whole_known / np.outer(unit, unit)))
+        told = _without(inner, given[:, record] / own**2) + np.eye(size)
+        unit = np.sqrt(np.diag(told))
+        spread[:, record] = (own / unit) ** 2 * np.diag(_inverse(told / np.outer(unit, unit)))
     return FirstStates(reduced, settled, along, spread)
 
 

@@ -55,8 +55,7 @@ class Measured:
             (place, start, stop, settle), middle = ends[0], records[0].output.size // 2
             ends = [(place, start, middle, settle), (place, middle, stop, middle)]
         self.segments = tuple(Segment(*each) for each in ends)
-        shifted = quantity == "displacement"
-        zeros = [one.output.std() if shifted and one.mean_removed else 0.0 for one in recorded]
+        zeros = [one.output.std() if one.lacks_mean(quantity) else 0.0 for one in recorded]
         self.zeros = np.array([zeros[one.record] for one in self.segments])
         self.loudest = 2.0 * np.log(noise[[one.record for one in self.segments]])
         self._tables: dict[int, Tables] = {}
